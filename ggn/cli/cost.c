@@ -394,7 +394,8 @@ static int cost_models(struct job *j, struct base_threads *threads, struct base_
         if (j->o->no_noise_maps)
             ggn_policy_without_halves(&policy);
         if (!rc)
-            rc = ggn_eval_trained(&m, &j->set, model, &policy, name, (enum ggn_precision)j->o->precision, threads, err);
+            rc =
+                ggn_eval_trained(&m, &j->set, model, &policy, name, (enum ggn_precision)j->o->precision, NULL, threads, err);
         if (!rc) {
             cost_network(j, &m);
             put_scores(j, &m);
@@ -453,16 +454,17 @@ static int cost_thresholds(struct job *j, struct base_err *err)
     return rc;
 }
 
-/* Whether a model takes the noise map, and the longest window. */
-static int read_models(const struct options *o, int *noise_maps, int *window, struct base_err *err)
+/* What the models take, and the longest window. */
+static int read_models(const struct options *o, struct ggn_eval_options *eo, struct base_err *err)
 {
     int rc = 0;
     for (int i = 0; i < o->n_models && !rc; i++) {
         struct ggn_model *model = NULL;
         rc = ggn_model_load(o->models[i], &model, err);
         if (!rc) {
-            *noise_maps |= model->hyper.noise_map && !o->no_noise_maps;
-            *window = model->hyper.window > *window ? model->hyper.window : *window;
+            eo->noise_maps |= model->hyper.noise_map && (model->hyper.reach > 0 || !o->no_noise_maps);
+            eo->measures |= model->hyper.reach > 0;
+            eo->window = model->hyper.window > eo->window ? model->hyper.window : eo->window;
         }
         ggn_model_destroy(model);
     }
@@ -517,7 +519,8 @@ int ggn_cmd_cost(int argc, char **argv)
     struct job j = {.o = &o};
     struct base_threads *threads = NULL;
     struct base_err err = {0};
-    int skipped, noise_maps = 0, window = 6;
+    struct ggn_eval_options eo = {.window = 6, .no_ssim = 1, .seed = 1};
+    int skipped;
 
     int rc = base_options_parse(&options, argc, argv, &o, &err);
     j.split = (enum ggn_split)o.split;
@@ -525,20 +528,16 @@ int ggn_cmd_cost(int argc, char **argv)
         fprintf(stderr, "%s: bfloat16 products by %s\n", argv[0], ggn_precision_bf16_by());
     if (!rc && !(threads = base_threads_create(o.threads, &err)))
         rc = err.code;
+    eo.dir = o.data;
+    eo.quality = !o.no_quality;
+    eo.recorded = o.recorded;
+    eo.without_halves = o.no_noise_maps;
+    eo.ratio = o.ratio;
+    eo.cadence = o.cadence;
     if (!rc)
-        rc = read_models(&o, &noise_maps, &window, &err);
+        rc = read_models(&o, &eo, &err);
     if (!rc)
-        rc = ggn_eval_set_load(&j.set,
-                               &(struct ggn_eval_options){.dir = o.data,
-                                                          .window = window,
-                                                          .quality = !o.no_quality,
-                                                          .no_ssim = 1,
-                                                          .recorded = o.recorded,
-                                                          .ratio = o.ratio,
-                                                          .seed = 1,
-                                                          .cadence = o.cadence,
-                                                          .noise_maps = noise_maps},
-                               threads, &skipped, &err);
+        rc = ggn_eval_set_load(&j.set, &eo, threads, &skipped, &err);
     for (int b = 0; o.recorded && b < j.set.n_blocks; b++) /* whose thresholds lie beyond: nothing is known there */
         if (j.set.blocks[b].label.censored)
             j.set.blocks[b].split = GGN_SPLITS;

@@ -204,8 +204,8 @@ static int add_models(struct evaluation *j, struct base_threads *threads, struct
         struct ggn_policy policy;
         rc = policy_of(j->o, j->models[i / precisions], &policy, err);
         if (!rc)
-            rc = ggn_eval_trained(&j->methods[j->n], &j->set, j->models[i / precisions], &policy, name, precision, threads,
-                                  err);
+            rc = ggn_eval_trained(&j->methods[j->n], &j->set, j->models[i / precisions], &policy, name, precision,
+                                  j->o->observer, threads, err);
         if (rc)
             return rc;
         j->likened[j->n] = precision == GGN_PRECISION_BF16 ? j->n - 1 : i > 0 ? j->n - i : -1;
@@ -362,13 +362,21 @@ static int load(struct evaluation *j, struct base_threads *threads, int *skipped
                                   .window = window,
                                   .quality = !o->no_quality,
                                   .recorded = o->recorded,
+                                  .without_halves = o->no_noise_maps,
                                   .ratio = o->ratio,
                                   .seed = 1,
                                   .job = ggn_cmd_job,
                                   .files = files,
                                   .n_files = n};
-    for (int i = 0; i < o->n_models && !rc && !o->no_noise_maps; i++)
-        eo.noise_maps |= j->models[i]->hyper.noise_map;
+    for (int i = 0; i < o->n_models && !rc; i++) {
+        const struct ggn_hyper *h = &j->models[i]->hyper;
+        eo.noise_maps |= h->noise_map && (h->reach > 0 || !o->no_noise_maps);
+        eo.measures |= h->reach > 0;
+    }
+    for (int i = 0; i < o->n_models && !rc && eo.measures; i++)
+        if (j->models[i]->hyper.noise_map && j->models[i]->hyper.reach <= 0)
+            rc = base_fail(err, BASE_EINVAL, "%s: it takes another noise picture than residual models; evaluate it apart",
+                           o->models[i]);
     return rc ? rc : ggn_eval_set_load(&j->set, &eo, threads, skipped, err);
 }
 

@@ -39,6 +39,9 @@ static int print_model(const struct ggn_model *m, const struct ggn_container *c,
     printf("block        %d x %d pixels, window of %d images\n", h->width, h->height, h->window);
     printf("widths       denoiser %d, generator %d, discriminator %d\n", h->k_r, h->k_m, h->k_d);
     printf("noise picture of half buffers: %s\n", h->noise_map ? "taken where the host has them" : "not taken");
+    if (h->reach > 0)
+        printf("residual     corrects the law of visible noise by up to %g octaves of noise; told %d scalars\n", h->reach,
+               h->scalars);
     for (int net = 0; net < GGN_NETS; net++)
         printf("%-12s %zu parameters, %.0f MAC\n", m->graph[net].name, m->graph[net].n_params,
                ggn_graph_mac(&m->graph[net]));
@@ -47,9 +50,9 @@ static int print_model(const struct ggn_model *m, const struct ggn_container *c,
            1e-6 * 9.0 * (h->window + 1) * h->width *
                h->height, /* of 3 channels 8 bits noisy and 16 denoised, and a spare slot */
            1e-6 * (double)ggn_inference_bytes(m, GGN_PRECISION_F32, 1));
-    printf("calibration  p = sigmoid(%g * logit + %g), stops below %g in %d checks in a row, spacing %g\n",
-           m->calibration.scale, m->calibration.shift, m->calibration.threshold, m->calibration.consecutive,
-           m->calibration.spacing);
+    printf("calibration  p = sigmoid(%g * %s + %g), stops below %g in %d checks in a row, spacing %g\n",
+           m->calibration.scale, h->reach > 0 ? "octaves" : "logit", m->calibration.shift, m->calibration.threshold,
+           m->calibration.consecutive, m->calibration.spacing);
     printf("file         %zu bytes, version %d, %d tensors\n", c->size, GGN_CONTAINER_VERSION, c->n_entries);
     printf("provenance   %s\n", provenance);
     cJSON_free(provenance);

@@ -48,10 +48,19 @@ static const struct base_option list[] = {
      .help = "train on gain * (image - newest image), folded away on saving; 0 = off (lull 8)"},
     {"soft-labels", 0, "N", TO(plan.soft_labels), 0, 1, .help = "1: labels between 0 and 1 near the threshold (lull 1)"},
     {"flips", 0, "N", TO(plan.flips), 0, 1, .help = "1: windows are flipped and rotated at random (lull 1)"},
-    {"jitter", 0, "N", TO(plan.jitter), 0, 2, .help = "octaves over which the exposure of a window is varied (lull 0.3)"},
+    {"jitter", 0, "N", TO(plan.jitter), 0, 2,
+     .help = "octaves over which the exposure of a window is varied; not with --residual (lull 0.3)"},
     {"picture", 0, "SHARE", TO(plan.noise_map), 0, 1,
      .help = "share of windows that come with the noise picture of their half buffers, 0 = networks without that input; "
              "preset lull only (0)"},
+    {"residual", 0, "OCTAVES", TO(plan.reach), 0, GGN_REACH_MAX,
+     .help =
+         "learn to correct what the observer measures by up to so many octaves of noise, 0 = judge without it; needs half "
+         "buffers at the recorded levels; preset lull only (0)"},
+    {"scalars", 0, "N", TO(plan.scalars), 0, 1,
+     .help = "1: with --residual, also tell the network what was measured (lull 1)"},
+    {"painted", 0, "N", TO(plan.painted), 0, 63,
+     .help = "with --residual: series per block that are painted with a pattern and exposed otherwise (lull 1)"},
     {"average", 0, "N", TO(plan.average), 0, 1e6,
      .help = "steps over which generator and discriminator are averaged, 0 = none; preset lull only (0)"},
     {"synthetic", 0, "N", TO(plan.synthetic), 0, 63,

@@ -12,6 +12,8 @@ struct look {
     const struct ggn_level_series *series;
     double (*logit)(void *data, const int *levels);
     void *data;
+    const double *law;
+    int now;                         /* the level asked about */
     int level[GGN_WINDOW_MAX], used; /* of the window's images, oldest first */
 };
 
@@ -30,6 +32,13 @@ static double window_logit(void *data)
     const struct look *l = data;
 
     return l->logit(l->data, l->level);
+}
+
+static double law(void *data)
+{
+    const struct look *l = data;
+
+    return l->law[l->now];
 }
 
 /* Noise falls by the square root of the samples, its shape stays. */
@@ -57,10 +66,10 @@ static int is_check(const struct ggn_stop_rule *rule, const struct ggn_stopper *
 }
 
 void ggn_replay(const struct ggn_series_set *set, const struct ggn_level_series *c, const struct ggn_stop_rule *rule,
-                double (*logit)(void *data, const int *levels), void *data, struct ggn_seen *seen)
+                double (*logit)(void *data, const int *levels), void *data, const double *law_of, struct ggn_seen *seen)
 {
-    struct look look = {.set = set, .series = c, .logit = logit, .data = data};
-    const struct ggn_evidence evidence = {&look, window_noise, window_logit, tail_statistics};
+    struct look look = {.set = set, .series = c, .logit = logit, .data = data, .law = law_of};
+    const struct ggn_evidence evidence = {&look, window_noise, window_logit, tail_statistics, law};
     struct ggn_stop_rule endless = *rule;
     struct ggn_stopper s = {0};
     double tail999, gini;
@@ -68,13 +77,17 @@ void ggn_replay(const struct ggn_series_set *set, const struct ggn_level_series 
     endless.policy.threshold = 0;
     for (int i = 0; i < c->n_levels; i++) {
         seen[i] = (struct ggn_seen){.p = (double)NAN};
-        if (!is_check(rule, &s, c, i) || !ggn_stopper_ask(&endless, &s, (uint64_t)c->spp[i]))
+        const int what = is_check(rule, &s, c, i) ? ggn_stopper_ask(&endless, &s, (uint64_t)c->spp[i]) : GGN_LOOK_NONE;
+        if (what == GGN_LOOK_NONE)
             continue;
-        if (look.used == rule->window)
+        if (what == GGN_LOOK_IMAGE && look.used == rule->window)
             memmove(look.level, look.level + 1, (size_t)--look.used * sizeof look.level[0]);
-        look.level[look.used++] = i;
+        if (what == GGN_LOOK_IMAGE)
+            look.level[look.used++] = i;
+        look.now = i;
         ggn_stopper_decide(&endless, &s, &evidence);
         seen[i].p = isnan(s.verdict.p) && !s.verdict.too_early ? INFINITY : s.verdict.p;
+        seen[i].correction = s.correction;
         seen[i].is_held = tail_statistics(&look, &tail999, &gini) && ggn_policy_tail_holds(&rule->policy, tail999, gini);
     }
 }

@@ -24,8 +24,10 @@ void ggn_series_set_release(struct ggn_series_set *set)
         free(c->has_noise_map);
         free(c->tail999);
         free(c->gini);
+        free(c->measure);
     }
     free(set->series);
+    ggn_meter_release(&set->meter);
     ggn_dataset_release(&set->data);
     *set = (struct ggn_series_set){0};
 }
@@ -125,6 +127,10 @@ int ggn_series_grow(const struct ggn_series_set *set, struct ggn_level_series *c
             return base_fail_nomem(err, "images of the data set");
         *numbers[i] = grown;
     }
+    struct ggn_measure *measure = set->meter.memory ? realloc(c->measure, n * sizeof *measure) : NULL;
+    if (set->meter.memory && !measure)
+        return base_fail_nomem(err, "images of the data set");
+    c->measure = measure;
     for (size_t i = 0; i < (set->noise_maps ? 3 : 2); i++) {
         uint8_t *grown = realloc(*images[i], n * bytes[i]);
         if (!grown)
@@ -145,11 +151,36 @@ void ggn_series_write_noise_map(const struct ggn_series_set *set, struct ggn_lev
         out[p] = ggn_noise_map_code((double)mean[p], scale * (double)d[p], NULL);
 }
 
-/* Scratch for noise maps of recorded levels: luminance of the mean and of D, [P] each. */
+void ggn_series_measure(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const float *mean,
+                        const float *d, double scale, int keep_texture)
+{
+    const size_t values = ggn_series_set_values(set);
+
+    for (int i = 0; i < 2; i++)
+        seq_simulate(mean, d, values, i ? -scale : scale, set->meter.rgb[i]);
+    ggn_measure(&set->meter, set->width, set->height, 0.5, keep_texture, &c->measure[k],
+                set->noise_maps ? c->noise_map + values / 3 * (size_t)k : NULL);
+    c->has_noise_map[k] = set->noise_maps != 0;
+}
+
+/* Scratch for noise maps of recorded levels: luminance of the mean and of D, [P] each; [3][P] where they are measured. */
 struct halves {
     const struct seq_record *full; /* NULL: no level has halves of all channels */
     float *mean, *d;
 };
+
+/* From the level's own halves: what the criterion sees there. */
+static int recorded_measure(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const struct seq_block *b,
+                            const struct seq_record *r, const struct halves *h, struct base_err *err)
+{
+    c->measure[k] = (struct ggn_measure){.visible = (double)NAN};
+    if (!seq_has_halves(r))
+        return 0;
+    int rc = seq_halves(b, r, h->mean, h->d, err);
+    if (!rc)
+        ggn_series_measure(set, c, k, h->mean, h->d, seq_half_scale(r->spp, r->half_spp), 0);
+    return rc;
+}
 
 /* From the level's own halves. Where none are recorded, from those of the full level: their noise has another draw, the
  * same strength in the mean, and bright paths spread out that few samples meet one by one. */
@@ -160,6 +191,8 @@ static int recorded_noise_map(const struct ggn_series_set *set, struct ggn_level
     const double scale = from ? seq_half_scale(from->spp, from->half_spp) : 0;
 
     c->has_noise_map[k] = 0;
+    if (set->meter.memory)
+        return recorded_measure(set, c, k, b, r, h, err);
     if (!set->noise_maps || scale == 0)
         return 0;
     int rc = seq_mean_luminance(b, r, h->mean, err);
@@ -198,12 +231,12 @@ static int fill_series(const struct ggn_series_set *set, struct ggn_level_series
     const size_t values = ggn_series_set_values(set);
     struct halves h = {.full = seq_full_level(b)};
     const struct seq_record *reference = b->reference || !o->mean_for_reference ? b->reference : h.full;
-    float *memory = set->noise_maps ? malloc(2 * (values / 3) * sizeof *memory) : NULL;
-    int rc =
-        set->noise_maps && !memory ? base_fail_nomem(err, "noise pictures") : ggn_series_grow(set, c, (int)b->n_levels, err);
+    const int wanted = set->noise_maps || set->meter.memory;
+    float *memory = wanted ? malloc(2 * values * sizeof *memory) : NULL;
+    int rc = wanted && !memory ? base_fail_nomem(err, "noise pictures") : ggn_series_grow(set, c, (int)b->n_levels, err);
 
     h.mean = memory;
-    h.d = memory ? memory + values / 3 : NULL;
+    h.d = memory ? memory + values : NULL;
     if (!rc)
         rc = fill_levels(set, c, b, o->ratio, &h, err);
     free(memory);
@@ -225,9 +258,12 @@ static int load_block(struct ggn_series_set *set, int view, uint32_t index, cons
     if (!set->width) {
         set->width = (int)b.width;
         set->height = (int)b.height;
+        rc = o->measures ? ggn_meter_init(&set->meter, (size_t)b.width * b.height, err) : 0;
     }
     struct ggn_level_series *c = NULL;
-    if ((int)b.width != set->width || (int)b.height != set->height)
+    if (rc)
+        ;
+    else if ((int)b.width != set->width || (int)b.height != set->height)
         rc = base_fail(err, BASE_EINVAL, "%s/%s: a block of %ux%u pixels among blocks of %dx%d", v->dir,
                        v->manifest.blocks[index].file, b.width, b.height, set->width, set->height);
     else if (!(c = ggn_series_set_append(set, err)))
@@ -283,7 +319,7 @@ static void find_spacing(struct ggn_series_set *set)
 
 int ggn_series_set_load(struct ggn_series_set *set, const struct ggn_series_set_options *o, struct base_err *err)
 {
-    struct ggn_series_set made = {.noise_maps = o->noise_maps};
+    struct ggn_series_set made = {.noise_maps = o->noise_maps, .keep_recorded = o->keep_recorded};
     int rc = ggn_dataset_open(o->dir, &made.data, err);
 
     if (rc)

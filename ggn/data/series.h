@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "data/dataset.h"
+#include "model/measure.h"
 
 struct ggn_level_series {
     int view, scene, synthetic;
@@ -23,9 +24,11 @@ struct ggn_level_series {
     uint8_t *noisy;     /* [n_levels][3][H][W] display codes */
     uint16_t *denoised; /* the same, 16-bit fixed point; NULL until needed */
     uint8_t *reference; /* [3][H][W] display codes; NULL without; a synthetic series shares its original's */
-    /* with set->noise_maps: the noise maps (model/window.h), [n_levels][H][W], and whether a level has one */
+    /* with set->noise_maps: the noise maps (model/window.h; with set->meter of the visible noise, model/measure.h),
+     * [n_levels][H][W], and whether a level has one */
     uint8_t *noise_map, *has_noise_map;
-    double *tail999, *gini; /* [n_levels], NaN where not recorded */
+    double *tail999, *gini;      /* [n_levels], NaN where not recorded */
+    struct ggn_measure *measure; /* [n_levels], with set->meter; visible is NaN where there are no halves */
     int has_label;
     struct ggn_label label;
     double spread; /* octaves, for soft labels */
@@ -35,6 +38,8 @@ struct ggn_series_set {
     struct ggn_dataset data; /* the views */
     int width, height;       /* of every block */
     int noise_maps;          /* series have noise maps */
+    int keep_recorded;       /* see ggn_series_set_options */
+    struct ggn_meter meter;  /* with memory: series have measures */
     int n, n_scenes;
     struct ggn_level_series *series;
     double first_spp, ratio, step_spp; /* how real levels are spaced: ratio, or (ratio 0) a constant step */
@@ -44,9 +49,11 @@ struct ggn_series_set_options {
     const char *dir; /* a data set (data/dataset.h) */
     /* comma-separated scenes: over the data set's split; NULL: the split, or every fifth scene without */
     const char *validation;
-    const char *test; /* likewise; NULL: the split, or none */
-    double ratio;     /* thin the levels to at least this ratio; 0: keep all */
-    int noise_maps;   /* also make the noise maps */
+    const char *test;  /* likewise; NULL: the split, or none */
+    double ratio;      /* thin the levels to at least this ratio; 0: keep all */
+    int noise_maps;    /* also make the noise maps */
+    int measures;      /* also measure every level (model/measure.h) */
+    int keep_recorded; /* ggn_series_set_extend makes what it simulates further series */
     /* where there is no reference, the mean of the full level stands for it: as noisy as that many samples are, which
      * levels recorded below it share */
     int mean_for_reference;
@@ -64,8 +71,15 @@ int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uin
 /* Continues recorded series of all splits that end near or before their threshold, up to 0.7 of the reference's samples
  * beyond the last level: the reference's samples go on where the recording stopped, their running mean simulated from the
  * half buffers. Where there is no reference but a full level, the whole series is made anew, up to SEQ_SIMULATED_CAP: its
- * mean stands for the converged image. */
+ * mean stands for the converged image. With set->keep_recorded that is a further, synthetic series, and the recorded one
+ * stays: its levels have noise of their own. */
 int ggn_series_set_extend(struct ggn_series_set *set, uint32_t seed, struct base_err *err);
+
+/* Adds `per_series` synthetic series for each training series that has a full level, as of surfaces that no scene has: light
+ * and noise of the recording times a pattern (tiles, stripes, dots, leaves, brushed metal, cloth, print; 2 to 64 px; any
+ * contrast) and an exposure of up to two stops either way. Labelled where the law's r falls below `level`. Needs the
+ * measures. */
+int ggn_series_set_paint(struct ggn_series_set *set, int per_series, double level, uint32_t seed, struct base_err *err);
 
 /* Makes every labelled series that has a full level anew, its levels `ratio` > 1 apart and up to SEQ_SIMULATED_CAP: from
  * the two halves alone, so that series with and without a reference are made alike. The same seed gives the same series. */
@@ -82,6 +96,11 @@ int ggn_series_grow(const struct ggn_series_set *set, struct ggn_level_series *s
  * [H][W]) whose noise is that of `scale`⁻² times fewer samples: scale = √(N/n) takes D from N samples to n. */
 void ggn_series_write_noise_map(const struct ggn_series_set *set, struct ggn_level_series *series, int k, const float *mean,
                                 const float *d, double scale);
+
+/* With set->meter: measures level k, whose two pictures are mean + and - scale * D (linear, [3][H][W]), and makes its noise
+ * map. keep_texture: see ggn_measure. */
+void ggn_series_measure(const struct ggn_series_set *set, struct ggn_level_series *series, int k, const float *mean,
+                        const float *d, double scale, int keep_texture);
 
 /* Appends an empty series; NULL: out of memory. Pointers to series are invalid afterwards. */
 struct ggn_level_series *ggn_series_set_append(struct ggn_series_set *set, struct base_err *err);

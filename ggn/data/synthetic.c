@@ -70,7 +70,18 @@ static void fill_level(const struct ggn_series_set *set, struct ggn_level_series
         }
         s->mean[p] = (float)base_luminance(rgb[0], rgb[1], rgb[2]);
     }
-    ggn_series_write_noise_map(set, c, k, s->mean, s->d_luminance, seq_noise_scale(s->n_full, c->spp[k]));
+    if (set->meter.memory)
+        ggn_series_measure(set, c, k, s->base, s->d, seq_noise_scale(s->n_full, c->spp[k]), 1);
+    else
+        ggn_series_write_noise_map(set, c, k, s->mean, s->d_luminance, seq_noise_scale(s->n_full, c->spp[k]));
+}
+
+/* The texture of all levels to be measured is that of the recorded halves, as in the labels (observer/curve.h): `base` has
+ * noise of its own that the levels share. k: a level that is to be made yet. */
+static void see_texture(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const struct source *s)
+{
+    if (set->meter.memory)
+        ggn_series_measure(set, c, k, s->base, s->d, 1, 0);
 }
 
 static void fill_levels(const struct ggn_series_set *set, struct ggn_level_series *c, const struct source *s, float *noise,
@@ -78,6 +89,7 @@ static void fill_levels(const struct ggn_series_set *set, struct ggn_level_serie
 {
     const size_t pixels = ggn_series_set_values(set) / 3;
 
+    see_texture(set, c, 0, s);
     memset(noise, 0, 3 * pixels * sizeof *noise);
     for (int k = c->n_levels - 1; k >= 0; k--) {
         step_down(s, pixels, c->spp[k], k + 1 < c->n_levels ? c->spp[k + 1] : s->n_reference, ggn_hash((uint32_t)k, seed),
@@ -92,6 +104,18 @@ static void no_statistics(struct ggn_level_series *c, int from)
         c->tail999[k] = c->gini[k] = (double)NAN;
 }
 
+/* An empty series of the same block. */
+static void begin_copy(struct ggn_level_series *c, const struct ggn_level_series *real)
+{
+    *c = *real;
+    c->synthetic = 1;
+    c->n_levels = 0;
+    c->spp = c->tail999 = c->gini = NULL;
+    c->noisy = c->noise_map = c->has_noise_map = NULL;
+    c->denoised = NULL;
+    c->measure = NULL;
+}
+
 static int make_series(struct ggn_series_set *set, const struct ggn_level_series *real, struct ggn_level_series *c,
                        const struct source *s, uint32_t seed, struct base_err *err)
 {
@@ -100,11 +124,7 @@ static int make_series(struct ggn_series_set *set, const struct ggn_level_series
     const double ratio = set->ratio > 1.01 ? set->ratio : 1.15;
     int n = choose_levels(spp, 0, set->first_spp, ratio, HIGHEST_SHARE * s->n_reference, 1, seed);
 
-    *c = *real;
-    c->synthetic = 1;
-    c->spp = c->tail999 = c->gini = NULL;
-    c->noisy = c->noise_map = c->has_noise_map = NULL;
-    c->denoised = NULL;
+    begin_copy(c, real);
     c->n_levels = n;
     int rc = noise ? ggn_series_grow(set, c, n ? n : 1, err) : base_fail_nomem(err, "synthetic images");
     if (!rc) {
@@ -195,6 +215,8 @@ static int extend_series(const struct ggn_series_set *set, struct ggn_level_seri
     int n = choose_levels(spp, n0, n0 * ratio, ratio, HIGHEST_SHARE * s->n_reference, 0, seed);
     float *noise = calloc(values, sizeof *noise);
     int rc = noise ? ggn_series_grow(set, c, first + n, err) : base_fail_nomem(err, "synthetic images");
+    if (!rc && n)
+        see_texture(set, c, first + n - 1, s);
     for (int k = n - 1; !rc && k >= 0; k--) {
         double m = spp[k] - n0;
         step_down(s, values / 3, m, k + 1 < n ? spp[k + 1] - n0 : s->n_reference, ggn_hash((uint32_t)k, seed), noise);
@@ -231,13 +253,22 @@ static int simulate_series(const struct ggn_series_set *set, struct ggn_level_se
     return rc;
 }
 
+static struct ggn_level_series *append_copy(struct ggn_series_set *set, int of, struct base_err *err)
+{
+    struct ggn_level_series *c = ggn_series_set_append(set, err);
+
+    if (c)
+        begin_copy(c, &set->series[of]);
+    return c;
+}
+
 int ggn_series_set_extend(struct ggn_series_set *set, uint32_t seed, struct base_err *err)
 {
     const double ratio = set->ratio > 1.01 && set->ratio < 2 ? set->ratio : 1.2565; /* a third of an octave */
     struct source s = {0};
     int rc = source_init(&s, set, err);
 
-    for (int i = 0; !rc && i < set->n; i++) {
+    for (int i = 0, real = set->n; !rc && i < real; i++) {
         struct ggn_level_series *c = &set->series[i];
         int usable = 0;
         double last = c->n_levels ? c->spp[c->n_levels - 1] : 0;
@@ -248,8 +279,10 @@ int ggn_series_set_extend(struct ggn_series_set *set, uint32_t seed, struct base
         rc = read_source(set, c, 1, &s, &usable, err);
         if (!rc && usable && isfinite(s.n_reference))
             rc = extend_series(set, c, &s, ggn_hash((uint32_t)i, seed + 1), err);
-        else if (!rc && usable)
+        else if (!rc && usable && (c = set->keep_recorded ? append_copy(set, i, err) : c))
             rc = simulate_series(set, c, &s, ratio, 1, ggn_hash((uint32_t)i, seed + 1), err);
+        else if (!rc && usable)
+            rc = BASE_ENOMEM;
     }
     free(s.base);
     return rc;
@@ -270,6 +303,105 @@ int ggn_series_set_simulate(struct ggn_series_set *set, double ratio, uint32_t s
     }
     set->ratio = ratio;
     set->step_spp = 0;
+    free(s.base);
+    return rc;
+}
+
+/* --- painted series --------------------------------------------------------------------------------------------------- */
+
+enum { CHECKER, STRIPES, DOTS, LEAVES, BRUSHED, CLOTH, PRINT, PATTERNS };
+
+static double fraction(double v) { return v - floor(v); }
+
+static double cell(double u, double v, uint32_t seed)
+{
+    return ggn_hash_unit((uint32_t)(int32_t)floor(u), ggn_hash((uint32_t)(int32_t)floor(v), seed));
+}
+
+/* Value noise, bilinear. */
+static double smooth(double u, double v, uint32_t seed)
+{
+    double x = fraction(u), y = fraction(v);
+    double top = cell(u, v, seed) * (1 - x) + cell(u + 1, v, seed) * x;
+    double bottom = cell(u, v + 1, seed) * (1 - x) + cell(u + 1, v + 1, seed) * x;
+    return top * (1 - y) + bottom * y;
+}
+
+/* In [0, 1], with features of about one. */
+static double pattern(int kind, double u, double v, uint32_t seed)
+{
+    double x = fraction(u) - 0.5, y = fraction(v) - 0.5;
+
+    switch (kind) {
+    case CHECKER: return fabs(fmod(floor(u) + floor(v), 2));
+    case STRIPES: return x > 0;
+    case DOTS: return x * x + y * y < 0.09;
+    case LEAVES: return fmin(fmax(4 * (0.6 * smooth(u, v, seed) + 0.4 * smooth(3 * u, 3 * v, seed + 1)) - 1.5, 0), 1);
+    case BRUSHED: return 0.5 * smooth(4 * u, 0.1 * v, seed) + 0.5 * smooth(12 * u, 0.3 * v, seed + 1);
+    case CLOTH: return 0.5 + 0.25 * (cos(6.2832 * u) + cos(6.2832 * v));
+    default: /* lines of glyphs, three by five */
+        return y > 0.1 || cell(u, v, seed) < 0.2 || cell(4 * u, 6 * v, seed) > 0.55;
+    }
+}
+
+/* Paints what is seen: light and noise alike are multiplied by the paint's reflectance and an exposure. */
+static void paint(struct source *s, int width, int height, uint32_t seed)
+{
+    const size_t pixels = (size_t)width * (size_t)height;
+    const int kind = (int)(PATTERNS * ggn_hash_unit(1, seed));
+    const double period = 2 * exp2(5 * ggn_hash_unit(2, seed)), angle = 6.2832 * ggn_hash_unit(3, seed);
+    const double dark = 0.05 + 0.65 * ggn_hash_unit(4, seed), gain = exp2(4 * ggn_hash_unit(5, seed) - 2);
+
+    for (size_t p = 0; p < pixels; p++) {
+        double x = (double)(p % (size_t)width) / period, y = (double)(p / (size_t)width) / period;
+        double t = pattern(kind, x * cos(angle) - y * sin(angle), x * sin(angle) + y * cos(angle), seed);
+        for (size_t c = 0; c < 3; c++) {
+            float factor = (float)(gain * (t + (1 - t) * dark * (0.5 + 0.5 * ggn_hash_unit(6 + (uint32_t)c, seed))));
+            s->base[c * pixels + p] *= factor;
+            s->d[c * pixels + p] *= factor;
+        }
+        s->d_luminance[p] = (float)base_luminance((double)s->d[p], (double)s->d[pixels + p], (double)s->d[2 * pixels + p]);
+    }
+}
+
+/* The law's answer on a series that was measured: where its noise falls below the level, between levels in log-log. */
+static struct ggn_label label_of(const struct ggn_level_series *c, double level)
+{
+    int k = c->n_levels - 1;
+
+    while (k > 0 && c->measure[k - 1].visible <= level)
+        k--;
+    struct ggn_label label = {c->block, c->spp[k], k == c->n_levels - 1 && c->measure[k].visible > level};
+    if (k > 0 && !label.censored) {
+        double a = c->measure[k - 1].visible, b = c->measure[k].visible;
+        label.threshold = c->spp[k - 1] * pow(c->spp[k] / c->spp[k - 1], b > 0 ? log(level / a) / log(b / a) : 0.5);
+    }
+    return label;
+}
+
+int ggn_series_set_paint(struct ggn_series_set *set, int per_series, double level, uint32_t seed, struct base_err *err)
+{
+    const double ratio = set->ratio > 1.01 && set->ratio < 2 ? set->ratio : 1.2565;
+    struct source s = {0};
+    int rc = source_init(&s, set, err);
+
+    for (int i = 0, real = set->n; !rc && i < real * per_series; i++) {
+        const struct ggn_level_series *from = &set->series[i % real];
+        int usable = 0;
+        if (from->synthetic || from->split != GGN_SPLIT_TRAIN)
+            continue;
+        rc = read_source(set, from, 0, &s, &usable, err);
+        if (rc || !usable)
+            continue;
+        paint(&s, set->width, set->height, ggn_hash((uint32_t)i, seed + 2));
+        struct ggn_level_series *c = append_copy(set, i % real, err);
+        rc = c ? simulate_series(set, c, &s, ratio, 1, ggn_hash((uint32_t)i, seed + 3), err) : BASE_ENOMEM;
+        if (!rc) {
+            c->reference = NULL; /* it shows the block unpainted */
+            c->label = label_of(c, level);
+            c->has_label = 1;
+        }
+    }
     free(s.base);
     return rc;
 }

@@ -231,6 +231,14 @@ int ggn_noise_map_plane(const struct ggn_level_series *series, int last, int wid
     return 1;
 }
 
+void ggn_window_scalars(const struct ggn_level_series *series, int last, int length, double error,
+                        float scalars[GGN_SCALARS])
+{
+    const int first = last - length + 1;
+
+    ggn_measure_scalars(series->measure + first, series->spp + first, length, error, scalars);
+}
+
 void ggn_crop_planes(const struct ggn_level_series *series, int level, int width, int height, int x0, int y0, int crop_w,
                      int crop_h, const struct ggn_augment *augment, float *noisy, float *reference)
 {

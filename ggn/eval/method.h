@@ -10,6 +10,7 @@
 
 #include "eval/set.h"
 #include "figures/stats.h"
+#include "observer/observer.h"
 
 enum { GGN_METHOD_NAME = 48 };
 
@@ -46,6 +47,15 @@ int ggn_method_variance(struct ggn_method *m, const struct ggn_eval_set *s, int 
 #define GGN_OBSERVER_GROWTH 1.5
 int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, int halves, double visible,
                         double growth, int *available, struct base_err *err);
+/* Where the law stops block b, asking at sample counts of its own (*asked of them, if not NULL) from first_spp on: where its
+ * error falls to stop_error. correction: [cases] octaves of noise that a network adds from a case to the next, where it is
+ * asked at the latest; NULL: none. seen: [cases] set->visible or visible_means. */
+double ggn_method_law_stop(const struct ggn_observer *observer, const struct ggn_eval_set *s, const double *seen,
+                           const struct ggn_eval_block *block, double stop_error, const double *correction, double first_spp,
+                           double growth, double *asked);
+/* The observer that judges a view: from the file at `path`, without the view where it was fitted; NULL: built in. */
+int ggn_method_observer_of(const char *path, const struct ggn_eval_set *s, const struct ggn_eval_block *block,
+                           struct ggn_observer *observer, struct base_err *err);
 /* Thresholds from a file, matched by the view's name (SIN3D's own names end in _part6); available: it has every view of
  * `split`. Views that it does not have stop at their cap. BASE_EINVAL where a view has another number of thresholds than
  * blocks. */

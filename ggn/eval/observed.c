@@ -25,18 +25,31 @@ static double error_at(const struct ggn_observer *o, const struct ggn_eval_set *
     return ggn_curve_between(s->spp[i], one, s->spp[k], other, spp);
 }
 
-/* Where the criterion stops, which asks at sample counts of its own. */
-static double replay(const struct ggn_observer *o, const struct ggn_eval_set *s, const double *seen,
-                     const struct ggn_eval_block *b, double stop_error, double growth, double *asked)
+double ggn_method_law_stop(const struct ggn_observer *o, const struct ggn_eval_set *s, const double *seen,
+                           const struct ggn_eval_block *b, double stop_error, const double *correction, double first_spp,
+                           double growth, double *asked)
 {
-    double spp = fmax(FIRST_SPP, s->spp[b->first]);
-    for (*asked = 1.0; spp < b->cap; ++*asked) {
-        double ratio = error_at(o, s, seen, b, spp) / stop_error;
+    double spp = fmax(first_spp, s->spp[b->first]), checks = 1.0;
+    size_t i = b->first;
+    for (; spp < b->cap; checks += 1.0) {
+        while (i + 1 < b->end && s->spp[i + 1] <= spp)
+            i++;
+        double ratio = error_at(o, s, seen, b, spp) / stop_error * (correction ? exp2(correction[i]) : 1.0);
         if (ratio <= 1.0)
             break;
-        spp = ceil(ggn_observer_next(spp, spp * ratio * ratio, growth));
+        double next = ggn_observer_next(spp, spp * ratio * ratio, growth);
+        spp = ceil(correction && i + 1 < b->end ? fmin(next, s->spp[i + 1]) : next);
     }
+    if (asked)
+        *asked = checks;
     return fmin(spp, b->cap);
+}
+
+int ggn_method_observer_of(const char *path, const struct ggn_eval_set *s, const struct ggn_eval_block *block,
+                           struct ggn_observer *o, struct base_err *err)
+{
+    *o = ggn_observer_default;
+    return path ? ggn_observer_read(path, s->images.data.views[block->view].name, o, err) : 0;
 }
 
 int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, const char *path, int halves, double visible,
@@ -51,8 +64,8 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
         rc = base_fail_nomem(err, "observer");
     for (int b = 0; b < s->n_blocks && !rc; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
-        if (path && block->view != view)
-            rc = ggn_observer_read(path, s->images.data.views[block->view].name, &o, err);
+        if (block->view != view)
+            rc = ggn_method_observer_of(path, s, block, &o, err);
         view = block->view;
         for (size_t i = block->first; i < block->end; i++) {
             m->score[i] = isnan(seen[i]) ? (double)NAN : ggn_observer_p_noisy(&o, ggn_observer_error(&o, seen[i], pixels));
@@ -60,7 +73,8 @@ int ggn_method_observer(struct ggn_method *m, const struct ggn_eval_set *s, cons
         }
         m->stop[b] = block->cap;
         if (*available)
-            m->stop[b] = replay(&o, s, seen, block, ggn_observer_error_at(&o, visible), growth, &m->asked[b]);
+            m->stop[b] = ggn_method_law_stop(&o, s, seen, block, ggn_observer_error_at(&o, visible), NULL, FIRST_SPP, growth,
+                                             &m->asked[b]);
     }
     if (rc) {
         ggn_method_release(m);

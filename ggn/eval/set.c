@@ -459,7 +459,8 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
                       struct base_err *err)
 {
     struct ggn_eval_set s = {.window = o->window, .job = o->job};
-    struct ggn_series_set_options co = {.dir = o->dir, .ratio = o->ratio, .with_test = 1, .noise_maps = o->noise_maps};
+    struct ggn_series_set_options co = {
+        .dir = o->dir, .ratio = o->ratio, .with_test = 1, .noise_maps = o->noise_maps, .measures = o->measures};
     struct fill f = {&s, o->quality, o->no_ssim};
     struct ggn_eval_values columns[COLUMNS];
     int rc = ggn_series_set_load(&s.images, &co, err);
@@ -477,6 +478,7 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
         rc = ggn_agree(s.job, &s.images, o->files, o->n_files, 0, base_threads_count(threads), err);
     if (!rc)
         rc = ggn_eval_each_block(&s, threads, fill_block, &f, columns, COLUMNS, err);
+    s.law = o->without_halves ? s.visible_means : s.visible;
     if (rc)
         ggn_eval_set_release(&s);
     else

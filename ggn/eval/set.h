@@ -34,8 +34,9 @@ struct ggn_eval_set {
     double *spp, *seconds;         /* own; [n]; seconds: thread time spent on the block so far, NaN if unknown */
     signed char *noisy;            /* owns; [n]: 1, 0, or -1 unknown */
     double *dammertz, *half_unsettled, *rse, *rse_unsettled; /* own; [n]; NaN where not recorded */
-    double *visible;       /* owns; [n]: noise that the model observer sees (observer/visibility.h); NaN without halves */
+    double *visible;       /* owns; [n]: noise that the model observer sees (model/visibility.h); NaN without halves */
     double *visible_means; /* owns; [n]: the same in a host without half buffers; NaN without levels to tell it */
+    const double *law;     /* visible or visible_means: what residual models begin with */
     double *flip, *ssim;   /* own; [n]: against the reference, else the mean of the full level; NaN unless asked for */
     double *relmse;        /* owns; [n]: variance over the squared mean, from the full level's halves; NaN without */
 };
@@ -50,6 +51,8 @@ struct ggn_eval_options {
     double cadence;           /* > 1: simulate all levels, this far apart (ggn_series_set_simulate); 0: no */
     uint32_t seed;            /* of the continuation */
     int noise_maps;           /* also make the noise maps (data/series.h) */
+    int without_halves;       /* residual models judge as in a host without half buffers */
+    int measures;             /* also measure the levels (data/series.h) */
     struct job *job;          /* the processes that share out the blocks, all with the same data; NULL: alone */
     const char *const *files; /* [n_files] what else must be the same for all of them (data/agree.h) */
     int n_files;

@@ -5,13 +5,73 @@
 
 #include "data/replay.h"
 #include "eval/viewer.h"
+#include "observer/observer.h"
 
 struct run {
     const struct ggn_eval_set *set;
     struct ggn_stop_rule rule;
     struct ggn_method *method;
     struct ggn_viewer *viewers; /* [workers] */
+    const char *observer;
+    double *correction; /* [cases], of a residual model; owns */
 };
+
+/* log2 of the law's error: at cases as the set says, at the levels before them as they were measured. [n_levels] */
+static void list_law(const struct run *r, const struct ggn_eval_block *b, const struct ggn_observer *o, double *law)
+{
+    const struct ggn_level_series *c = &r->set->images.series[b->series];
+    const size_t pixels = (size_t)r->set->images.width * (size_t)r->set->images.height;
+    const int skipped = r->set->window - 1;
+
+    for (int i = 0; i < c->n_levels; i++) {
+        double seen = i < skipped ? c->measure[i].visible : r->set->law[b->first + (size_t)(i - skipped)];
+        law[i] = ggn_measure_octaves(ggn_observer_error(o, seen, pixels));
+    }
+}
+
+/* A block of a residual model. seen: [n_levels] */
+static int judge_by_law(const struct run *r, int index, struct ggn_viewer *viewer, struct ggn_seen *seen,
+                        struct base_err *err)
+{
+    const struct ggn_eval_block *b = &r->set->blocks[index];
+    const struct ggn_level_series *c = &r->set->images.series[b->series];
+    const int skipped = r->set->window - 1;
+    struct ggn_observer o;
+    double *law = malloc((size_t)c->n_levels * sizeof *law);
+    int rc = law ? ggn_method_observer_of(r->observer, r->set, b, &o, err) : base_fail_nomem(err, r->method->name);
+
+    if (!rc) {
+        list_law(r, b, &o, law);
+        viewer->law = law;
+        ggn_replay(&r->set->images, c, &r->rule, ggn_viewer_logit, viewer, law, seen);
+        for (int i = skipped; i < c->n_levels; i++) {
+            size_t k = b->first + (size_t)(i - skipped);
+            r->method->score[k] = r->method->verdict[k] = seen[i].p;
+            r->method->own_guard[k] = 0;
+            r->correction[k] = i > skipped && isnan(seen[i].p) ? r->correction[k - 1] : seen[i].correction;
+        }
+    }
+    free(law);
+    return rc;
+}
+
+/* Where the blocks stop, between levels too. */
+static int stop_by_law(const struct run *r, struct base_err *err)
+{
+    const struct ggn_policy *p = &r->rule.policy;
+    const double stop = exp2((log(p->threshold / (1 - p->threshold)) - p->shift) / p->scale);
+    struct ggn_observer o;
+    int rc = 0;
+
+    for (int i = 0; i < r->set->n_blocks && !rc; i++) {
+        const struct ggn_eval_block *b = &r->set->blocks[i];
+        rc = ggn_method_observer_of(r->observer, r->set, b, &o, err);
+        if (!rc)
+            r->method->stop[i] =
+                ggn_method_law_stop(&o, r->set, r->set->law, b, stop, r->correction, p->first_spp, p->ratio, NULL);
+    }
+    return rc;
+}
 
 static int judge_block(void *data, int index, int worker, struct base_err *err)
 {
@@ -25,11 +85,16 @@ static int judge_block(void *data, int index, int worker, struct base_err *err)
     if (!seen)
         return base_fail_nomem(err, r->method->name);
     ggn_viewer_turn(&r->viewers[worker], c);
+    if (r->rule.reach > 0) {
+        int rc = judge_by_law(r, index, &r->viewers[worker], seen, err);
+        free(seen);
+        return rc;
+    }
     open.policy.gate_noise = 0;
-    ggn_replay(&r->set->images, c, &open, ggn_viewer_logit, &r->viewers[worker], seen);
+    ggn_replay(&r->set->images, c, &open, ggn_viewer_logit, &r->viewers[worker], NULL, seen);
     for (int i = skipped; i < c->n_levels; i++)
         r->method->score[b->first + (size_t)(i - skipped)] = seen[i].p;
-    ggn_replay(&r->set->images, c, &r->rule, ggn_viewer_logit, &r->viewers[worker], seen);
+    ggn_replay(&r->set->images, c, &r->rule, ggn_viewer_logit, &r->viewers[worker], NULL, seen);
     for (int i = skipped; i < c->n_levels; i++) {
         r->method->verdict[b->first + (size_t)(i - skipped)] = seen[i].p;
         r->method->own_guard[b->first + (size_t)(i - skipped)] = seen[i].is_held;
@@ -58,11 +123,14 @@ static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const
 }
 
 int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model,
-                     const struct ggn_policy *policy, const char *name, enum ggn_precision precision,
+                     const struct ggn_policy *policy, const char *name, enum ggn_precision precision, const char *observer,
                      struct base_threads *threads, struct base_err *err)
 {
     int workers = base_threads_count(threads), made = 0, window = model->hyper.window;
-    struct run r = {.set = s, .method = m, .rule = {.policy = *policy, .window = window}};
+    struct run r = {.set = s,
+                    .method = m,
+                    .rule = {.policy = *policy, .window = window, .reach = model->hyper.reach},
+                    .observer = observer};
 
     if (window < 2 || window > GGN_WINDOW_MAX)
         return base_fail(err, BASE_EINVAL, "%s: windows of %d images; evaluation takes 2 to %d", name, window,
@@ -71,21 +139,26 @@ int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const s
     if (rc)
         return rc;
     r.viewers = calloc((size_t)workers, sizeof *r.viewers);
-    if (!r.viewers)
+    r.correction = calloc(s->n, sizeof *r.correction);
+    if (!r.viewers || !r.correction)
         rc = base_fail_nomem(err, name);
     for (; made < workers && !rc; made += !rc)
         rc = ggn_viewer_init(&r.viewers[made], model, precision, &s->images, err);
     const struct ggn_eval_values made_by_block[] = {{m->score, sizeof *m->score, NULL},
                                                     {m->verdict, sizeof *m->verdict, NULL},
-                                                    {m->own_guard, sizeof *m->own_guard, NULL}};
+                                                    {m->own_guard, sizeof *m->own_guard, NULL},
+                                                    {r.correction, sizeof *r.correction, NULL}};
     if (!rc)
-        rc = ggn_eval_each_block(s, threads, judge_block, &r, made_by_block, 3, err);
+        rc = ggn_eval_each_block(s, threads, judge_block, &r, made_by_block, 4, err);
     for (int i = 0; i < made; i++)
         ggn_viewer_release(&r.viewers[i]);
     free(r.viewers);
-    if (!rc)
+    if (!rc && r.rule.reach > 0)
+        rc = stop_by_law(&r, err);
+    free(r.correction);
+    if (!rc && r.rule.reach <= 0)
         ggn_method_run(m, s);
-    else
+    else if (rc)
         ggn_method_release(m);
     return rc;
 }

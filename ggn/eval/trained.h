@@ -9,9 +9,11 @@
 /*
  * Scores are p_noisy of every window that the policy's cadence makes, for which the network is asked even where the gate
  * would spare it; stops are those of the rule (model/stopper.h, data/replay.h), with gate and guard as the policy says.
+ * A residual model asks between levels too, where the law is known; it needs set->images.meter. observer: of its law, as for
+ * ggn_method_observer.
  */
 int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model,
-                     const struct ggn_policy *policy, const char *name, enum ggn_precision precision,
+                     const struct ggn_policy *policy, const char *name, enum ggn_precision precision, const char *observer,
                      struct base_threads *threads, struct base_err *err);
 
 #endif

@@ -91,6 +91,19 @@ static uint16_t *denoised(struct ggn_viewer *v, int level, const int *needed, in
 
 const uint16_t *ggn_viewer_denoise(struct ggn_viewer *v, int level) { return denoised(v, level, &level, 1); }
 
+/* What a residual model is told of a window. */
+static void tell(const struct ggn_viewer *v, const int *levels, float scalars[GGN_SCALARS])
+{
+    struct ggn_measure window[GGN_WINDOW_MAX];
+    double spp[GGN_WINDOW_MAX];
+
+    for (int i = 0; i < v->window; i++) {
+        window[i] = v->series->measure[levels[i]];
+        spp[i] = v->series->spp[levels[i]];
+    }
+    ggn_measure_scalars(window, spp, v->window, v->law[levels[v->window - 1]], scalars);
+}
+
 double ggn_viewer_logit(void *viewer, const int *levels)
 {
     struct ggn_viewer *v = viewer;
@@ -110,7 +123,11 @@ double ggn_viewer_logit(void *viewer, const int *levels)
     const size_t pixels = ggn_series_set_values(v->set) / 3;
     const uint8_t *noise_map =
         v->set->noise_maps && v->series->has_noise_map[last] ? v->series->noise_map + pixels * (size_t)last : NULL;
-    known->logit = v->exact ? ggn_exact_logit(v->exact, noisy, clean, noise_map)
-                            : ggn_inference_logit(v->inference, noisy, clean, noise_map, v->set->width, v->set->height);
+    float scalars[GGN_SCALARS] = {0};
+    if (v->law)
+        tell(v, levels, scalars);
+    known->logit = v->exact
+                       ? ggn_exact_logit(v->exact, noisy, clean, noise_map, scalars)
+                       : ggn_inference_logit(v->inference, noisy, clean, noise_map, scalars, v->set->width, v->set->height);
     return known->logit;
 }

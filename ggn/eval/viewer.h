@@ -17,6 +17,7 @@ struct ggn_viewer {
     struct ggn_exact *exact;               /* owns; of GGN_PRECISION_F64 */
     const struct ggn_series_set *set;      /* borrows */
     const struct ggn_level_series *series; /* borrows; the block */
+    const double *law;                     /* borrows; [levels] of a residual model: log2 of the law's error */
     int window;
     uint16_t *denoised[GGN_WINDOW_MAX]; /* [3][H][W] each; one allocation, owned */
     int holds[GGN_WINDOW_MAX];          /* the level that is in it, -1: none */

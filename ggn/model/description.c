@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/json.h"
+#include "model/measure.h"
 
 /* Hyper-parameters and calibration as tables, so that reading and writing cannot disagree. */
 static const struct {
@@ -74,6 +75,10 @@ static int parse_root(const cJSON *root, struct ggn_description *d, struct base_
         rc = get_int(root, hyper_field[i].name, 1, 1 << 20, (int *)(void *)((char *)&d->hyper + hyper_field[i].at), err);
     if (!rc && cJSON_HasObjectItem(root, "picture"))
         rc = get_int(root, "picture", 0, 1, &d->hyper.noise_map, err);
+    if (!rc && cJSON_HasObjectItem(root, "residual"))
+        rc = get_number(root, "residual", 0, GGN_REACH_MAX, &d->hyper.reach, err);
+    if (!rc && cJSON_HasObjectItem(root, "scalars"))
+        rc = get_int(root, "scalars", 0, GGN_SCALARS, &d->hyper.scalars, err);
     for (size_t i = 0; i < N_CALIBRATION && !rc; i++)
         rc = get_number(calibration, calibration_field[i].name, calibration_field[i].min, calibration_field[i].max,
                         (double *)(void *)((char *)&d->calibration + calibration_field[i].at), err);
@@ -115,6 +120,10 @@ static cJSON *to_json(const struct ggn_description *d, int *failed)
                          *(const int *)(const void *)((const char *)&d->hyper + hyper_field[i].at), failed);
     if (d->hyper.noise_map)
         base_json_number(root, "picture", d->hyper.noise_map, failed);
+    if (d->hyper.reach > 0) {
+        base_json_number(root, "residual", d->hyper.reach, failed);
+        base_json_number(root, "scalars", d->hyper.scalars, failed);
+    }
     cJSON *calibration = base_json_object(root, "calibration", failed);
     for (size_t i = 0; i < N_CALIBRATION; i++)
         base_json_number(calibration, calibration_field[i].name,

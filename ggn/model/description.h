@@ -4,7 +4,8 @@
  *   {"kind": "model", "preset": "paper"|"lull", "height", "width", "window", "k_r", "k_m", "k_d",
  *    "calibration": {"scale", "shift", "threshold", "consecutive", "spacing"}, "provenance": {...}}
  *
- * and "picture": 1 in a model that takes the noise map.
+ * and "picture": 1 in a model that takes the noise map. A residual model has "residual", the octaves of noise by which its
+ * network may correct the law of visible noise, and "scalars", how many numbers the network is told (model/measure.h).
  */
 #ifndef GGN_MODEL_DESCRIPTION_H
 #define GGN_MODEL_DESCRIPTION_H
@@ -14,10 +15,12 @@
 struct cJSON;
 
 struct ggn_calibration {
-    double scale, shift; /* p = sigmoid(scale·logit + shift); 1 and 0 = not calibrated (Platt 1999) */
-    double threshold;    /* a check votes for stopping when p < threshold; in (0, 1) */
-    int consecutive;     /* checks in a row that must vote so; 1..16 */
-    double spacing;      /* ratio of spp between consecutive images the model was trained on; 1..16 */
+    /* p = sigmoid(scale·logit + shift); 1 and 0 = not calibrated (Platt 1999). A residual model's logit is in octaves of
+     * noise over what is just visible: log2 of the law's error and the network's correction */
+    double scale, shift;
+    double threshold; /* a check votes for stopping when p < threshold; in (0, 1) */
+    int consecutive;  /* checks in a row that must vote so; 1..16 */
+    double spacing;   /* ratio of spp between consecutive images the model was trained on; 1..16 */
 };
 
 struct ggn_description {

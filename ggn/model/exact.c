@@ -108,7 +108,7 @@ static void map_into(struct ggn_exact *e, int c)
 }
 
 double ggn_exact_logit(struct ggn_exact *e, const uint8_t *const *noisy, const uint16_t *const *denoised,
-                       const uint8_t *noise_map)
+                       const uint8_t *noise_map, const float *scalars)
 {
     const size_t pixels = (size_t)e->hyper.width * (size_t)e->hyper.height;
 
@@ -125,6 +125,8 @@ double ggn_exact_logit(struct ggn_exact *e, const uint8_t *const *noisy, const u
         load(e, GGN_NET_D, 2, noise_map, NULL, noise_map ? (double)GGN_NOISE_MAP_GAIN : 0);
         load(e, GGN_NET_D, 3, NULL, NULL, noise_map ? 1 : 0);
     }
+    for (int i = 0; i < e->hyper.scalars; i++)
+        plane(e, GGN_NET_D, GGN_D_SCALARS, 0)[i] = (double)scalars[i];
     ggn_exec_forward(e->exec[GGN_NET_D], e->weights[GGN_NET_D], 1, GGN_EVAL);
     return *plane(e, GGN_NET_D, last(e, GGN_NET_D), 0);
 }

@@ -23,6 +23,6 @@ void ggn_exact_destroy(struct ggn_exact *exact);
 /* As ggn_inference_denoise and ggn_inference_logit. */
 void ggn_exact_denoise(struct ggn_exact *exact, const uint8_t *noisy, uint16_t *denoised);
 double ggn_exact_logit(struct ggn_exact *exact, const uint8_t *const *noisy, const uint16_t *const *denoised,
-                       const uint8_t *noise_map);
+                       const uint8_t *noise_map, const float *scalars);
 
 #endif

@@ -118,7 +118,7 @@ static void load_noise_map(struct ggn_inference *j, const uint8_t *noise_map, in
 }
 
 static double tile_logit(struct ggn_inference *j, const uint8_t *const *noisy, const uint16_t *const *denoised,
-                         const uint8_t *noise_map, int width, int height, int x0, int y0)
+                         const uint8_t *noise_map, const float *scalars, int width, int height, int x0, int y0)
 {
     const struct ggn_value *in = input(j, GGN_NET_M);
 
@@ -132,12 +132,15 @@ static double tile_logit(struct ggn_inference *j, const uint8_t *const *noisy, c
     map_into(j, 1);
     if (j->model->hyper.noise_map)
         load_noise_map(j, noise_map, width, height, x0, y0);
+    if (j->model->hyper.scalars)
+        memcpy(ggn_exec_plane(j->exec[GGN_NET_D], GGN_D_SCALARS, 0, 0), scalars,
+               (size_t)j->model->hyper.scalars * sizeof *scalars);
     forward(j, GGN_NET_D);
     return (double)*output_plane(j, GGN_NET_D);
 }
 
 double ggn_inference_logit(struct ggn_inference *j, const uint8_t *const *noisy, const uint16_t *const *denoised,
-                           const uint8_t *noise_map, int width, int height)
+                           const uint8_t *noise_map, const float *scalars, int width, int height)
 {
     const struct ggn_value *in = input(j, GGN_NET_M);
     const int nx = ggn_tile_count(width, in->w), ny = ggn_tile_count(height, in->h);
@@ -147,7 +150,7 @@ double ggn_inference_logit(struct ggn_inference *j, const uint8_t *const *noisy,
         if (!ggn_fixed_is_finite(denoised[k], 3 * (size_t)width * (size_t)height))
             return (double)NAN;
     for (int t = 0; t < nx * ny; t++) {
-        double z = tile_logit(j, noisy, denoised, noise_map, width, height, ggn_tile_start(width, in->w, t % nx),
+        double z = tile_logit(j, noisy, denoised, noise_map, scalars, width, height, ggn_tile_start(width, in->w, t % nx),
                               ggn_tile_start(height, in->h, t / nx));
         if (!isfinite(z))
             return z;

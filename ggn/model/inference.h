@@ -36,10 +36,11 @@ void ggn_inference_destroy(struct ggn_inference *inference);
 /* noisy [3][height][width] display codes → denoised, 16-bit fixed point. */
 void ggn_inference_denoise(struct ggn_inference *inference, const uint8_t *noisy, uint16_t *denoised, int width, int height);
 /* noisy, denoised: S images each, noisiest first. noise_map: [height][width], the noise map of the newest image, or NULL:
- * it has none; a model without it ignores it. The raw logit of the discriminator; calibrate it with
- * ggn_policy_p. NaN or infinite when the model's weights overflow on this window. */
+ * it has none; a model without it ignores it. scalars: [GGN_SCALARS], for a model that reads them (hyper.scalars), else
+ * ignored. The raw logit of the discriminator; calibrate it with ggn_policy_p. NaN or infinite when the model's weights
+ * overflow on this window. */
 double ggn_inference_logit(struct ggn_inference *inference, const uint8_t *const *noisy, const uint16_t *const *denoised,
-                           const uint8_t *noise_map, int width, int height);
+                           const uint8_t *noise_map, const float *scalars, int width, int height);
 /* The noise feature map of the last tile that was judged, for pictures: 0 of the denoised window, 1 of the noisy one. Rows
  * are *row apart. Borrowed until the next call. */
 const float *ggn_inference_feature_map(const struct ggn_inference *inference, int which, int *row);

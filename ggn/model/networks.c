@@ -1,5 +1,7 @@
 #include "model/networks.h"
 
+#include "model/measure.h"
+
 const char *const ggn_preset_names[] = {"paper", "lull", NULL};
 
 static const double SLOPE = 0.2; /* LeakyReLU */
@@ -21,12 +23,16 @@ int ggn_hyper_check(const struct ggn_hyper *p, struct base_err *err)
                   {"k_r", p->k_r, 1, 128},
                   {"k_m", p->k_m, 1, 128},
                   {"k_d", p->k_d, 1, 64},
-                  {"picture", p->noise_map, 0, p->preset == GGN_PRESET_LULL}};
+                  {"picture", p->noise_map, 0, p->preset == GGN_PRESET_LULL},
+                  {"scalars", p->scalars ? p->scalars - GGN_SCALARS + 1 : 0, 0, p->reach > 0}};
 
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
         if (fields[i].value < fields[i].min || fields[i].value > fields[i].max)
             return base_fail(err, BASE_EINVAL, "hyper-parameter %s = %d is not in %d..%d", fields[i].name, fields[i].value,
                              fields[i].min, fields[i].max);
+    if (!(p->reach >= 0 && p->reach <= (p->preset == GGN_PRESET_LULL ? GGN_REACH_MAX : 0)))
+        return base_fail(err, BASE_EINVAL, "hyper-parameter residual = %g is not in 0..%g", p->reach,
+                         p->preset == GGN_PRESET_LULL ? GGN_REACH_MAX : 0);
     return 0;
 }
 
@@ -121,6 +127,7 @@ static void build_discriminator(struct ggn_graph *g, const struct ggn_hyper *p)
     int x = 0;
 
     ggn_graph_begin(g, "discriminator", p->noise_map ? 4 : 2, p->height, p->width);
+    const int told = p->scalars ? ggn_graph_input(g, p->scalars) : -1;
     for (int i = 0; i < 3; i++) {
         ggn_graph_stage(g, conv[i]);
         x = ggn_graph_conv_strided(g, x, k << i, 3, 2);
@@ -133,14 +140,14 @@ static void build_discriminator(struct ggn_graph *g, const struct ggn_hyper *p)
     x = ggn_graph_flatten(g, x);
     for (int i = 0; i < 3; i++) {
         ggn_graph_stage(g, fc[i]);
-        x = ggn_graph_linear(g, x, 4 * k >> i);
+        x = ggn_graph_linear(g, x, told, 4 * k >> i);
         ggn_graph_mark(g, x, fc[i]);
         x = ggn_graph_bn(g, x);
         x = ggn_graph_lrelu(g, x, SLOPE);
         x = ggn_graph_dropout(g, x, 0.5);
     }
     ggn_graph_stage(g, "fc4");
-    x = ggn_graph_linear(g, x, 1);
+    x = ggn_graph_linear(g, x, told, 1);
     if (p->preset == GGN_PRESET_PAPER) {
         x = ggn_graph_lrelu(g, x, SLOPE);
         ggn_graph_dropout(g, x, 0.5);

@@ -16,6 +16,9 @@ enum ggn_preset {
 extern const char *const ggn_preset_names[]; /* "paper", "lull", NULL */
 
 enum { GGN_NET_R, GGN_NET_M, GGN_NET_D, GGN_NETS };
+enum { GGN_D_SCALARS = 1 };
+
+#define GGN_REACH_MAX 4.0 /* octaves */
 
 struct ggn_hyper {
     enum ggn_preset preset;
@@ -23,6 +26,10 @@ struct ggn_hyper {
     int window;        /* images per window, S; 1..16 */
     int k_r, k_m, k_d; /* widths; 1..256 (k_d ≤ 64·16) */
     int noise_map;     /* 1: D also gets the noise map of the newest image; not in the published form */
+    /* > 0: D's answer corrects the law of visible noise by up to so many octaves of noise (model/measure.h); its last layer
+     * starts at zero, where it is the law. 0: the answer is D's alone, as published */
+    double reach;
+    int scalars; /* 0, or GGN_SCALARS: numbers that D's linear layers also read; with reach */
 };
 
 /* The paper's sizes: 200×200, S = 6, K = 16, 20, 64. */
@@ -31,7 +38,8 @@ struct ggn_hyper ggn_hyper_default(enum ggn_preset preset);
 int ggn_hyper_check(const struct ggn_hyper *hyper, struct base_err *err);
 
 /* R: 3×H×W → 3×H×W (sigmoid). M: 3S×H×W → 1×H×W (sigmoid). D: 2×H×W → logit (flat, 1); with `noise_map` 4×H×W: behind the
- * two maps GGN_NOISE_MAP_GAIN · the noise map (model/window.h), and 1 everywhere; without half buffers 0 in both. */
+ * two maps GGN_NOISE_MAP_GAIN · the noise map (model/window.h; with `reach` the map of visible noise), and 1 everywhere;
+ * without half buffers 0 in both. With `scalars` value GGN_D_SCALARS of its graph takes them. */
 int ggn_network_build(struct ggn_graph *graph, int net, const struct ggn_hyper *hyper, struct base_err *err);
 
 #endif

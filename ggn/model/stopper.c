@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "model/measure.h"
+
 static uint64_t to_spp(double spp) { return spp >= 1e18 ? UINT64_C(1000000000000000000) : (uint64_t)spp; }
 
 /* Asks at so many samples, but later than now; 2^64 - 1 samples make that 0: when the host likes. */
@@ -11,14 +13,22 @@ static void ask_at(struct ggn_stopper *s, uint64_t spp)
     s->verdict.next_spp = spp > s->asked_spp ? spp : s->asked_spp + 1;
 }
 
-static int due(const struct ggn_policy *p, const struct ggn_stopper *s, uint64_t spp)
+/* Of a step between images: nearer than that to the last one, the two would hardly differ. Looks that are judged anyway
+ * can leave the window as it was trained. */
+static const double NEARER = 0.5, NEARER_WITH_LAW = 0.75;
+
+/* The samples from which an image may join the window. */
+static double joins_at(const struct ggn_stop_rule *rule, const struct ggn_stopper *s)
 {
-    if ((double)spp < p->first_spp)
-        return 0;
-    if (!s->used)
-        return 1;
     double last = (double)s->spp[s->used - 1];
-    return (double)spp >= last + 0.5 * (ggn_policy_next(p, last) - last);
+    return last + (rule->reach > 0 ? NEARER_WITH_LAW : NEARER) * (ggn_policy_next(&rule->policy, last) - last);
+}
+
+static int due(const struct ggn_stop_rule *rule, const struct ggn_stopper *s, uint64_t spp)
+{
+    if ((double)spp < rule->policy.first_spp)
+        return 0;
+    return !s->used || (double)spp >= joins_at(rule, s);
 }
 
 static void push(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uint64_t spp)
@@ -37,12 +47,16 @@ int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uin
     const struct ggn_verdict nothing = {.p = (double)NAN, .predicted_spp = (double)NAN, .noise = (double)NAN};
 
     if (spp && s->asked_spp == spp)
-        return 0;
+        return GGN_LOOK_NONE;
     s->asked_spp = spp;
-    if (due(&rule->policy, s, spp)) {
+    if (due(rule, s, spp)) {
         s->verdict = nothing;
         push(rule, s, spp);
-        return 1;
+        return GGN_LOOK_IMAGE;
+    }
+    if (rule->reach > 0 && s->used && !s->verdict.stop) {
+        s->verdict = nothing;
+        return GGN_LOOK_BETWEEN;
     }
     if (!s->used) {
         s->verdict = nothing;
@@ -51,7 +65,7 @@ int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uin
     } else if (!s->verdict.stop) {
         ask_at(s, s->verdict.next_spp);
     }
-    return 0;
+    return GGN_LOOK_NONE;
 }
 
 /* Goes on at the next level or, while the gate says that the block is plainly noisy, at the first level of the window that
@@ -84,9 +98,59 @@ static int is_held(const struct ggn_policy *p, const struct ggn_evidence *e)
     return (p->tail999 > 0 || p->gini > 0) && e->tail(e->data, &tail999, &gini) && ggn_policy_tail_holds(p, tail999, gini);
 }
 
+static const double LEAST_STEP = 1.04; /* between looks, as a share of the samples */
+
+/* Logits beyond this are certain: no network in reach changes them into a doubt. */
+static const double CERTAIN = 12;
+
+/* The residual model's logit; NaN: the law does not know. */
+static double by_law(const struct ggn_stop_rule *rule, struct ggn_stopper *s, const struct ggn_evidence *e)
+{
+    const struct ggn_policy *p = &rule->policy;
+    double law = e->law(e->data);
+
+    if (isnan(law) || s->regular < (uint32_t)rule->window || fabs(p->scale * law + p->shift) > CERTAIN)
+        s->correction = 0;
+    else if (s->spp[s->used - 1] == s->asked_spp)
+        s->correction = ggn_residual_correction(e->logit(e->data), rule->reach);
+    return law + s->correction;
+}
+
+static void decide_by_law(const struct ggn_stop_rule *rule, struct ggn_stopper *s, const struct ggn_evidence *e)
+{
+    const struct ggn_policy *p = &rule->policy;
+    struct ggn_verdict *v = &s->verdict;
+    double spp = (double)s->asked_spp, logit = by_law(rule, s, e), joins = joins_at(rule, s);
+    double next = ggn_policy_next(p, (double)s->spp[s->used - 1]);
+
+    if (isnan(logit)) {
+        v->too_early = 1;
+        ask_at(s, to_spp(ceil(next)));
+        return;
+    }
+    v->noise = exp2(logit - s->correction);
+    v->p = ggn_policy_p(p, logit);
+    if (ggn_stopper_pass(s, p->passes, v->p < p->threshold) && !is_held(p, e)) {
+        v->stop = 1;
+        v->predicted_spp = spp;
+        return;
+    }
+    double stops_at = (log(p->threshold / (1 - p->threshold)) - p->shift) / p->scale;
+    double predicted = spp * fmax(exp2(fmin(2 * (logit - stops_at), 20)), LEAST_STEP); /* noise falls as 1/sqrt(spp) */
+    next = predicted < joins ? predicted : fmin(fmax(predicted, joins), next);
+    ask_at(s, to_spp(ceil(next)));
+    if (rule->spp_max > s->asked_spp && v->next_spp > rule->spp_max)
+        v->next_spp = rule->spp_max;
+    v->predicted_spp = fmax(predicted, (double)v->next_spp);
+}
+
 void ggn_stopper_decide(const struct ggn_stop_rule *rule, struct ggn_stopper *s, const struct ggn_evidence *e)
 {
     const struct ggn_policy *p = &rule->policy;
+    if (rule->reach > 0) {
+        decide_by_law(rule, s, e);
+        return;
+    }
     struct ggn_verdict *v = &s->verdict;
     double spp = (double)s->asked_spp;
 
@@ -131,6 +195,8 @@ int ggn_stopper_valid(const struct ggn_stop_rule *rule, const struct ggn_stopper
     if (s->used > (uint32_t)rule->window || s->regular > s->used || s->leapt > 1 || !verdict_valid(s))
         return 0;
     if (s->used && s->spp[s->used - 1] > s->asked_spp)
+        return 0;
+    if (!(fabs(s->correction) <= rule->reach))
         return 0;
     for (uint32_t i = 0; i < s->used; i++)
         if (!s->spp[i] || (i && s->spp[i] <= s->spp[i - 1]))

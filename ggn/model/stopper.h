@@ -10,6 +10,11 @@
  * - Then the network: p = ggn_policy_p(logit). `passes` checks in a row with p below the threshold stop the block, unless
  *   the tail guard (ggn_policy_tail_holds) holds it back, which leaves the passes counted so far.
  *
+ * A residual model has `reach` > 0. Its logit is that of the law of visible noise, log2 of the newest image's error, and the
+ * network's correction of up to `reach`. Then every look is judged: by the law alone until a window is full and where the
+ * network could not change the verdict, between the window's images with the last correction. The next look is where the
+ * law expects the end, at the next image at the latest.
+ *
  * Nothing here looks at pixels or keeps more than the plain values below. Pure functions, any thread.
  */
 #ifndef GGN_MODEL_STOPPER_H
@@ -25,6 +30,7 @@ struct ggn_stop_rule {
     struct ggn_policy policy; /* gate_noise 0: no gate; tail999, gini 0: no guard */
     int window;               /* images per window, S; 1 .. GGN_WINDOW_MAX */
     uint64_t spp_max;         /* no question comes beyond; 0: no limit */
+    double reach;             /* octaves of noise; 0: the network answers alone */
 };
 
 struct ggn_verdict {
@@ -33,7 +39,7 @@ struct ggn_verdict {
     uint64_t next_spp;    /* samples at which to ask again, where it goes on */
     double p;             /* probability that the noise is still seen; NaN: the network was not asked */
     double predicted_spp; /* where it expects to stop; NaN: not known */
-    double noise;         /* of the window, see ggn_window_noise; NaN: one image only */
+    double noise;         /* of the window, see ggn_window_noise; with `reach` the law's error; NaN: not known */
 };
 
 /* One block. All zero: never asked. */
@@ -45,6 +51,7 @@ struct ggn_stopper {
     uint32_t passes;              /* checks in a row below the threshold */
     uint32_t leapt;               /* the last verdict asked for a larger step than the network learned */
     struct ggn_verdict verdict;   /* the last one */
+    double correction;            /* with `reach`: the network's last one, octaves of noise */
 };
 
 /* What the window shows whose newest image is the one asked about. */
@@ -53,10 +60,15 @@ struct ggn_evidence {
     double (*noise)(void *data);                            /* ggn_window_noise of oldest and newest image */
     double (*logit)(void *data);                            /* the network's, of a full window */
     int (*tail)(void *data, double *tail999, double *gini); /* of the newest image's half buffer; 0: not known */
+    double (*law)(void *data); /* with `reach`: log2 of the error of the image asked about; NaN: not known */
 };
 
-/* The block now has `spp` samples. 1: its image is the newest of the window (the oldest leaves when there are more than
- * rule->window), to be judged next. 0: the verdict stands: the same question again, before the first level, or so soon after
+/* What an image asked about is. */
+enum { GGN_LOOK_NONE, GGN_LOOK_IMAGE, GGN_LOOK_BETWEEN };
+
+/* The block now has `spp` samples. GGN_LOOK_IMAGE: its image is the newest of the window (the oldest leaves when there are
+ * more than rule->window), to be judged next. GGN_LOOK_BETWEEN, with `reach`: no image of the window, but to be judged, too.
+ * GGN_LOOK_NONE: the verdict stands: the same question again, before the first level, or so soon after
  * the newest image that the two would hardly differ. */
 int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uint64_t spp);
 /* Sets s->verdict on the image that ggn_stopper_ask has just accepted. */

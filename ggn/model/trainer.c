@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "model/measure.h"
 #include "nn/hash.h"
 #include "nn/loss.h"
 #include "nn/ssim.h"
@@ -66,6 +67,10 @@ static int create_net(struct ggn_trainer *t, int net, struct base_err *err)
     if (!t->weights[net])
         return BASE_ENOMEM;
     ggn_weights_init(t->weights[net], t->options.init[net], t->options.seed + 1000u * (uint32_t)net);
+    if (net == GGN_NET_D && t->hyper.reach > 0) { /* its last layer: an untrained network corrects nothing */
+        const size_t last = t->graph[net].tensor[t->graph[net].n_tensors - 2].offset;
+        memset(t->weights[net]->params + last, 0, (t->graph[net].n_params - last) * sizeof(real));
+    }
     ggn_weights_pack(t->weights[net], NULL);
     if (!trained)
         return 0;
@@ -331,6 +336,28 @@ void ggn_trainer_set_noise_maps(struct ggn_trainer *t, const real *const *noise_
     }
 }
 
+void ggn_trainer_set_scalars(struct ggn_trainer *t, const real *const *scalars, int count)
+{
+    for (int i = 0; i < count && t->hyper.scalars; i++)
+        memcpy(ggn_exec_plane(t->d, GGN_D_SCALARS, i, 0), scalars[i], (size_t)t->hyper.scalars * sizeof *scalars[i]);
+}
+
+double ggn_trainer_answer(const struct ggn_trainer *t, int i, double law)
+{
+    double z = (double)*ggn_exec_plane(t->d, t->graph[GGN_NET_D].n_values - 1, i, 0);
+
+    return t->hyper.reach > 0 ? law + ggn_residual_correction(z, t->hyper.reach) : z;
+}
+
+/* d logit / d network: 1, or of scale · (law + reach · tanh(z/reach)) scale · (1 − tanh²(z/reach)). */
+static double slope_of(const struct ggn_trainer *t, int i)
+{
+    if (t->hyper.reach <= 0)
+        return 1;
+    double tame = ggn_trainer_answer(t, i, 0) / t->hyper.reach;
+    return t->options.scale * (1 - tame * tame);
+}
+
 /* D forward, mean BCE, D backward (its own gradient is added to grad, that of the maps stays in d). */
 static double classify(struct ggn_trainer *t, const struct ggn_batch *b, double *logits)
 {
@@ -344,12 +371,14 @@ static double classify(struct ggn_trainer *t, const struct ggn_batch *b, double 
     ggn_exec_forward(t->d, t->weights[GGN_NET_D], b->count, GGN_TRAIN);
     memset(z, 0, (size_t)b->count * sizeof *z);
     for (int i = 0; i < n; i++)
-        z[first + i] = (double)*ggn_exec_plane(t->d, out, i, 0);
+        z[first + i] = t->hyper.reach > 0 ? t->options.scale * ggn_trainer_answer(t, i, b->law[first + i])
+                                          : ggn_trainer_answer(t, i, 0);
     job_sum(t->job, z, (size_t)b->count, sizeof *z);
     for (int i = 0; i < b->count; i++) {
         total += share * ggn_bce(z[i], b->label[i]);
         if (i >= first && i < first + n)
-            *ggn_exec_grad(t->d, out, i - first, 0) = (real)(share * ggn_bce_grad(z[i], b->label[i]));
+            *ggn_exec_grad(t->d, out, i - first, 0) =
+                (real)(share * slope_of(t, i - first) * ggn_bce_grad(z[i], b->label[i]));
     }
     ggn_exec_backward(t->d, t->weights[GGN_NET_D], t->grad[GGN_NET_D]);
     return total;
@@ -376,6 +405,7 @@ int ggn_trainer_classifier_step(struct ggn_trainer *t, const struct ggn_batch *b
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], 2 * b->count, GGN_TRAIN);
     exchange_maps(t, maps, n, 0);
     ggn_trainer_set_noise_maps(t, b->noise_map, n);
+    ggn_trainer_set_scalars(t, b->scalars, n);
     *bce = classify(t, b, logits);
     rc = job_failed(t->job, err);
     if (!rc)

@@ -30,7 +30,8 @@ struct ggn_train_options {
     double clip;    /* largest L2 norm of a network's gradient; 0 = no clipping */
     double explode; /* a loss or gradient norm above it counts as divergence */
     int dropout;
-    int bf16; /* weights also packed for GGN_EXEC_BF16 */
+    double scale; /* with hyper.reach: logit = scale · octaves */
+    int bf16;     /* weights also packed for GGN_EXEC_BF16 */
     enum ggn_init init[GGN_NETS];
     uint32_t seed;
 };
@@ -46,6 +47,8 @@ struct ggn_batch {
     const real *const *denoised;  /* [mine][3S] for ggn_trainer_classifier_step */
     const real *const *reference; /* [mine][3] for ggn_trainer_paper_step */
     const real *const *noise_map; /* [mine] noise maps, GGN_NOISE_MAP_GAIN · codes, NULL: none; with hyper.noise_map */
+    const real *const *scalars;   /* [mine][GGN_SCALARS], with hyper.scalars */
+    const double *law;            /* [count] with hyper.reach: log2 of the law's error */
     const double *label;          /* [count] 1 = still noisy, 0 = not, between = uncertain */
 };
 
@@ -89,6 +92,10 @@ int ggn_trainer_denoiser_step(struct ggn_trainer *trainer, const real *const *x,
 int ggn_trainer_classifier_step(struct ggn_trainer *trainer, const struct ggn_batch *batch, double *bce, double *logits,
                                 struct base_err *err);
 
+/* D's answer to image i of the last forward pass of D: its logit, or with hyper.reach octaves: law + the correction. */
+double ggn_trainer_answer(const struct ggn_trainer *trainer, int i, double law);
+/* Puts scalars[count] into D's input, for who runs D without a step; nothing without hyper.scalars. */
+void ggn_trainer_set_scalars(struct ggn_trainer *trainer, const real *const *scalars, int count);
 /* Puts noise map[count] into D's input, for who runs D without a step; nothing without hyper.noise_map. */
 void ggn_trainer_set_noise_maps(struct ggn_trainer *trainer, const real *const *noise_map, int count);
 

@@ -304,18 +304,21 @@ static real dropout_factor(const struct ggn_task *t, long i)
 
 PLANE_LAYER(dropout, *p.y = *p.x * dropout_factor(t, i), *p.dx = (t->l->add_in ? *p.dx : 0) + *p.dy * dropout_factor(t, i))
 
-/* --- linear: Y = W·X + b ---------------------------------------------------------------------------------------------- */
+/* --- linear: Y = W·X + b, X the vector `in` and behind it that of `in2` ----------------------------------------------- */
 
 static void linear_unit(void *data, long o, int worker)
 {
     const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
-    const long c_in = g->value[t->l->in].c;
-    const real *w = t->w->params + t->l->weight + (size_t)(o * c_in);
+    const long c_in = g->value[t->l->in].c, c_all = ggn_layer_c_in(g, t->l);
+    const real *w = t->w->params + t->l->weight + (size_t)(o * c_all);
 
-    for (int n = 0; n < t->e->batch; n++)
-        ggn_act(t, t->l->out, n, 0)[o] =
-            t->w->params[t->l->bias + (size_t)o] + t->e->kernels->dot(w, ggn_act(t, t->l->in, n, 0), c_in);
+    for (int n = 0; n < t->e->batch; n++) {
+        real *y = &ggn_act(t, t->l->out, n, 0)[o];
+        *y = t->w->params[t->l->bias + (size_t)o] + t->e->kernels->dot(w, ggn_act(t, t->l->in, n, 0), c_in);
+        if (t->l->in2 >= 0)
+            *y += t->e->kernels->dot(w + c_in, ggn_act(t, t->l->in2, n, 0), c_all - c_in);
+    }
     (void)worker;
 }
 
@@ -325,28 +328,40 @@ static void linear_forward(struct ggn_task *t) { ggn_task_run(t, t->e->graph->va
 static void linear_weight_back(void *data, long o, int worker)
 {
     const struct ggn_task *t = data;
-    const long c_in = t->e->graph->value[t->l->in].c;
+    const long c_in = t->e->graph->value[t->l->in].c, c_all = ggn_layer_c_in(t->e->graph, t->l);
+    real *dw = t->e->params_grad + t->l->weight + (size_t)(o * c_all);
 
     for (int n = 0; n < t->e->batch; n++) {
         const real d = ggn_grad(t, t->l->out, n, 0)[o];
-        t->e->kernels->axpy(t->e->params_grad + t->l->weight + (size_t)(o * c_in), d, ggn_act(t, t->l->in, n, 0), c_in);
+        t->e->kernels->axpy(dw, d, ggn_act(t, t->l->in, n, 0), c_in);
+        if (t->l->in2 >= 0)
+            t->e->kernels->axpy(dw + c_in, d, ggn_act(t, t->l->in2, n, 0), c_all - c_in);
         t->e->params_grad[t->l->bias + (size_t)o] += d;
     }
     (void)worker;
 }
 
-/* dX = Wᵀ·dY */
+/* dX = Wᵀ·dY for the inputs from `first` on that value `in` holds. */
+static void linear_value_back(const struct ggn_task *t, long n, int in, long first, int add)
+{
+    const struct ggn_graph *g = t->e->graph;
+    const long c_in = g->value[in].c, c_all = ggn_layer_c_in(g, t->l);
+    real *dx = ggn_grad(t, in, n, 0);
+
+    if (!add)
+        memset(dx, 0, (size_t)c_in * sizeof *dx);
+    for (int o = 0; o < g->value[t->l->out].c; o++)
+        t->e->kernels->axpy(dx, ggn_grad(t, t->l->out, n, 0)[o], t->w->params + t->l->weight + (size_t)(o * c_all + first),
+                            c_in);
+}
+
 static void linear_input_back(void *data, long n, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_graph *g = t->e->graph;
-    const long c_in = g->value[t->l->in].c;
-    real *dx = ggn_grad(t, t->l->in, n, 0);
 
-    if (!t->l->add_in)
-        memset(dx, 0, (size_t)c_in * sizeof *dx);
-    for (int o = 0; o < g->value[t->l->out].c; o++)
-        t->e->kernels->axpy(dx, ggn_grad(t, t->l->out, n, 0)[o], t->w->params + t->l->weight + (size_t)(o * c_in), c_in);
+    linear_value_back(t, n, t->l->in, 0, t->l->add_in);
+    if (t->l->in2 >= 0)
+        linear_value_back(t, n, t->l->in2, t->e->graph->value[t->l->in].c, t->l->add_in2);
     (void)worker;
 }
 

@@ -78,6 +78,8 @@ void ggn_graph_begin(struct ggn_graph *g, const char *name, int c, int h, int w)
     add_value(g, c, h, w, 0);
 }
 
+int ggn_graph_input(struct ggn_graph *g, int c) { return add_value(g, c, 1, 1, 1); }
+
 void ggn_graph_stage(struct ggn_graph *g, const char *stage)
 {
     g->stage = stage;
@@ -187,12 +189,12 @@ int ggn_graph_flatten(struct ggn_graph *g, int in)
     return l->out = add_value(g, a->c * a->h * a->w, 1, 1, 1);
 }
 
-int ggn_graph_linear(struct ggn_graph *g, int in, int c_out)
+int ggn_graph_linear(struct ggn_graph *g, int in, int in2, int c_out)
 {
-    struct ggn_layer *l = add_layer(g, GGN_OP_LINEAR, in, -1);
+    struct ggn_layer *l = add_layer(g, GGN_OP_LINEAR, in, in2);
     if (!l)
         return 0;
-    l->weight = add_tensor(g, "weight", 0, 0, (int[4]){c_out, g->value[in].c}, 2);
+    l->weight = add_tensor(g, "weight", 0, 0, (int[4]){c_out, ggn_layer_c_in(g, l)}, 2);
     l->bias = add_tensor(g, "bias", 1, 0, (int[4]){c_out}, 1);
     g->n_stage_layers++;
     return l->out = add_value(g, c_out, 1, 1, 1);

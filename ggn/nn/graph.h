@@ -40,7 +40,7 @@ struct ggn_value {
  * CONV: 3×3 stride 1 pad 1 or 1×1, bias, then LeakyReLU when slope != 1; reads `in` and `in2` as one. IM2COL: C planes → C·9
  * planes of the windows of a strided 3×3 convolution. BN: batch normalisation per channel. MAXPOOL: kernel 2 stride 2, or
  * kernel 3 stride 2 pad 1. UP: bilinear ×2, half-pixel centres, then pad_y zero rows on top and pad_x zero columns on the
- * left. FLATTEN: planes → vector in (C, H, W) order. */
+ * left. FLATTEN: planes → vector in (C, H, W) order. LINEAR: of a vector, and of `in2` behind it. */
 #define GGN_OPS(OP) \
     OP(CONV, conv, "conv") \
     OP(IM2COL, im2col, "im2col") \
@@ -98,6 +98,8 @@ struct ggn_graph {
 
 /* Starts a graph whose input is c × h × w. */
 void ggn_graph_begin(struct ggn_graph *g, const char *name, int c, int h, int w);
+/* A second input, a vector of c numbers; before any layer. Returns its value. */
+int ggn_graph_input(struct ggn_graph *g, int c);
 /* Layers added from here on belong to `stage` (static text). */
 void ggn_graph_stage(struct ggn_graph *g, const char *stage);
 /* Each adds one layer and returns the value it computes. After a failure (bad shape, too many layers) every call does
@@ -110,7 +112,7 @@ int ggn_graph_sigmoid(struct ggn_graph *g, int in);
 int ggn_graph_maxpool(struct ggn_graph *g, int in, int kernel);
 int ggn_graph_up(struct ggn_graph *g, int in, int pad_y, int pad_x);
 int ggn_graph_flatten(struct ggn_graph *g, int in);
-int ggn_graph_linear(struct ggn_graph *g, int in, int c_out);
+int ggn_graph_linear(struct ggn_graph *g, int in, int in2, int c_out);
 int ggn_graph_dropout(struct ggn_graph *g, int in, double p); /* of a vector */
 /* Names the value for `ggn golden`. */
 void ggn_graph_mark(struct ggn_graph *g, int value, const char *stage);

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "observer/visibility.h"
+#include "model/visibility.h"
 #include "sequence/simulate.h"
 
 const char *const ggn_curve_sources[] = {"halves", "levels", NULL};

@@ -34,6 +34,12 @@ double ggn_observer_p_noisy(const struct ggn_observer *o, double error)
     return error > 0.0 ? 0.5 * erfc(-2.0 * log2(error) / (o->spread * sqrt(2.0))) : 0.0;
 }
 
+double ggn_observer_slope(const struct ggn_observer *o)
+{
+    const double share = GGN_OBSERVER_VISIBLE;
+    return log(share / (1.0 - share)) / log2(ggn_observer_error_at(o, share));
+}
+
 double ggn_observer_error_at(const struct ggn_observer *o, double share)
 {
     double below = 1e-6, above = 1e6; /* errors; bisected in octaves */

@@ -1,7 +1,7 @@
 /*
  * The model observer: stands in for people where there are no human thresholds, and is never called human.
  *
- * Visible noise r (observer/visibility.h) is seen while it exceeds `level`, the one number that is fitted to people
+ * Visible noise r (model/visibility.h) is seen while it exceeds `level`, the one number that is fitted to people
  * (observer/calibrate.h). People differ and the observer errs: log2 of the samples at which a viewer stops seeing the noise
  * is taken as normal around its answer, with the deviation `spread`. Pure functions, thread-safe.
  *
@@ -47,6 +47,9 @@ double ggn_observer_next(double spp, double predicted, double growth);
 double ggn_observer_p_noisy(const struct ggn_observer *observer, double error);
 /* Its inverse: the error at which this share of viewers, in (0, 1), sees noise. */
 double ggn_observer_error_at(const struct ggn_observer *observer, double share);
+
+/* a such that the logistic 1/(1 + exp(-a log2(error))) says the same at GGN_OBSERVER_VISIBLE, and nearly everywhere else. */
+double ggn_observer_slope(const struct ggn_observer *observer);
 
 /* Parameters from a file that ggn_calibration_write made. left_out: the name of a view that may have been fitted: the
  * parameters without it, if it was; NULL: those fitted to all views. */

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 #include "base/colour.h"
-#include "observer/visibility.h"
+#include "model/visibility.h"
 
 struct workspace { /* for one block; owns */
     float *rgb, *image, *reference, *seen;

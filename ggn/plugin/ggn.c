@@ -9,9 +9,16 @@
  * in a few pixels has not met its rare bright paths often enough for any judgement by eye, and is not stopped.
  *
  * A model may also take the noise map that the half buffer shows; without half buffer it decides without.
+ *
+ * A *residual* model begins with what `observer` measures, from the half buffer or without one from how the mean changes:
+ * the network only corrects it, so gate and tail guard are not needed. `error` is then the visible noise over what is just
+ * visible.
  */
 #include "model/inference.h"
+#include "model/measure.h"
 #include "model/window.h"
+#include "observer/observer.h"
+#include "plugin/pair.h"
 #include "plugin/translate.h"
 #include "plugin/windowed.h"
 #include "sequence/simulate.h"
@@ -45,17 +52,21 @@ static const struct lull_param params[P_COUNT] = {
 
 struct worker {
     struct ggn_inference *inference;
-    double *noise;      /* [pixels of the largest block], for the tail guard */
-    uint8_t *noise_map; /* [pixels of the largest block], for models with the noise map */
+    double *noise;          /* [pixels of the largest block], for the tail guard */
+    uint8_t *noise_map;     /* [pixels of the largest block], for models with the noise map */
+    struct ggn_meter meter; /* of a residual model */
+    struct ggn_measure measure;
 };
 
-/* The noisy image, 8 bit, and the denoised one, 16 bit. */
+static size_t values_of(const struct lull_block *b) { return 3 * (size_t)lull_kit_pixels(b); }
+
+/* The noisy image, 8 bit, and the denoised one, 16 bit; of a residual model also what was measured. */
 static struct gp_slot slot_of(const void *of, int32_t width, int32_t height)
 {
+    const struct lull_instance *in = of;
     const size_t values = 3 * (size_t)width * (size_t)height;
 
-    (void)of;
-    return (struct gp_slot){.made = 2 * values, .kept = values};
+    return (struct gp_slot){.made = 2 * values, .kept = values + (in->rule.reach > 0 ? sizeof(struct ggn_measure) : 0)};
 }
 
 static void worker_destroy(void *data)
@@ -65,6 +76,7 @@ static void worker_destroy(void *data)
     if (!w)
         return;
     ggn_inference_destroy(w->inference);
+    ggn_meter_release(&w->meter);
     free(w->noise);
     free(w->noise_map);
     free(w);
@@ -78,7 +90,7 @@ static void *worker_create(const struct lull_instance *in, size_t pixels, struct
         return NULL;
     w->noise = malloc(pixels * sizeof *w->noise);
     w->noise_map = malloc(pixels);
-    if (w->noise && w->noise_map)
+    if (w->noise && w->noise_map && (in->rule.reach <= 0 || !ggn_meter_init(&w->meter, pixels, err)))
         w->inference = ggn_inference_create(in->model, (enum ggn_precision)in->kit.value[P_PRECISION], NULL, err);
     if (w->inference)
         return w;
@@ -88,9 +100,94 @@ static void *worker_create(const struct lull_instance *in, size_t pixels, struct
 
 static void model_destroy(void *model) { ggn_model_destroy(model); }
 
+/* Where a slot keeps what was measured of its image; not aligned. */
+static unsigned char *measured(const struct gp_block_view *seen, uint32_t slot)
+{
+    return (unsigned char *)gp_history_kept(&seen->in->history, seen->block->id, slot) + values_of(seen->block);
+}
+
 static long read_image(const struct gp_block_view *seen, uint32_t slot)
 {
+    const struct worker *w = seen->worker;
+
+    if (seen->in->rule.reach > 0)
+        memcpy(measured(seen, slot), &w->measure, sizeof w->measure);
     return gp_windowed_read(seen, gp_history_kept(&seen->in->history, seen->block->id, slot));
+}
+
+/* The two pictures of the block into the worker's meter. Returns whether they tell anything; *differ: whether they do
+ * anywhere, *split: as ggn_measure wants it. */
+static int read_pair(const struct gp_block_view *seen, int *differ, double *split)
+{
+    struct lull_instance *in = seen->in;
+    const struct lull_block *b = seen->block;
+    float *const *rgb = ((const struct worker *)seen->worker)->meter.rgb;
+    struct lull_kit_tally tally = {0};
+
+    *split = 0.5;
+    if (in->means.count) {
+        uint64_t spp_base;
+        float *keep;
+        const float *base = gp_means_begin(&in->means, b->id, b->spp, &keep, &spp_base);
+        *differ = gp_pair_of_means(&in->kit, seen->view, b, base, spp_base, keep, rgb, &tally);
+        return base != NULL;
+    }
+    if (!gp_has_halves(b)) {
+        gp_warn_once(
+            &in->kit, &in->warned,
+            "ggn: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped by "
+            "it");
+        return 0;
+    }
+    *split *= seq_half_scale((double)b->spp, (double)b->half_spp);
+    *differ = gp_pair_of_halves(&in->kit, seen->view, b, rgb, &tally);
+    return 1;
+}
+
+static void measure_block(const struct gp_block_view *seen)
+{
+    struct lull_instance *in = seen->in;
+    const struct lull_block *b = seen->block;
+    struct worker *w = seen->worker;
+    struct lull_kit_tally tally = {0};
+    double split;
+    int differ;
+
+    w->measure = (struct ggn_measure){.visible = (double)NAN};
+    if (in->rule.reach <= 0 || !read_pair(seen, &differ, &split))
+        return;
+    memset(w->noise_map, 0, (size_t)lull_kit_pixels(b));
+    if (differ)
+        ggn_measure(&w->meter, b->x1 - b->x0, b->y1 - b->y0, split, 0, &w->measure, w->noise_map);
+    else
+        w->measure.visible =
+            gp_error_of_same(&in->kit, gp_pair_has_structure(w->meter.rgb[0], (size_t)lull_kit_pixels(b)), &in->warned,
+                             "ggn: the planes say that a block has no noise, yet it is not of one colour: "
+                             "HALF must hold a fixed half of the samples, COLOR the mean of all",
+                             &tally);
+}
+
+static double law(void *data)
+{
+    const struct gp_block_view *seen = data;
+    const struct worker *w = seen->worker;
+
+    return ggn_measure_octaves(
+        ggn_observer_error(&ggn_observer_default, w->measure.visible, (size_t)lull_kit_pixels(seen->block)));
+}
+
+/* What the network is told of the window whose newest image has just been measured. */
+static void scalars_of(struct gp_block_view *seen, float scalars[GGN_SCALARS])
+{
+    const struct ggn_stopper *s = &seen->head->stopper;
+    struct ggn_measure window[GGN_WINDOW_MAX];
+    double spp[GGN_WINDOW_MAX];
+
+    for (uint32_t i = 0; i < s->used; i++) {
+        memcpy(&window[i], measured(seen, seen->head->order[i]), sizeof window[i]);
+        spp[i] = (double)s->spp[i];
+    }
+    ggn_measure_scalars(window, spp, (int)s->used, law(seen), scalars);
 }
 
 static double window_noise(void *data)
@@ -128,6 +225,8 @@ static const uint8_t *read_noise_map(const struct gp_block_view *seen)
     struct lull_kit_span s;
     double split;
 
+    if (model->hyper.noise_map && seen->in->rule.reach > 0)
+        return worker->noise_map; /* of the visible noise, already measured */
     if (!model->hyper.noise_map || !has_half(seen, &split))
         return NULL;
     for (lull_kit_span_begin(&s, seen->view, seen->block, HALVES); lull_kit_span_next(&s);)
@@ -142,14 +241,17 @@ static const uint8_t *read_noise_map(const struct gp_block_view *seen)
 /* Denoises the images that have not been denoised yet. */
 static double window_logit(void *data)
 {
-    const struct gp_block_view *seen = data;
+    struct gp_block_view *seen = data;
     const struct gp_history *history = &seen->in->history;
     const struct worker *worker = seen->worker;
     const uint8_t *noisy[GGN_WINDOW_MAX];
     const uint16_t *denoised[GGN_WINDOW_MAX];
     const struct lull_block *b = seen->block;
     int w = b->x1 - b->x0, h = b->y1 - b->y0;
+    float scalars[GGN_SCALARS] = {0};
 
+    if (seen->in->rule.reach > 0)
+        scalars_of(seen, scalars);
     for (int i = 0; i < seen->in->rule.window; i++) {
         uint32_t slot = seen->head->order[i];
         uint16_t *to = gp_history_made(history, b->id, slot);
@@ -159,7 +261,7 @@ static double window_logit(void *data)
             ggn_inference_denoise(worker->inference, noisy[i], to, w, h);
         seen->head->made |= UINT32_C(1) << slot;
     }
-    return ggn_inference_logit(worker->inference, noisy, denoised, read_noise_map(seen), w, h);
+    return ggn_inference_logit(worker->inference, noisy, denoised, read_noise_map(seen), scalars, w, h);
 }
 
 static int tail_statistics(void *data, double *tail999, double *gini)
@@ -200,9 +302,10 @@ static int32_t load(struct lull_instance *in, int kind, const char *path, struct
     if (rc || ggn_policy_of(model, &in->rule.policy, &error))
         return gp_fail_from(err, "model", &error);
     in->rule.window = model->hyper.window;
+    in->rule.reach = model->hyper.reach;
     if (in->rule.window < 2 || in->rule.window > GGN_WINDOW_MAX)
         return lull_kit_fail(err, LULL_E_IO, "model: %.200s: windows of %d images", path, in->rule.window);
-    if (model->hyper.noise_map) {
+    if (model->hyper.noise_map && in->rule.reach <= 0) {
         in->kit.need.planes_used |= LULL_PLANE_BIT(LULL_PLANE_HALF);
         in->half_wanted = "this model judges by half buffers too, which the host does not give: how well it decides without "
                           "them depends on how it was trained (ggn evaluate --no-pictures)";
@@ -224,8 +327,9 @@ static const struct gp_block_view_ops ops = {.model = "lull-2",
                                              .worker_create = worker_create,
                                              .worker_destroy = worker_destroy,
                                              .model_destroy = model_destroy,
+                                             .measure = measure_block,
                                              .read = read_image,
-                                             .evidence = {NULL, window_noise, window_logit, tail_statistics}};
+                                             .evidence = {NULL, window_noise, window_logit, tail_statistics, law}};
 
 static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
                       struct lull_instance **instance, struct lull_error *err)

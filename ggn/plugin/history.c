@@ -89,7 +89,7 @@ uint32_t gp_head_push(struct gp_head *head, int window, uint32_t before)
 
 /* --- lull.state/1 ------------------------------------------------------------------------------------------------------ */
 
-static const char MAGIC[8] = {'G', 'G', 'N', 'S', 'T', 'A', 'T', '2'};
+static const char MAGIC[8] = {'G', 'G', 'N', 'S', 'T', 'A', 'T', '3'};
 
 struct state_header {
     char magic[8];
@@ -132,7 +132,7 @@ static int head_valid(const struct gp_head *head, const struct ggn_stop_rule *ru
             return 0;
         seen |= UINT32_C(1) << head->order[i];
     }
-    return !head->made && head->bad <= 1 && ggn_stopper_valid(rule, &head->stopper);
+    return !head->made && head->bad <= 1 && head->measured <= 1 && ggn_stopper_valid(rule, &head->stopper);
 }
 
 static int32_t load_blocks(struct gp_history *h, const struct ggn_stop_rule *rule, const struct lull_reader *reader,

@@ -28,7 +28,7 @@ struct gp_head {
     uint32_t order[GP_SLOTS_MAX]; /* slots, oldest image first; order[used] is the spare one */
     uint32_t made;                /* bit per slot: what is made from it is there */
     uint32_t bad;                 /* the last image had broken pixels */
-    uint32_t zero;
+    uint32_t measured;            /* the last call has measured it */
 };
 
 struct gp_history {

@@ -7,13 +7,12 @@
  * is at most `visible`. No model.
  */
 #include "observer/observer.h"
-#include "observer/visibility.h"
+#include "model/visibility.h"
 #include "plugin/criteria.h"
 #include "plugin/means.h"
+#include "plugin/pair.h"
 #include "plugin/translate.h"
 #include "sequence/simulate.h"
-
-static const double FLOAT_STEP = 0x1p-22; /* means that are nearer than their rounding are the same */
 
 enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_COUNT };
 enum { COLOR = LULL_PLANE_BIT(LULL_PLANE_COLOR), PLANES = COLOR | LULL_PLANE_BIT(LULL_PLANE_HALF) };
@@ -50,71 +49,6 @@ struct lull_instance {
 
 /* --- one block --------------------------------------------------------------------------------------------------------- */
 
-static int usable(const double a[3], const double m[3])
-{
-    return isfinite(a[0]) && isfinite(a[1]) && isfinite(a[2]) && isfinite(m[0]) && isfinite(m[1]) && isfinite(m[2]);
-}
-
-/* Fills w->rgb with the means of the two halves; n samples, of which h are in HALF. A pixel that is no number takes the
- * place of the one before it: neither noise nor texture. Returns whether the halves differ anywhere. */
-static int read_halves(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
-                       struct worker *w, struct lull_kit_tally *tally)
-{
-    const double n = (double)b->spp, h = (double)b->half_spp;
-    const size_t plane = (size_t)lull_kit_pixels(b);
-    struct lull_kit_span s;
-    size_t at = 0;
-    int differ = 0;
-
-    for (lull_kit_span_begin(&s, view, b, PLANES); lull_kit_span_next(&s);)
-        for (int32_t i = 0; i < s.count; i++, at++) {
-            const double *m = s.value[LULL_PLANE_COLOR][i], *a = s.value[LULL_PLANE_HALF][i];
-            int good = usable(a, m);
-            tally->valid += good;
-            tally->bad += !good;
-            for (size_t c = 0; c < 3; c++) {
-                float *one = &w->rgb[0][c * plane + at], *other = &w->rgb[1][c * plane + at];
-                *one = good ? gp_shown(kit, a[c]) : at ? one[-1] : 0;
-                *other = good ? gp_shown(kit, (n * m[c] - h * a[c]) / (n - h)) : at ? other[-1] : 0;
-                differ |= good && a[c] != m[c];
-            }
-        }
-    return differ;
-}
-
-/* Fills w->rgb with the mean plus and minus its noise, as the earlier mean `base` tells; keeps the mean where `keep` is not
- * NULL. A pixel that is or was no number takes the place of the one before it. Returns whether the means differ anywhere. */
-static int read_means(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
-                      const float *base, uint64_t spp_base, float *keep, struct worker *w, struct lull_kit_tally *tally)
-{
-    const double scale = base ? seq_means_scale((double)spp_base, (double)b->spp) : 0;
-    const size_t plane = (size_t)lull_kit_pixels(b);
-    struct lull_kit_span s;
-    size_t at = 0;
-    int differ = 0;
-
-    for (lull_kit_span_begin(&s, view, b, COLOR); lull_kit_span_next(&s);)
-        for (int32_t i = 0; i < s.count; i++, at++) {
-            const double *m = s.value[LULL_PLANE_COLOR][i];
-            double d[3];
-            for (size_t c = 0; c < 3; c++) {
-                d[c] = base ? scale * (m[c] - (double)base[c * plane + at]) : 0;
-                if (keep)
-                    keep[c * plane + at] = (float)m[c];
-            }
-            int good = usable(d, m);
-            tally->valid += good;
-            tally->bad += !good;
-            for (size_t c = 0; c < 3; c++) {
-                float *one = &w->rgb[0][c * plane + at], *other = &w->rgb[1][c * plane + at];
-                *one = good ? gp_shown(kit, m[c] + d[c]) : at ? one[-1] : 0;
-                *other = good ? gp_shown(kit, m[c] - d[c]) : at ? other[-1] : 0;
-                differ |= good && fabs(d[c]) > FLOAT_STEP * scale * fabs(m[c]);
-            }
-        }
-    return differ;
-}
-
 /* split: of the two pictures' difference, to noise as strong as the mean's. */
 static double error_of(const struct lull_instance *in, const struct lull_block *b, double split, struct worker *w)
 {
@@ -130,22 +64,14 @@ static double error_of(const struct lull_instance *in, const struct lull_block *
     return ggn_observer_error(&in->observer, noise, pixels);
 }
 
-static int has_structure(const struct worker *w, size_t pixels)
-{
-    for (size_t c = 0; c < 3; c++)
-        for (size_t i = 1; i < pixels; i++)
-            if (w->rgb[0][c * pixels + i] != w->rgb[0][c * pixels])
-                return 1;
-    return 0;
-}
-
 /* What the two pictures of w say; differ: they are not the same everywhere. `same` is the warning if they should not be. */
 static double verdict_on(struct lull_instance *in, const struct lull_block *b, int differ, double split, const char *same,
                          struct worker *w, struct lull_kit_tally *tally)
 {
     if (differ)
         return error_of(in, b, split, w);
-    return gp_error_of_same(&in->kit, has_structure(w, (size_t)lull_kit_pixels(b)), &in->warned, same, tally);
+    return gp_error_of_same(&in->kit, gp_pair_has_structure(w->rgb[0], (size_t)lull_kit_pixels(b)), &in->warned, same,
+                            tally);
 }
 
 static double error_of_halves(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
@@ -159,7 +85,7 @@ static double error_of_halves(struct lull_instance *in, const struct lull_view *
         tally->early = 1;
         return (double)NAN;
     }
-    int differ = read_halves(&in->kit, view, b, w, tally);
+    int differ = gp_pair_of_halves(&in->kit, view, b, w->rgb, tally);
     return verdict_on(in, b, differ, 0.5 * seq_half_scale((double)b->spp, (double)b->half_spp),
                       "observer: COLOR and HALF are the same in a block that is not of one colour: HALF must hold a fixed "
                       "half of the samples",
@@ -172,7 +98,7 @@ static double error_of_means(struct lull_instance *in, const struct lull_view *v
     uint64_t spp_base;
     float *keep;
     const float *base = gp_means_begin(&in->means, b->id, b->spp, &keep, &spp_base);
-    int differ = read_means(&in->kit, view, b, base, spp_base, keep, w, tally);
+    int differ = gp_pair_of_means(&in->kit, view, b, base, spp_base, keep, w->rgb, tally);
 
     if (!base) {
         tally->early = 1;

@@ -59,10 +59,10 @@ void gp_windowed_ready(struct lull_instance *in, const struct lull_param *params
     for (uint32_t i = 0; i < count; i++)
         if (!isnan(in->kit.value[i]))
             ggn_policy_adjust(policy, params[i].name, in->kit.value[i]);
-    const double numbers[] = {policy->threshold, policy->passes, policy->gate_noise,
-                              policy->tail999,   policy->gini,   policy->first_spp};
+    const double numbers[] = {policy->threshold, policy->passes,    policy->gate_noise, policy->tail999,
+                              policy->gini,      policy->first_spp, in->rule.reach};
     gp_windowed_hash(in, numbers, sizeof numbers);
-    if (policy->tail999 > 0 || policy->gini > 0)
+    if (policy->tail999 > 0 || policy->gini > 0 || in->rule.reach > 0)
         need->planes_used |= LULL_PLANE_BIT(LULL_PLANE_HALF);
     need->block_width = (uint32_t)width;
     need->block_height = (uint32_t)height;
@@ -107,9 +107,17 @@ static int32_t workers_create(const struct lull_instance *in, uint32_t count, si
     return gp_fail_from(err, "begin_frame", &error);
 }
 
+static void frame_release(struct lull_instance *in)
+{
+    gp_history_release(&in->history);
+    gp_means_release(&in->means);
+    workers_release(in->ops, in->worker, in->workers);
+}
+
 int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
 {
     struct gp_history history = {0};
+    struct gp_means means = {0};
     void **worker;
     int32_t status = lull_kit_frame_check(in, frame, err);
 
@@ -123,13 +131,17 @@ int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_fram
     if (status)
         return status;
     status = gp_history_create(&history, in->rule.window, frame, in->ops->slot, in, err);
+    if (!status && in->rule.reach > 0 && !(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)))
+        status = gp_means_create(&means, frame, err);
     if (status) {
+        gp_history_release(&history);
         workers_release(in->ops, worker, count);
         return status;
     }
-    gp_history_release(&in->history);
-    workers_release(in->ops, in->worker, in->workers);
+    frame_release(in);
     in->history = history;
+    in->means = means;
+    atomic_flag_clear(&in->warned);
     in->worker = worker;
     in->workers = count;
     lull_kit_frame_open(in, frame);
@@ -146,8 +158,7 @@ void gp_windowed_end_frame(struct lull_instance *in)
 {
     if (!in)
         return;
-    gp_history_release(&in->history);
-    workers_release(in->ops, in->worker, in->workers);
+    frame_release(in);
     in->worker = NULL;
     in->workers = 0;
     lull_kit_end_frame(in);
@@ -191,10 +202,16 @@ static void read_block(struct lull_instance *in, const struct lull_view *view, c
     evidence.data = &seen;
     *head = in->history.head[b->id];
     uint32_t before = head->stopper.used;
-    if (!ggn_stopper_ask(&in->rule, &head->stopper, b->spp))
+    const int what = ggn_stopper_ask(&in->rule, &head->stopper, b->spp);
+    head->measured = what != GGN_LOOK_NONE;
+    if (what == GGN_LOOK_NONE)
         return;
-    uint32_t slot = gp_head_push(head, in->rule.window, before);
-    head->bad = in->ops->read(&seen, slot) > 0;
+    if (in->ops->measure)
+        in->ops->measure(&seen);
+    if (what == GGN_LOOK_IMAGE) {
+        uint32_t slot = gp_head_push(head, in->rule.window, before);
+        head->bad = in->ops->read(&seen, slot) > 0;
+    }
     ggn_stopper_decide(&in->rule, &head->stopper, &evidence);
 }
 
@@ -226,6 +243,8 @@ int32_t gp_windowed_evaluate(struct lull_instance *in, const struct lull_view *v
 
     for (uint32_t i = 0; i < count && !status; i++) { /* a call that failed leaves no trace */
         const struct lull_block *b = lull_kit_at(blocks, block_stride, i);
+        if (in->means.count && in->history.pending[b->id].measured)
+            gp_means_commit(&in->means, b->id);
         in->history.head[b->id] = in->history.pending[b->id];
     }
     return status;
@@ -243,7 +262,9 @@ static const struct lull_kit_rule rule = {
 static int32_t state_save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {
     int32_t status = gp_save_check(in, writer, err);
-    return status ? status : gp_history_save(&in->history, in->key, writer, err);
+    if (!status)
+        status = gp_history_save(&in->history, in->key, writer, err);
+    return status ? status : gp_means_save(&in->means, writer, err);
 }
 
 static int32_t state_load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
@@ -258,6 +279,8 @@ static int32_t state_load(struct lull_instance *in, const struct lull_reader *re
     status = gp_history_create(&history, in->rule.window, &frame, in->ops->slot, in, err);
     if (!status)
         status = gp_history_load(&history, &in->rule, in->key, reader, err);
+    if (!status)
+        status = gp_means_load(&in->means, reader, err);
     if (status) {
         gp_history_release(&history);
         return status;

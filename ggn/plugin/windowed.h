@@ -10,6 +10,9 @@
 
 #include "plugin/criteria.h"
 #include "plugin/history.h"
+#include "plugin/means.h"
+
+#include <stdatomic.h>
 
 #include "base/err.h"
 #include "model/preprocess.h"
@@ -35,6 +38,8 @@ struct gp_block_view_ops {
     void *(*worker_create)(const struct lull_instance *in, size_t pixels, struct base_err *err);
     void (*worker_destroy)(void *worker); /* NULL is allowed */
     void (*model_destroy)(void *model);   /* NULL is allowed */
+    /* Measures the block as it is now, before it is read or judged. NULL: nothing is measured. */
+    void (*measure)(const struct gp_block_view *seen);
     /* Puts what is kept of the block's image into `slot`; returns how many values of it were broken. */
     long (*read)(const struct gp_block_view *seen, uint32_t slot);
     struct ggn_evidence evidence; /* its functions are given a struct gp_block_view */
@@ -50,6 +55,8 @@ struct lull_instance {
     uint32_t key;              /* of saved state: a hash of model and policy */
     struct ggn_display display;
     struct gp_history history; /* of the open frame */
+    struct gp_means means;     /* likewise; with rule.reach, without HALF */
+    atomic_flag warned;        /* of planes that say nothing about noise: once per frame */
     uint32_t workers;
     void **worker;
 };

@@ -7,6 +7,7 @@
 
 #include "base/json.h"
 #include "model/policy.h"
+#include "observer/observer.h"
 #include "train/fit_policy.h"
 #include "train/phase_classifier.h"
 #include "train/resume.h"
@@ -34,6 +35,8 @@ static cJSON *describe_run(const struct ggn_session *s, int *failed)
                    {"flips", p->flips},
                    {"jitter", p->jitter},
                    {"picture", p->noise_map},
+                   {"residual", p->reach},
+                   {"painted_per_block", p->reach > 0 ? p->painted : 0},
                    {"average", p->average},
                    {"synthetic_per_block", p->synthetic},
                    {"extended", p->extend},
@@ -148,10 +151,15 @@ static int choose_threshold(const struct ggn_session *s, const struct ggn_classi
     int rc = ggn_checks_create(&checks, &s->validation, v->logit, policy, err);
     if (rc)
         return rc;
-    rc = ggn_calibrate_threshold(&checks, s->plan->early_rate, policy, stopping, err);
+    if (s->hyper.reach > 0)
+        rc = ggn_calibrate_stopping(&checks, policy->passes, policy->threshold, stopping, err);
+    else
+        rc = ggn_calibrate_threshold(&checks, s->plan->early_rate, policy, stopping, err);
     ggn_checks_release(&checks);
     return rc;
 }
+
+static const double FIRST_SPP = 16; /* of the criterion `observer` */
 
 int ggn_session_finish(struct ggn_session *s, struct base_err *err)
 {
@@ -166,7 +174,7 @@ int ggn_session_finish(struct ggn_session *s, struct base_err *err)
         return rc;
     }
     if (v.n) {
-        ggn_calibrate_platt(v.logit, v.label, v.n, &policy);
+        ggn_session_calibrate(s, &v, &policy);
         for (int i = 0; i < v.n; i++)
             right += (ggn_policy_p(&policy, v.logit[i]) >= 0.5) == v.noisy[i];
         accuracy = (double)right / v.n;
@@ -175,8 +183,15 @@ int ggn_session_finish(struct ggn_session *s, struct base_err *err)
     policy.first_spp = s->set.first_spp;
     policy.ratio = s->set.ratio > 1.001 ? s->set.ratio : 0;
     policy.step_spp = s->set.step_spp;
-    ggn_calibrate_limits(&s->train, &policy);
-    ggn_calibrate_limits(&s->validation, &policy);
+    if (s->hyper.reach > 0) { /* like the law that it corrects: whose spread is known, where a few scenes tell little */
+        policy.first_spp = fmax(policy.first_spp, FIRST_SPP);
+        policy.threshold = GGN_OBSERVER_VISIBLE;
+        policy.passes = 1;
+        policy.slope = 0.5 * s->scale;
+    } else {
+        ggn_calibrate_limits(&s->train, &policy);
+        ggn_calibrate_limits(&s->validation, &policy);
+    }
     /* the threshold last: it is chosen for the cadence, the gate and the guard that will stand beside it */
     rc = choose_threshold(s, &v, &policy, &stopping, err);
     if (!rc)

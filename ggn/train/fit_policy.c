@@ -73,7 +73,7 @@ int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *w, co
     for (int c = 0; c < w->set->n; c++) {
         struct known known = {w, logit, w->first[c], w->first[c + 1]};
         if (known.end > known.first)
-            ggn_replay(w->set, &w->set->series[c], &rule, known_logit, &known, seen);
+            ggn_replay(w->set, &w->set->series[c], &rule, known_logit, &known, NULL, seen);
         seen += w->set->series[c].n_levels;
     }
     return 0;

@@ -14,7 +14,7 @@
 #include "train/resume.h"
 #include "train/start.h"
 
-/* Of a sample: the window, the second window or reference, and the noise map, which needs no more than an image. */
+/* Of a sample: the window, the second window or reference, and noise map and scalars, which need no more than an image. */
 static size_t sample_values(const struct ggn_session *s)
 {
     return (2 * (size_t)s->hyper.window + 1) * ggn_series_set_values(&s->set);
@@ -44,8 +44,8 @@ static void fill_window(void *data, long i, int worker)
     const struct ggn_session *s = f->s;
     const struct ggn_window *w = &f->windows->list[f->index[i]];
     const struct ggn_level_series *c = &s->set.series[w->series];
-    const struct ggn_augment_options how = {s->plan->flips, s->set.width == s->set.height, s->plan->jitter,
-                                            s->plan->noise_map};
+    const struct ggn_augment_options how = {s->plan->flips, s->set.width == s->set.height,
+                                            s->plan->reach > 0 ? 0 : s->plan->jitter, s->plan->noise_map};
     struct ggn_augment augment =
         f->augment ? ggn_augment_draw(f->step, f->first + (int)i, ggn_session_seed(s) ^ 2, &how) : ggn_augment_none();
     float *at = s->buffer + (size_t)i * sample_values(s), *noise_map = at + 2 * window_values(s);
@@ -62,6 +62,11 @@ static void fill_window(void *data, long i, int worker)
     }
     s->planes[6 * (size_t)s->hyper.window * (size_t)s->plan->batch + (size_t)i] =
         ggn_noise_map_plane(c, w->last, s->set.width, s->set.height, &augment, noise_map) ? noise_map : NULL;
+    if (s->hyper.scalars) {
+        float *scalars = noise_map + ggn_series_set_values(&s->set) - GGN_SCALARS;
+        ggn_window_scalars(c, w->last, s->hyper.window, ggn_session_law(s, c, w->last), scalars);
+        s->planes[(6 * (size_t)s->hyper.window + 1) * (size_t)s->plan->batch + (size_t)i] = scalars;
+    }
     (void)worker;
 }
 
@@ -85,7 +90,8 @@ static struct ggn_batch fill_batch(struct ggn_session *s, const struct fill *f, 
                               .noisy = noisy,
                               .denoised = f->denoised ? second : NULL,
                               .reference = f->denoised ? NULL : second,
-                              .noise_map = second + planes * (size_t)s->plan->batch};
+                              .noise_map = second + planes * (size_t)s->plan->batch,
+                              .scalars = second + (planes + 1) * (size_t)s->plan->batch};
 }
 
 /* --- evaluation mode -------------------------------------------------------------------------------------------------- */
@@ -106,11 +112,19 @@ static void generate(struct ggn_session *s, const float *const *planes, int coun
                        t->m->graph->value[out].row);
 }
 
+/* With a residual, log2 of the law's error at the end of a window; else 0. */
+static double law_of(const struct ggn_session *s, const struct ggn_windows *windows, int index)
+{
+    const struct ggn_window *w = &windows->list[index];
+
+    return s->hyper.reach > 0 ? ggn_session_law(s, &s->set.series[w->series], w->last) : 0;
+}
+
 /* Raw logits of windows list[index[i]], i < n, with the weights as they are; each process computes some of them. */
 static void logits(struct ggn_session *s, const struct ggn_windows *windows, const int *index, int n, double *logit)
 {
     struct ggn_trainer *t = s->trainer;
-    const int out = t->d->graph->n_values - 1, most = (int)job_most(s->plan->job, s->plan->batch);
+    const int most = (int)job_most(s->plan->job, s->plan->batch);
     int mine, first = ggn_session_first(s, n, &mine);
 
     ggn_weights_pack(t->weights[GGN_NET_M], NULL);
@@ -123,9 +137,10 @@ static void logits(struct ggn_session *s, const struct ggn_windows *windows, con
         generate(s, b.denoised, count, 0);
         generate(s, b.noisy, count, 1);
         ggn_trainer_set_noise_maps(t, b.noise_map, count);
+        ggn_trainer_set_scalars(t, b.scalars, count);
         ggn_exec_forward(t->d, t->weights[GGN_NET_D], count, GGN_EVAL);
         for (int i = 0; i < count; i++)
-            logit[first + i] = (double)*ggn_exec_plane(t->d, out, i, 0);
+            logit[first + i] = ggn_trainer_answer(t, i, law_of(s, windows, index[first + i]));
     }
     job_sum(s->plan->job, logit, (size_t)n, sizeof *logit);
 }
@@ -308,12 +323,13 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
 {
     const int paper = s->hyper.preset == GGN_PRESET_PAPER, n = s->plan->batch;
     int index[GGN_BATCH_MAX];
-    double label[GGN_BATCH_MAX], logit[GGN_BATCH_MAX];
+    double label[GGN_BATCH_MAX], logit[GGN_BATCH_MAX], law[GGN_BATCH_MAX];
     struct ggn_paper_record record;
 
     for (int i = 0; i < n; i++) {
         index[i] = paper ? paper_window(s, step, i) : ggn_windows_draw(&s->train, step, i, ggn_session_seed(s));
         label[i] = s->train.list[index[i]].label;
+        law[i] = law_of(s, &s->train, index[i]);
     }
     int mine, first = ggn_session_first(s, n, &mine);
     struct fill f = {.s = s,
@@ -326,6 +342,7 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
     struct ggn_batch b = fill_batch(s, &f, mine);
     b.count = n;
     b.label = label;
+    b.law = law;
     double scale = paper ? 1 : ggn_session_lr(s, 1, step, steps);
     s->trainer->options.lr[GGN_NET_M] = s->trainer->options.lr[GGN_NET_D] = s->plan->lr * scale;
     s->trainer->options.lr[GGN_NET_R] = s->plan->lr_r * scale;
@@ -383,6 +400,14 @@ int ggn_classify_validation(struct ggn_session *s, int most, struct ggn_classifi
     return rc;
 }
 
+void ggn_session_calibrate(const struct ggn_session *s, const struct ggn_classified *v, struct ggn_policy *policy)
+{
+    if (s->hyper.reach <= 0)
+        ggn_calibrate_platt(v->logit, v->label, v->n, policy);
+    else
+        policy->scale = s->scale;
+}
+
 /* Loss and accuracy are those of the calibrated probability, as the model will be used: from epoch to epoch the logits of
  * all windows shift together, which says nothing about the model (loss 0.18 and 0.41 at an AUC of 0.992 and 0.995). */
 static int measure(struct ggn_session *s, struct ggn_log_row *row, struct base_err *err)
@@ -394,7 +419,7 @@ static int measure(struct ggn_session *s, struct ggn_log_row *row, struct base_e
     row->validation_auc = v.auc;
     row->validation_loss = row->validation_accuracy = v.n ? 0 : (double)NAN;
     if (!rc)
-        ggn_calibrate_platt(v.logit, v.label, v.n, &calibrated);
+        ggn_session_calibrate(s, &v, &calibrated);
     for (int i = 0; !rc && i < v.n; i++) {
         double z = calibrated.scale * v.logit[i] + calibrated.shift;
         right += (z > 0) == v.noisy[i];

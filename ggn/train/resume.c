@@ -14,12 +14,37 @@ enum { N_ROW = 9 };
 uint32_t ggn_resume_key(const struct ggn_session *s)
 {
     const struct ggn_train_plan *p = s->plan;
-    const double numbers[] = {
-        (double)p->preset, p->window,    p->k_r,        p->k_m,        p->k_d,         p->crop,
-        p->batch_r,        p->batch,     p->steps_r,    p->steps,      p->epochs,      p->epoch_steps,
-        p->patience,       p->lr_r,      p->lr,         p->difference, p->soft_labels, p->flips,
-        p->jitter,         p->noise_map, p->average,    p->synthetic,  p->extend,      p->validation_windows,
-        p->seed,           s->set.width, s->set.height, s->set.n};
+    const double numbers[] = {(double)p->preset,
+                              p->window,
+                              p->k_r,
+                              p->k_m,
+                              p->k_d,
+                              p->crop,
+                              p->batch_r,
+                              p->batch,
+                              p->steps_r,
+                              p->steps,
+                              p->epochs,
+                              p->epoch_steps,
+                              p->patience,
+                              p->lr_r,
+                              p->lr,
+                              p->difference,
+                              p->soft_labels,
+                              p->flips,
+                              p->jitter,
+                              p->noise_map,
+                              p->reach,
+                              p->scalars,
+                              p->painted,
+                              p->average,
+                              p->synthetic,
+                              p->extend,
+                              p->validation_windows,
+                              p->seed,
+                              s->set.width,
+                              s->set.height,
+                              s->set.n};
     uLong crc = crc32(0, (const Bytef *)numbers, sizeof numbers);
 
     for (int i = 0; i < s->set.n; i++) {

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "nn/hash.h"
+#include "observer/observer.h"
 
 double ggn_session_lr(const struct ggn_session *s, double lr, uint64_t step, uint64_t steps)
 {
@@ -22,6 +23,13 @@ uint32_t ggn_session_seed(const struct ggn_session *s)
 void ggn_session_path(const struct ggn_session *s, const char *suffix, char *path, size_t room)
 {
     snprintf(path, room, "%s%s", s->plan->out, suffix);
+}
+
+double ggn_session_law(const struct ggn_session *s, const struct ggn_level_series *c, int k)
+{
+    const size_t pixels = (size_t)s->set.width * (size_t)s->set.height;
+
+    return ggn_measure_octaves(ggn_observer_error(&ggn_observer_default, c->measure[k].visible, pixels));
 }
 
 void ggn_session_keep_best(struct ggn_session *s)
@@ -56,8 +64,8 @@ static int check_plan(const struct ggn_session *s, struct base_err *err)
     if (!paper && (p->crop < 16 || p->crop > s->set.width || p->crop > s->set.height))
         return base_fail(err, BASE_EINVAL, "crop %d is not in 16..%d, the side of the blocks", p->crop,
                          s->set.width < s->set.height ? s->set.width : s->set.height);
-    if (paper && (p->noise_map > 0 || p->average > 0))
-        return base_fail(err, BASE_EINVAL, "preset paper has neither noise pictures nor averaged weights");
+    if (paper && (p->noise_map > 0 || p->average > 0 || p->reach > 0))
+        return base_fail(err, BASE_EINVAL, "preset paper has neither noise pictures, averaged weights nor a residual");
     if (p->k_r < 3)
         return base_fail(err, BASE_EINVAL, "the denoiser needs a width of at least 3");
     if (!s->train.n)
@@ -68,6 +76,8 @@ static int check_plan(const struct ggn_session *s, struct base_err *err)
         noisy += s->train.list[i].noisy;
         if (paper && !s->set.series[s->train.list[i].series].reference)
             return base_fail(err, BASE_EINVAL, "%s: preset paper needs a reference for each training block", p->data.dir);
+        if (p->reach > 0 && isnan(s->set.series[s->train.list[i].series].measure[s->train.list[i].last].visible))
+            return base_fail(err, BASE_EINVAL, "%s: --residual needs half buffers at every recorded level", p->data.dir);
     }
     if (noisy == 0 || noisy == s->train.n)
         return base_fail(err, BASE_EINVAL, "%s: all %d training windows are %s: nothing to tell apart", p->data.dir,
@@ -83,6 +93,8 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     s->threads = base_threads_create(p->threads > 0 ? p->threads : job_threads(p->job), err);
     struct ggn_series_set_options data = p->data;
     data.noise_maps = p->noise_map > 0;
+    data.measures = data.keep_recorded = p->reach > 0;
+    s->scale = ggn_observer_slope(&ggn_observer_default);
     data.mean_for_reference = 1;
     int rc = s->threads ? ggn_series_set_load(&s->set, &data, err) : BASE_ENOMEM;
 
@@ -90,6 +102,8 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
         rc = ggn_series_set_add_synthetic(&s->set, p->synthetic, p->seed, err);
     if (!rc && p->extend)
         rc = ggn_series_set_extend(&s->set, p->seed, err);
+    if (!rc && p->reach > 0 && p->painted > 0)
+        rc = ggn_series_set_paint(&s->set, p->painted, ggn_observer_default.level, p->seed, err);
     if (rc)
         return rc;
     struct ggn_window_options train = {
@@ -109,14 +123,16 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
                                   .k_r = p->k_r,
                                   .k_m = p->k_m,
                                   .k_d = p->k_d,
-                                  .noise_map = p->noise_map > 0};
+                                  .noise_map = p->noise_map > 0,
+                                  .reach = p->reach,
+                                  .scalars = p->reach > 0 && p->scalars ? GGN_SCALARS : 0};
     rc = ggn_network_build(&s->r_graph, GGN_NET_R, &s->hyper, err);
     s->r = rc ? NULL : ggn_weights_create(&s->r_graph, NULL, 0, err);
     if (!s->r)
         return rc ? rc : BASE_ENOMEM;
     size_t crops = 6 * (size_t)job_most(p->job, p->batch_r) * (size_t)p->crop * (size_t)p->crop;
     size_t windows = (size_t)job_most(p->job, p->batch) * (2 * (size_t)p->window + 1) * ggn_series_set_values(&s->set);
-    size_t pointers = 6 * (size_t)p->batch_r + (6 * (size_t)p->window + 1) * (size_t)p->batch;
+    size_t pointers = 6 * (size_t)p->batch_r + (6 * (size_t)p->window + 2) * (size_t)p->batch;
     s->buffer = malloc((crops > windows ? crops : windows) * sizeof *s->buffer);
     s->planes = malloc(pointers * sizeof *s->planes);
     return s->buffer && s->planes ? 0 : base_fail_nomem(err, "a batch");
@@ -148,7 +164,8 @@ int ggn_session_load_init(struct ggn_session *s, struct base_err *err)
         return rc;
     const struct ggn_hyper *a = &s->init->hyper, *b = &s->hyper;
     if (a->preset == b->preset && a->height == b->height && a->width == b->width && a->window == b->window &&
-        a->k_r == b->k_r && a->k_m == b->k_m && a->k_d == b->k_d && a->noise_map == b->noise_map)
+        a->k_r == b->k_r && a->k_m == b->k_m && a->k_d == b->k_d && a->noise_map == b->noise_map &&
+        (a->reach > 0) == (b->reach > 0) && a->scalars == b->scalars)
         return 0;
     return base_fail(err, BASE_EINVAL, "%s: networks of another size, preset or input", s->plan->init);
 }
@@ -163,6 +180,7 @@ int ggn_session_begin(struct ggn_session *s, int parts, int batch, int height, i
     o.parts = parts;
     o.batch = batch;
     o.seed = s->plan->seed;
+    o.scale = s->scale;
     o.lr[GGN_NET_R] = s->plan->lr_r;
     o.lr[GGN_NET_M] = o.lr[GGN_NET_D] = s->plan->lr;
     ggn_trainer_destroy(s->trainer);

@@ -39,6 +39,7 @@ struct ggn_session {
     struct ggn_log log;
     float *buffer;        /* pixels of this process's part of a batch */
     const float **planes; /* pointers into it */
+    double scale;         /* with plan->reach: of the logistic, per octave of noise */
 };
 
 /* Loads the data and checks the plan against it. `session` starts as {.plan = plan}; release it also after a failure. */
@@ -56,6 +57,8 @@ void ggn_session_load_best(struct ggn_session *session);
 
 /* Cosine from lr down to a fiftieth, after a short warm-up; divergences halve it. */
 double ggn_session_lr(const struct ggn_session *session, double lr, uint64_t step, uint64_t steps);
+/* With plan->reach: log2 of the law's error at level k. */
+double ggn_session_law(const struct ggn_session *session, const struct ggn_level_series *series, int k);
 /* Of n samples in order, the first that is this process's; *mine: how many are. */
 int ggn_session_first(const struct ggn_session *session, int n, int *mine);
 /* Seed of the draws. */

@@ -26,12 +26,15 @@ struct ggn_train_plan {
     double lr_r, lr;
     double difference; /* preset lull: see ggn_train_fold */
     int soft_labels;
-    int flips;              /* see ggn_augment_options */
-    double jitter;          /* octaves of exposure; see ggn_augment_options */
-    double noise_map;       /* preset lull: share of windows that come with the noise map; 0: networks without it */
-    int average;            /* preset lull: steps over which the weights of M and D are averaged; 0: none */
-    int synthetic;          /* synthetic series per block */
-    int extend;             /* continue recorded series beyond their last level, see ggn_series_set_extend */
+    int flips;        /* see ggn_augment_options */
+    double jitter;    /* octaves of exposure; see ggn_augment_options */
+    double noise_map; /* preset lull: share of windows that come with the noise map; 0: networks without it */
+    double reach;     /* preset lull: of a residual model, octaves of noise (model/networks.h); 0: the networks alone */
+    int scalars;      /* with reach: the discriminator is told what was measured */
+    int painted;      /* with reach: painted series per block, see ggn_series_set_paint */
+    int average;      /* preset lull: steps over which the weights of M and D are averaged; 0: none */
+    int synthetic;    /* synthetic series per block */
+    int extend;       /* continue recorded series beyond their last level, see ggn_series_set_extend */
     int validation_windows; /* most windows per validation */
     double early_rate;      /* share of validation blocks that may be stopped early (ggn_stopping.early_rate) */
     uint32_t seed;

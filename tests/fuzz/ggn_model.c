@@ -5,6 +5,7 @@
 
 #include "baselines/baseline.h"
 #include "model/inference.h"
+#include "model/measure.h"
 #include "model/stopper.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
@@ -50,7 +51,8 @@ static void decide(const struct ggn_model *m)
             n[i] = noisy;
             d[i] = denoised;
         }
-        ggn_inference_logit(j, n, d, NULL, m->hyper.width, m->hyper.height);
+        static const float told[GGN_SCALARS];
+        ggn_inference_logit(j, n, d, NULL, told, m->hyper.width, m->hyper.height);
     }
     ggn_inference_destroy(j);
     free(noisy);

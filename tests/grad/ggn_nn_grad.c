@@ -156,7 +156,18 @@ FOR_SHAPES(test_lrelu, ggn_graph_lrelu(&graph, 0, 0.2))
 FOR_SHAPES(test_sigmoid, ggn_graph_sigmoid(&graph, 0))
 FOR_SHAPES(test_pool3, ggn_graph_maxpool(&graph, 0, 3))
 FOR_SHAPES(test_up, ggn_graph_up(&graph, 0, c & 1, c > 2))
-FOR_SHAPES(test_linear, ggn_graph_dropout(&graph, ggn_graph_linear(&graph, ggn_graph_flatten(&graph, 0), 5), 0.5))
+FOR_SHAPES(test_linear, ggn_graph_dropout(&graph, ggn_graph_linear(&graph, ggn_graph_flatten(&graph, 0), -1, 5), 0.5))
+
+/* Linear layers that read a second vector, which another layer made, so that its gradient is added up. */
+static void build_told(void)
+{
+    int x = ggn_graph_flatten(&graph, 0);
+    int told = ggn_graph_linear(&graph, x, -1, 3);
+    x = ggn_graph_linear(&graph, x, told, 6);
+    ggn_graph_linear(&graph, x, told, 2);
+}
+
+FOR_SHAPES(test_told, build_told())
 
 static void test_pool2(void **state)
 {
@@ -172,7 +183,7 @@ static void test_pool2(void **state)
 /* d/dh L(θ + h·d) at 0 against g·d for random directions d of all parameters and inputs. */
 static void check_network(int net, enum ggn_preset preset, int side, int images)
 {
-    struct ggn_hyper hyper = {preset, side, side + 5, 2, 2, 3, 4, 0};
+    struct ggn_hyper hyper = {preset, side, side + 5, 2, 2, 3, 4, 0, 0, 0};
     struct base_err err = {0};
 
     if (ggn_network_build(&graph, net, &hyper, &err))
@@ -252,10 +263,11 @@ static void test_bce(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_conv3),    cmocka_unit_test(test_conv1),        cmocka_unit_test(test_conv_transposed),
-        cmocka_unit_test(test_joined),   cmocka_unit_test(test_conv_strided), cmocka_unit_test(test_batch_norm),
-        cmocka_unit_test(test_lrelu),    cmocka_unit_test(test_sigmoid),      cmocka_unit_test(test_pool2),
-        cmocka_unit_test(test_pool3),    cmocka_unit_test(test_up),           cmocka_unit_test(test_linear),
-        cmocka_unit_test(test_networks), cmocka_unit_test(test_ssim),         cmocka_unit_test(test_bce)};
+        cmocka_unit_test(test_conv3),  cmocka_unit_test(test_conv1),        cmocka_unit_test(test_conv_transposed),
+        cmocka_unit_test(test_joined), cmocka_unit_test(test_conv_strided), cmocka_unit_test(test_batch_norm),
+        cmocka_unit_test(test_lrelu),  cmocka_unit_test(test_sigmoid),      cmocka_unit_test(test_pool2),
+        cmocka_unit_test(test_pool3),  cmocka_unit_test(test_up),           cmocka_unit_test(test_linear),
+        cmocka_unit_test(test_told),   cmocka_unit_test(test_networks),     cmocka_unit_test(test_ssim),
+        cmocka_unit_test(test_bce)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

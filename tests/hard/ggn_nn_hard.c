@@ -51,7 +51,7 @@ static double decide(const struct ggn_model *m, float (*block)(int image, int k)
             noisy[i][k] = ggn_preprocess((double)block(i, k), NULL, counts);
         ggn_inference_denoise(j, noisy[i], denoised[i], SIDE, SIDE);
     }
-    double p = ggn_policy_p(&policy, ggn_inference_logit(j, n, d, NULL, SIDE, SIDE));
+    double p = ggn_policy_p(&policy, ggn_inference_logit(j, n, d, NULL, NULL, SIDE, SIDE));
     ggn_inference_destroy(j);
     return p;
 }

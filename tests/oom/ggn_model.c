@@ -13,7 +13,7 @@
 #include "model/trainer.h"
 #include "support/fail_alloc.h"
 
-static const struct ggn_hyper hyper = {GGN_PRESET_LULL, 16, 16, 2, 1, 1, 1, 1};
+static const struct ggn_hyper hyper = {GGN_PRESET_LULL, 16, 16, 2, 1, 1, 1, 1, 0, 0};
 static char path[] = "/tmp/ggn_oom.XXXXXX";
 
 static int setup(void **state)

@@ -213,7 +213,7 @@ static void continued(void **state)
 static void network(void **state)
 {
     (void)state;
-    struct ggn_hyper hyper = {GGN_PRESET_LULL, 20, 24, WINDOW, 2, 2, 2, 0};
+    struct ggn_hyper hyper = {GGN_PRESET_LULL, 20, 24, WINDOW, 2, 2, 2, 0, 0, 0};
     struct base_err err = {0};
     struct ggn_method m;
     struct ggn_model *model = ggn_model_create(&hyper, &err);
@@ -227,14 +227,14 @@ static void network(void **state)
     policy.threshold = 0.5;
     policy.passes = 2;
     policy.gate_noise = policy.tail999 = policy.gini = 0;
-    if (ggn_eval_trained(&m, &set, model, &policy, "empty", GGN_PRECISION_F32, threads, &err) != 0)
+    if (ggn_eval_trained(&m, &set, model, &policy, "empty", GGN_PRECISION_F32, NULL, threads, &err) != 0)
         fail_msg("%s", err.text);
     for (size_t i = 0; i < set.n; i++)
         assert_near(m.score[i], 1.0 / (1.0 + exp(1.0)), 1e-6);
     assert_near(m.stop[3], 80, 0); /* two passes: 40 and 80 */
     ggn_method_release(&m);
     policy.ratio = 4; /* 20, 80, 320, 1280 */
-    assert_int_equal(ggn_eval_trained(&m, &set, model, &policy, "empty", GGN_PRECISION_F32, threads, &err), 0);
+    assert_int_equal(ggn_eval_trained(&m, &set, model, &policy, "empty", GGN_PRECISION_F32, NULL, threads, &err), 0);
     const struct ggn_eval_block *b = &set.blocks[0];
     for (size_t i = b->first; i < b->end; i++)
         assert_int_equal(isnan(m.score[i]), !(set.spp[i] == 80 || set.spp[i] == 320 || set.spp[i] == 1280));
@@ -243,7 +243,7 @@ static void network(void **state)
     policy.ratio = 2;
     policy.passes = 1;
     policy.gate_noise = 0.04; /* grey noise of sigma 0.74/sqrt(n) in block 3 of the first scene, 0.22/sqrt(n) in block 0 */
-    assert_int_equal(ggn_eval_trained(&m, &set, model, &policy, "empty", GGN_PRECISION_F32, threads, &err), 0);
+    assert_int_equal(ggn_eval_trained(&m, &set, model, &policy, "empty", GGN_PRECISION_F32, NULL, threads, &err), 0);
     assert_true(m.stop[0] < m.stop[3] && m.stop[3] > 80);
     assert_near(m.score[set.blocks[3].first], 1.0 / (1.0 + exp(1.0)), 1e-6); /* asked all the same */
     assert_true(isinf(m.verdict[set.blocks[3].first]));                      /* but not believed */

@@ -11,11 +11,12 @@
 #include "base/files.h"
 #include "model/container.h"
 #include "model/description.h"
+#include "model/measure.h"
 #include "model/model.h"
 #include "base/half.h"
 
 static char path[] = "/tmp/ggn_model.XXXXXX";
-static struct ggn_hyper small = {GGN_PRESET_LULL, 16, 17, 2, 1, 2, 1, 0};
+static struct ggn_hyper small = {GGN_PRESET_LULL, 16, 17, 2, 1, 2, 1, 0, 0, 0};
 
 static int setup(void **state)
 {
@@ -156,6 +157,34 @@ static void forge(const char *from, const char *to, const char *expected)
     mend(data, size);
     refuse(data, size, expected);
     free(data);
+}
+
+/* A residual model says so, too. */
+static void test_residual(void **state)
+{
+    struct base_err err = {0};
+    struct ggn_hyper published = ggn_hyper_default(GGN_PRESET_PAPER);
+
+    small.reach = 0.5;
+    small.scalars = GGN_SCALARS;
+    forge("\"scalars\":\t7", "\"scalars\":\t0", "does not have the shape");
+    forge("\"scalars\":\t7", "\"scalars\":\t3", "hyper-parameter scalars");
+    forge("\"scalars\":\t7", "\"scalars\":\t9", "'scalars' is missing or not a number in 0..7");
+    forge("\"residual\":\t0.5", "\"residual\":\t9.5", "'residual' is missing or not a number in 0..4");
+    forge("\"residual\":\t0.5", "\"residual\":\t0.0", "hyper-parameter scalars");
+    struct ggn_model *m = make(), *read = NULL;
+    assert_int_equal(ggn_model_save(m, path, GGN_F32, NULL), 0);
+    assert_int_equal(ggn_model_load(path, &read, &err), 0);
+    assert_true(read->hyper.reach == 0.5 && read->hyper.scalars == GGN_SCALARS);
+    assert_int_equal(read->graph[GGN_NET_D].value[GGN_D_SCALARS].c, GGN_SCALARS);
+    ggn_model_destroy(m);
+    ggn_model_destroy(read);
+    small.reach = 0;
+    small.scalars = 0;
+    published.reach = 0.5;
+    assert_int_equal(ggn_hyper_check(&published, &err), BASE_EINVAL);
+    assert_non_null(strstr(err.text, "residual"));
+    (void)state;
 }
 
 /* A model that takes the noise map says so in its file, and a file that says so of other networks is refused. */
@@ -622,6 +651,7 @@ int main(void)
                                        cmocka_unit_test(test_paths),
                                        cmocka_unit_test(test_half_floats),
                                        cmocka_unit_test(test_picture),
+                                       cmocka_unit_test(test_residual),
                                        cmocka_unit_test(test_layout),
                                        cmocka_unit_test(test_refused_containers),
                                        cmocka_unit_test(test_names_and_values),

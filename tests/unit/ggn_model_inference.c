@@ -13,7 +13,7 @@
 #include "nn/exec.h"
 #include "nn/hash.h"
 
-static struct ggn_hyper hyper = {GGN_PRESET_LULL, 24, 33, 3, 4, 6, 3, 0};
+static struct ggn_hyper hyper = {GGN_PRESET_LULL, 24, 33, 3, 4, 6, 3, 0, 0, 0};
 enum { AREA = 24 * 33, BYTES = 3 * AREA };
 
 static struct ggn_model *make(void)
@@ -46,7 +46,7 @@ static double picture_logit(struct ggn_inference *j, uint32_t first, const uint8
         image(noisy[i], first + i);
         ggn_inference_denoise(j, noisy[i], denoised[i], 33, 24);
     }
-    double logit = ggn_inference_logit(j, n, d, picture, 33, 24);
+    double logit = ggn_inference_logit(j, n, d, picture, NULL, 33, 24);
     assert_true(isfinite(logit));
     return logit;
 }
@@ -231,8 +231,8 @@ static void test_exact(void **state)
     for (int k = 0; k < AREA; k++)
         picture[k] = (uint8_t)(k % 7);
     for (int with = 0; with < 2; with++) {
-        double exact = ggn_exact_logit(e, n, w, with ? picture : NULL),
-               judged = ggn_inference_logit(j, n, w, with ? picture : NULL, 33, 24);
+        double exact = ggn_exact_logit(e, n, w, with ? picture : NULL, NULL),
+               judged = ggn_inference_logit(j, n, w, with ? picture : NULL, NULL, 33, 24);
         if (!(fabs(exact - judged) < 1e-4 * fmax(1, fabs(judged))))
             fail_msg("picture %d: double %.12g, judge %.12g", with, exact, judged);
         differ += exact != judged;
@@ -313,7 +313,7 @@ static double tile_by_tile(struct ggn_inference *j, uint8_t noisy[3][MOST], cons
                         denoised[i][k / AREA * w * h + y * w + x] = out[i][k];
                 }
             }
-            highest = pass ? fmax(highest, ggn_inference_logit(j, n, d, small, NET_W, NET_H)) : highest;
+            highest = pass ? fmax(highest, ggn_inference_logit(j, n, d, small, NULL, NET_W, NET_H)) : highest;
         }
     return highest;
 }
@@ -343,9 +343,9 @@ static void test_tiles(void **state)
             ggn_inference_denoise(j, noisy[i], got[i], w, h);
             assert_memory_equal(got[i], want[i], (size_t)(3 * w * h) * sizeof got[i][0]);
         }
-        assert_true(ggn_inference_logit(j, n, d, picture, w, h) == highest);
+        assert_true(ggn_inference_logit(j, n, d, picture, NULL, w, h) == highest);
         got[1][3 * w * h - 1] = GGN_FIXED_NAN; /* one value that is none, of the last image's neighbour */
-        assert_true(isnan(ggn_inference_logit(j, n, d, picture, w, h)));
+        assert_true(isnan(ggn_inference_logit(j, n, d, picture, NULL, w, h)));
     }
     ggn_inference_destroy(j);
     ggn_model_destroy(m);
@@ -373,9 +373,9 @@ static void test_exact_without_numbers(void **state)
         ggn_exact_denoise(e, noisy[i], denoised[i]);
     assert_int_equal(denoised[0][2 * AREA + 5], 65534);
     assert_int_equal(denoised[0][AREA + 5], 0);
-    assert_true(isfinite(ggn_exact_logit(e, n, d, NULL)));
+    assert_true(isfinite(ggn_exact_logit(e, n, d, NULL, NULL)));
     denoised[2][7] = GGN_FIXED_NAN;
-    assert_true(isnan(ggn_exact_logit(e, n, d, NULL)));
+    assert_true(isnan(ggn_exact_logit(e, n, d, NULL, NULL)));
     ggn_exact_destroy(e);
     m->weights[GGN_NET_R]->params[m->graph[GGN_NET_R].n_params - 1] = NAN;
     e = ggn_exact_create(&m->hyper, m->graph, learned, NULL);

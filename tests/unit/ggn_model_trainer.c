@@ -48,7 +48,7 @@ static int with_picture; /* of the networks that are made next */
 
 static struct ggn_trainer *make_one_of(enum ggn_preset preset, double lr, struct base_threads *threads, struct job *job)
 {
-    struct ggn_hyper hyper = {preset, H, W, WINDOW, 4, 6, 4, with_picture};
+    struct ggn_hyper hyper = {preset, H, W, WINDOW, 4, 6, 4, with_picture, 0, 0};
     struct ggn_train_options options = ggn_train_options_default(preset);
     struct base_err err = {0};
 
@@ -291,7 +291,7 @@ static void test_copy(void **state)
 
 static void test_refusals(void **state)
 {
-    struct ggn_hyper hyper = {GGN_PRESET_LULL, H, W, WINDOW, 4, 6, 4, 0};
+    struct ggn_hyper hyper = {GGN_PRESET_LULL, H, W, WINDOW, 4, 6, 4, 0, 0, 0};
     struct ggn_batch batch = {.count = BATCH,
                               .noisy = data.p_noisy,
                               .denoised = data.p_denoised,

@@ -327,7 +327,7 @@ static struct ggn_network_pass pass_of(run_fn *run, const struct ggn_graph *g, e
 
 static void build(struct ggn_graph *g, int net)
 {
-    struct ggn_hyper hyper = {GGN_PRESET_LULL, 40, 51, 2, 3, 5, 4, 0};
+    struct ggn_hyper hyper = {GGN_PRESET_LULL, 40, 51, 2, 3, 5, 4, 0, 0, 0};
     assert_int_equal(ggn_network_build(g, net, &hyper, NULL), 0);
 }
 

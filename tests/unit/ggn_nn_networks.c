@@ -53,7 +53,8 @@ static void put_graph(FILE *f, const struct ggn_graph *g)
 /* The published networks, small ones of odd sizes that take the noise map, and what they need in memory. */
 static void structure(void **state)
 {
-    const struct ggn_hyper published = ggn_hyper_default(GGN_PRESET_PAPER), odd = {GGN_PRESET_LULL, 37, 51, 2, 3, 5, 2, 1};
+    const struct ggn_hyper published = ggn_hyper_default(GGN_PRESET_PAPER),
+                           odd = {GGN_PRESET_LULL, 37, 51, 2, 3, 5, 2, 1, 0, 0};
     const struct ggn_hyper *const hypers[] = {&published, &odd};
     static const int flags[] = {0, GGN_EXEC_NO_FUSE, GGN_EXEC_GRADS, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD};
     char *text;
@@ -180,7 +181,7 @@ static double initial(const struct ggn_tensor *t, enum ggn_init init, double fan
 
 static void first_weights(void **state)
 {
-    const struct ggn_hyper hyper = {GGN_PRESET_LULL, 32, 35, 2, 3, 4, 3, 0};
+    const struct ggn_hyper hyper = {GGN_PRESET_LULL, 32, 35, 2, 3, 4, 3, 0, 0, 0};
     (void)state;
 
     for (int net = 0; net < GGN_NETS; net++)
@@ -213,7 +214,7 @@ static void first_weights(void **state)
 /* Batch norm as a factor and a shift; arrays that do not meet; the backward form only where it was asked for. */
 static void packed(void **state)
 {
-    const struct ggn_hyper hyper = {GGN_PRESET_LULL, 32, 35, 2, 8, 8, 3, 0};
+    const struct ggn_hyper hyper = {GGN_PRESET_LULL, 32, 35, 2, 8, 8, 3, 0, 0, 0};
     (void)state;
 
     assert_int_equal(ggn_network_build(&graph, GGN_NET_M, &hyper, NULL), 0);
@@ -305,7 +306,7 @@ static void ranges(void **state)
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
         for (int value = fields[i].min - 1; value <= fields[i].max + 1;
              value += value == fields[i].min ? fields[i].max - value : 1) {
-            struct ggn_hyper h = {GGN_PRESET_LULL, 20, 20, 2, 3, 3, 3, 0};
+            struct ggn_hyper h = {GGN_PRESET_LULL, 20, 20, 2, 3, 3, 3, 0, 0, 0};
             struct base_err err = {0};
             char want[96];
             memcpy((char *)&h + fields[i].at, &value, sizeof value);

@@ -19,7 +19,7 @@
 #include "observer/calibrate.h"
 #include "observer/views.h"
 #include "observer/trials.h"
-#include "observer/visibility.h"
+#include "model/visibility.h"
 
 /* --- calibration --- */
 

@@ -14,7 +14,7 @@
 
 #include "base/files.h"
 #include "observer/views.h"
-#include "observer/visibility.h"
+#include "model/visibility.h"
 
 /* --- thresholds --- */
 

@@ -14,7 +14,7 @@
 
 #include "base/files.h"
 #include "observer/remaining.h"
-#include "observer/visibility.h"
+#include "model/visibility.h"
 
 /* --- the kernel --- */
 

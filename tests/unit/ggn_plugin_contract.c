@@ -22,7 +22,7 @@
 #include "model/window.h"
 #include "nn/hash.h"
 #include "observer/observer.h"
-#include "observer/visibility.h"
+#include "model/visibility.h"
 #include "plugin/criteria.h"
 #include "plugin/model_path.h"
 #include "plugin/windowed.h"
@@ -187,7 +187,7 @@ static double other_logit(void *data)
         d[i] = denoised[i];
         ggn_inference_denoise(j, n[i], denoised[i], across(o), down(o));
     }
-    logit = ggn_inference_logit(j, n, d, NULL, across(o), down(o));
+    logit = ggn_inference_logit(j, n, d, NULL, NULL, across(o), down(o));
     ggn_inference_destroy(j);
     return logit;
 }
@@ -214,7 +214,7 @@ static int other_tail(void *data, double *tail999, double *gini)
 
 static void other_ask(struct other *o, uint64_t spp)
 {
-    const struct ggn_evidence evidence = {o, other_noise, other_logit, other_tail};
+    const struct ggn_evidence evidence = {o, other_noise, other_logit, other_tail, NULL};
 
     if (!ggn_stopper_ask(&o->rule, &o->stopper, spp))
         return;
@@ -409,7 +409,7 @@ static void states(void **state)
             sizeof rects[0] + head +
             (size_t)(id == 0 ? 2 : id == 1) * (size_t)(3 * (rects[id].x1 - rects[id].x0) * (rects[id].y1 - rects[id].y0));
     assert_int_equal(saved_size, want);
-    assert_memory_equal(saved, "GGNSTAT2", 8);
+    assert_memory_equal(saved, "GGNSTAT3", 8);
     const uint32_t numbers[] = {BLOCKS, WINDOW, (uint32_t)head};
     assert_memory_equal(saved + 12, numbers, sizeof numbers);
     assert_memory_equal(saved + 24, &rects[0], sizeof rects[0]);
@@ -750,7 +750,7 @@ static void refusals(void **state)
 
 static int setup(void **state)
 {
-    const struct ggn_hyper hyper = {GGN_PRESET_LULL, 18, 21, WINDOW, 3, 4, 3, 0};
+    const struct ggn_hyper hyper = {GGN_PRESET_LULL, 18, 21, WINDOW, 3, 4, 3, 0, 0, 0};
     cJSON *from = cJSON_CreateObject();
     int fd[2] = {mkstemp(network), mkstemp(attributes)};
 

@@ -18,7 +18,7 @@
 
 enum { W = 21, H = 18, PIXELS = W * H, WINDOW = 2 };
 
-static const struct ggn_hyper hyper = {GGN_PRESET_LULL, H, W, WINDOW, 3, 4, 3, 1};
+static const struct ggn_hyper hyper = {GGN_PRESET_LULL, H, W, WINDOW, 3, 4, 3, 1, 0, 0};
 static char path[] = "/tmp/ggn_picture.XXXXXX";
 static struct ggn_model *model;
 static struct ggn_policy policy;
@@ -83,7 +83,7 @@ static double expected(double h)
         double y = luminance(color[1][p]), difference = sqrt(h / (16 - h)) * (luminance(half[p]) - y);
         picture[p] = (uint8_t)abs(code(y + difference) - code(y));
     }
-    double p = ggn_policy_p(&policy, ggn_inference_logit(j, n, d, h > 0 ? picture : NULL, W, H));
+    double p = ggn_policy_p(&policy, ggn_inference_logit(j, n, d, h > 0 ? picture : NULL, NULL, W, H));
     ggn_inference_destroy(j);
     return p;
 }

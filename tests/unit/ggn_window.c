@@ -439,7 +439,7 @@ static void policies_are_written_down(void **state)
 /* In a model: its calibration, and the rest beside it; without the rest the model's own numbers and the defaults. */
 static void policies_of_models(void **state)
 {
-    struct ggn_hyper hyper = {GGN_PRESET_LULL, 16, 16, 2, 1, 1, 1, 0};
+    struct ggn_hyper hyper = {GGN_PRESET_LULL, 16, 16, 2, 1, 1, 1, 0, 0, 0};
     struct ggn_policy
         p = {.first_spp = 12, .step_spp = 3, .scale = 2, .shift = -1, .threshold = 0.25, .passes = 3, .gini = 0.75},
         q;

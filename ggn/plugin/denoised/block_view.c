@@ -2,7 +2,7 @@
 
 #include "base/colour.h"
 #include "denoise/blend.h"
-#include "observer/visibility.h"
+#include "model/visibility.h"
 #include "plugin/translate.h"
 #include "sequence/simulate.h"
 

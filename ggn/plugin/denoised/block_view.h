@@ -1,7 +1,7 @@
 /*
  * The view of a block of a picture that will be denoised: both halves of its samples are denoised, with what lies around,
  * and two estimates say how visible the error is of the picture that will be kept (denoise/estimate.h,
- * observer/visibility.h).
+ * model/visibility.h).
  *
  * The picture that is kept lies between the mean M of all samples and its denoised form F(M), M with the weight alpha of
  * denoise/blend.h, or F(M) alone.
@@ -44,7 +44,7 @@ struct gd_block_view {
     float *lightness[4]; /* [P]: L* of the same */
     float *maps[3], *crossed, *agreed, *scratch, *alpha; /* [P] */
     double *texture;                                     /* [patches] */
-    double *rows;                                        /* scratch of observer/visibility.h */
+    double *rows;                                        /* scratch of model/visibility.h */
     void *memory;                                        /* owns all of the above but oidn */
     struct base_err err;                                 /* of the last call that failed */
 };

@@ -1,4 +1,4 @@
-#include "observer/visibility.h"
+#include "model/visibility.h"
 
 #include <math.h>
 #include <stdint.h>

@@ -17,8 +17,8 @@
  * Beyond the edges of a block its outermost pixels are repeated; a block may be as small as one pixel. Pure functions on
  * memory of the caller, thread-safe; the same bits on every processor (square and cube roots only).
  */
-#ifndef GGN_OBSERVER_VISIBILITY_H
-#define GGN_OBSERVER_VISIBILITY_H
+#ifndef GGN_MODEL_VISIBILITY_H
+#define GGN_MODEL_VISIBILITY_H
 
 #include <stddef.h>
 

@@ -1,0 +1,27 @@
+/*
+ * A block as two pictures, in the light that a display sends, whose difference is its noise and whose common part the
+ * picture: what `observer` and residual models measure. Pure functions but for the tally, any thread.
+ */
+#ifndef GGN_PLUGIN_PAIR_H
+#define GGN_PLUGIN_PAIR_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include <lull/criterion_kit.h>
+
+/* rgb: two of [3][P]. A pixel that is no number takes the place of the one before it: neither noise nor texture; the tally
+ * counts it. Both return whether the pictures differ anywhere. */
+
+/* The means of the two halves of the samples; the view has COLOR and HALF. */
+int gp_pair_of_halves(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *block,
+                      float *const rgb[2], struct lull_kit_tally *tally);
+/* The mean plus and minus its noise, as the earlier mean `base` tells, of spp_base samples (plugin/means.h); NULL: nothing
+ * tells it. Keeps the mean where `keep` is not NULL. */
+int gp_pair_of_means(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *block,
+                     const float *base, uint64_t spp_base, float *keep, float *const rgb[2], struct lull_kit_tally *tally);
+
+/* Whether one picture, [3][pixels], is of more than one colour. */
+int gp_pair_has_structure(const float *rgb, size_t pixels);
+
+#endif
