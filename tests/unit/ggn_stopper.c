@@ -47,7 +47,7 @@ static struct ggn_stop_rule make_rule(void)
 /* Asks and judges; returns whether it was looked at. */
 static int ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uint64_t spp, struct show *show)
 {
-    const struct ggn_evidence e = {show, noise, logit, tail};
+    const struct ggn_evidence e = {show, noise, logit, tail, NULL};
     int look = ggn_stopper_ask(rule, s, spp);
     if (look)
         ggn_stopper_decide(rule, s, &e);
