@@ -124,7 +124,7 @@ REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
 FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install uninstall deb man compdb clean help setup tests test-tools replay train-demo test-study test-hosts test-packages test-clang
+.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install uninstall deb wheel man compdb clean help setup tests test-tools replay train-demo test-study test-hosts test-packages test-clang
 .SECONDARY:
 
 all: $(PROGRAMS) $(CRITERIA) $(MODULES) $(HOST_LIB) $(EXAMPLES) ## build the programs and the criteria
@@ -178,7 +178,24 @@ $(DENOISER): $(call o,$(wildcard plugin-api/denoise/program/*.c)) $(OBJ)/base.a
 	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
 $(OUT)/lib/lull/modules/lull-mpi.so: $(call o,$(MPI_SRC)) $(OBJ)/base.a
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(MPI_LIBS) -lm -o $@
-$(HOST_LIB): $(call o,$(HOST_SRC)) $(LOADER_OBJ) $(OBJ)/base.a plugin-api/host.map
+# As the wheel and the Blender extension carry them: for systems that have the C library and zlib, and without symbols. Debian has no
+# archives of cJSON and libpng that fit into a shared object, so they lie beside.
+BUNDLE := $(OUT)/bundle/lib
+CARRIED := denoised fixed ggn halfbuf observer variance
+BESIDE := $(BUNDLE)/libcjson.so.1 $(BUNDLE)/libpng16.so.16
+BUNDLED := $(BUNDLE)/liblull-host.so.1 $(BESIDE) $(CARRIED:%=$(BUNDLE)/lull/%.so) $(BUNDLE)/lull/lull-2.ggn \
+    $(BUNDLE)/lull/modules/lull-denoiser
+$(BUNDLE)/liblull-host.so.1: BASE_LIBS += -s -Wl,-rpath,'$$ORIGIN'
+$(BUNDLE)/lull/ggn.so: GGN_LIBS += -s -Wl,-rpath,'$$ORIGIN/..'
+$(BUNDLE)/lull/ggn.so: $(OBJ)/ggn/plugin/entry_ggn.c.o $(OBJ)/ggn-plugin.a $(OBJ)/ggn.a plugin-api/plugin.map
+	$(so) $(filter %.o %.a,$^) $(LDFLAGS_ALL) -Wl,--as-needed $(GGN_LIBS) -o $@
+$(BUNDLE)/lull/%.ggn: ggn/models/%.ggn
+	@install -D -m 644 $< $@
+$(BESIDE): $(BUNDLE)/%:
+	@mkdir -p $(@D); strip -o $@ "$$($(CC) -print-file-name=$*)"
+$(BUNDLE)/%: $(OUT)/lib/%
+	@mkdir -p $(@D); strip -o $@ $<
+$(HOST_LIB) $(BUNDLE)/liblull-host.so.1: $(call o,$(HOST_SRC)) $(LOADER_OBJ) $(OBJ)/base.a plugin-api/host.map
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--version-script=plugin-api/host.map -Wl,-z,defs -Wl,-soname,$(@F) \
 	    -Wl,--as-needed $(filter %.o %.a,$^) $(LDFLAGS_ALL) $(BASE_LIBS) -ldl -o $@
 	@ln -sf $(@F) $(@:.1=)
@@ -361,6 +378,8 @@ uninstall: ## remove what install put under $(DESTDIR)$(PREFIX)
 	@for i in $(INSTALLED); do rm -f $(DESTDIR)$(PREFIX)/$${i%%:*}/$${i##*/} || exit 1; done
 	@for f in $(OWN_FOLDERS); do [ ! -d $(DESTDIR)$(PREFIX)/$$f ] || rmdir --ignore-fail-on-non-empty $(DESTDIR)$(PREFIX)/$$f; done
 
+wheel: $(BUNDLED) ## make the Python package with host library, criteria and model in build/wheel
+	@scripts/packages/bundle wheel
 deb: all ## make the Debian packages lull, liblull-host1 and lull-dev in build/deb (needs debhelper)
 	@scripts/packages/deb
 

@@ -14,7 +14,8 @@ if [ "${DEB_ROOT-}" = debian ]; then
     }
     for file in /etc/resolv.conf /etc/apt/apt.conf.d/*proxy*; do [ ! -e "$file" ] || cp "$file" "$root$file"; done
     usr=/usr work=$root/tmp
-    inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin HOME=/tmp sh -c "cd /tmp && $1"; }
+    # the programs find their criteria by /proc; it is mounted for one command only
+    inside() { unshare --mount sh -c 'mount -t proc proc "$0/proc" && exec chroot "$0" "$@"' "$root" env -i PATH=/usr/sbin:/usr/bin HOME=/tmp sh -c "cd /tmp && $1"; }
     as apt "shift; cp \"\$@\" $root/tmp && chroot $root apt-get update -q && exec chroot $root apt-get install -y --no-install-recommends \$(for f; do echo /tmp/\${f##*/}; done)"
     dpkg_at="chroot $root dpkg"
 else

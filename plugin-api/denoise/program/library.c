@@ -34,9 +34,9 @@ struct library {
     void (*execute_filter)(filter_t filter);
 };
 
-static const char *const how_to_get_it =
-    "scripts/setup --denoiser puts it into build/oidn; or install Open Image Denoise 2 and name its library by "
-    "LULL_OIDN=FILE";
+static const char *const how_to_get_it = "scripts/setup --denoiser puts it into build/oidn, pip install pyoidn into a "
+                                         "Python; or install Open Image Denoise 2 and name its library by "
+                                         "LULL_OIDN=FILE";
 
 /* --- finding ----------------------------------------------------------------------------------------------------------- */
 

@@ -2,8 +2,10 @@
 """liblull-host.so, which everything here stands on, and the criteria that it finds."""
 from __future__ import annotations
 
+import contextlib
 import ctypes as C
 import functools
+import importlib.util
 import os
 import shutil
 import sys
@@ -14,6 +16,7 @@ from typing import Any, Iterable, NamedTuple, Optional
 from . import abi
 
 NAME = "liblull-host.so.1"
+CARRIED = Path(__file__).resolve().parent / "lib"
 _CODES = {getattr(abi, name): name for name in dir(abi) if name.startswith("E_")}
 _PARAMETER_TYPES = ("int", "float", "bool", "choice", "file", "text")
 
@@ -52,9 +55,10 @@ class Info(NamedTuple):
 
 
 def search_path() -> list[str]:
-    """Where the library is looked for: above the folders of LULL_PLUGIN_PATH, in ../lib beside a `lull-render` on PATH, in
-    the build tree that this package lies in, in the usual prefixes."""
+    """Where the library is looked for: above the folders of LULL_PLUGIN_PATH, in the package itself (a wheel has it there),
+    in ../lib beside a `lull-render` on PATH, in the build tree that this package lies in, in the usual prefixes."""
     folders = [Path(f).resolve().parent for f in os.environ.get("LULL_PLUGIN_PATH", "").split(os.pathsep) if f]
+    folders += [CARRIED]
     program = shutil.which("lull-render")
     folders += [Path(program).resolve().parents[1] / "lib"] if program else []
     folders += [Path(__file__).resolve().parents[3] / "build" / "lib"]
@@ -65,6 +69,7 @@ def search_path() -> list[str]:
 @functools.lru_cache(maxsize=None)
 def library() -> C.CDLL:
     """The library, loaded once. Its criteria are those of LULL_PLUGIN_PATH and of the folder lull beside it."""
+    _prepare_denoiser()
     found = next((path for folder in search_path() if os.path.exists(path := os.path.join(folder, NAME))), NAME)
     try:
         loaded = C.CDLL(found)
@@ -79,6 +84,20 @@ def library() -> C.CDLL:
     for name in ("progress", "end", "close", "file_abort", "quote_end"):
         getattr(loaded, f"lull_host_{name}").restype = None
     return loaded
+
+
+def _prepare_denoiser() -> None:
+    """For the criterion `denoised`, which runs a program: unpacked by Blender it is not executable yet; and the Open Image
+    Denoise of the package pyoidn (the extra lull[denoise]) is found."""
+    program = CARRIED / "lull" / "modules" / "lull-denoiser"
+    if program.exists() and not os.access(program, os.X_OK):
+        with contextlib.suppress(OSError):
+            program.chmod(0o755)
+    package = importlib.util.find_spec("pyoidn")
+    if package and package.origin and "LULL_OIDN" not in os.environ:
+        folder = Path(package.origin).parent / "oidn"
+        if (folder / "lib" / "libOpenImageDenoise.so.2").exists():
+            os.environ["LULL_OIDN"] = str(folder)
 
 
 def call(name: str, *arguments: Any) -> None:

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""python3 -m lull: what it finds, one line each. Exit status 2 without the library or any criterion."""
+import importlib.util
+import os
+import shutil
+import sys
+from pathlib import Path
+
+from . import __version__, abi, criteria
+from .criterion import load
+from .library import LullError, call, library
+
+
+def _trial(spec: str) -> str:
+    """Whether an instance can be made."""
+    try:
+        load(spec, log=lambda *_: None).close()
+    except LullError as error:
+        return f"not ready: {error}"
+    return "ready"
+
+
+def _denoiser() -> str:
+    try:
+        call("host_denoiser", None)
+    except LullError as error:
+        return str(error)
+    return os.environ.get("LULL_OIDN") or "Open Image Denoise, where the system has it"
+
+
+def main() -> int:
+    print(f"lull        {__version__}, Python {sys.version.split()[0]}")
+    try:
+        print(f"library     {library()._name}")
+    except LullError as error:
+        print(f"library     {error}")
+        return 2
+    found = criteria()
+    for info in found:
+        print(f"criterion   {info.id:<12}{info.version:<5}{_trial(f'{info.path}:{info.id}')}  ({info.path})")
+    folders = {(Path(info.path).parent / at).resolve() for info in found for at in (".", "../../share/lull", "../../../ggn/models")}
+    for path in sorted(path for folder in folders for path in folder.glob("*.ggn")):
+        print(f"model       {path}")
+    print(f"denoiser    {_denoiser()}")
+    for module in ("mitsuba", "bpy"):
+        print(f"{module:<12}{'found' if importlib.util.find_spec(module) else 'none'}")
+    print(f"blender     {shutil.which('blender') or 'none'}")
+    return 0 if found else 2
+
+
+sys.exit(main())
