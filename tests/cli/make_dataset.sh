@@ -72,12 +72,12 @@ t "  …bad arguments: one line, status 2" sh -c "'$M' data-set --csv nowhere 2>
 
 # --- interrupt and go on ---
 cat >long.plan <<'EOF'
-train long scenes/cornell-box.pbrt 1 linear:200:200:1 0 4-7
+train long scenes/cornell-box.pbrt 1 linear:80:80:1 0 4-7
 validation next scenes/cornell-box.pbrt 1 linear:1:1:1 0 5
 EOF
 setsid "$M" data-set --plan long.plan run >out 2>err &
 pid=$!
-until [ -s run/train/long/block-00007.lseq ] || ! kill -0 $pid 2>/dev/null; do sleep 0.1; done
+until [ -s run/train/long/block-00007.lseq ] || ! kill -0 $pid 2>/dev/null; do sleep 0.05; done
 kill -INT -$pid
 wait $pid
 t "SIGINT: exit status 130" test $? -eq 130
