@@ -429,8 +429,8 @@ LULL_EXPORT void lull_host_viridis(double t, uint8_t rgb[3]);
 
 /* --- the denoised picture ------------------------------------------------------------------------------------------- */
 
-#define LULL_DENOISE_FULL \
-    UINT32_C(1) /* the denoised picture alone; else a blend of it with the noisy one, which needs HALF */
+/* The denoised picture alone; else a blend of it with the noisy one, which needs HALF. */
+#define LULL_DENOISE_FULL UINT32_C(1)
 
 struct lull_host_denoising {
     uint32_t struct_size;
