@@ -1,10 +1,28 @@
 """Runs functions named test_* and reports them as TAP lines; a test's docstring says what must hold."""
+import contextlib
+import os
 import sys
 import traceback
 
 
 class Skip(Exception):
     """Raised by a test that cannot run here; the text says why."""
+
+
+@contextlib.contextmanager
+def denoiser(kind, build):
+    """Open Image Denoise is tests/stub/oidn.c of this kind; "/…": another file; "real": that of build/oidn, else the test is skipped."""
+    stub = os.path.abspath(os.path.join(build, "tests/oidn-stub/libOpenImageDenoise.so.2"))
+    library = kind if kind[0] == "/" else os.path.abspath("build/oidn/lib") if kind == "real" else stub
+    if not os.path.exists(library) and kind[0] != "/":
+        raise Skip(f"no {library}")
+    before = {name: os.environ.get(name) for name in ("LULL_OIDN", "OIDN_STUB")}
+    os.environ.update(LULL_OIDN=library, OIDN_STUB=kind)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
 def raises(kind, text, call, *arguments, **named):

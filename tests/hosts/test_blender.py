@@ -293,6 +293,7 @@ def test_addon():
             Cycles.render = render
         assert seen[0] == 0 and seen[-1] > .1 and brightest("Lull Stop Map") > 0, seen  # there while it renders
         assert "Lull Stop Map" in bpy.data.images and os.path.getsize(tmp("lull.exr")) > 1000
+        assert bpy.ops.lull.render() == {"FINISHED"}  # over the one before, which is shown
         scene.frame_start, scene.frame_end, scene.lull.folder = 1, 2, tmp("frames")
         os.mkdir(tmp("frames"))
         assert bpy.ops.lull.render(animation=True) == {"FINISHED"}
@@ -304,6 +305,17 @@ def test_addon():
         assert scene.lull.chosen(scene).parameters == {"visible": "0.5", "growth": "2"}
         scene.lull.parameters = "visible=.1"
         assert scene.lull.chosen(scene).parameters == {"visible": ".1"}
+        scene.lull.parameters, scene.lull.denoise = "", True
+        wanted = scene.lull.chosen(scene)
+        assert (wanted.criterion, wanted.denoise, wanted.parameters) == ("denoised", "blend", {"visible": "0.5"})
+        scene.lull.kept = "full"
+        assert scene.lull.chosen(scene).parameters == {"picture": "denoised", "visible": "0.5"}
+        scene.lull.folder, scene.cycles.samples = TMP.name, 32
+        with tap.denoiser("constant", os.environ.get("BUILD", "build")):
+            assert bpy.ops.lull.render() == {"FINISHED"} and "denoised, 0%" in scene.lull.state, scene.lull.state
+        assert abs(layers(tmp("lull.exr"))["G"] - .5).max() < 1e-6
+        scene.lull.denoise = False
+        assert scene.lull.criterion == "observer" and scene.lull.chosen(scene).denoise == ""
         step = Session.step
         Session.step = lambda session: 1 / 0 if session.driver.totals.samples else step(session)
         try:

@@ -13,7 +13,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from blender_host import ROOT, TMP, FolderGone, NothingRendered, command, cube, layers, saved, start, tmp  # noqa: E402
+from blender_host import (ROOT, TMP, FolderGone, NothingRendered, command, cube, layers, one_render, saved, start,  # noqa: E402
+                          tmp)
 import bpy  # noqa: E402
 import numpy as np  # noqa: E402
 import tap  # noqa: E402
@@ -202,6 +203,56 @@ def test_quote():
     status, text = command(*common, "-o", tmp("plain.exr"))
     assert status == 0 and "visible 0.2 takes about" in text and "visible 0.9 would take" in text, text
     assert Path(tmp("after.exr")).read_bytes() == Path(tmp("plain.exr")).read_bytes()
+
+
+def test_denoise():
+    """--denoise keeps the blend, by Cycles' own denoising passes, and stops by it; the noisy picture is there if that fails"""
+    scene = cube(48, 32)
+    blend = saved(scene, "denoise.blend")
+    with tap.denoiser("box", os.environ.get("BUILD", "build")):
+        assert command(blend, "--denoise", "-q", "--block", "16", "--spp-max", "64", "-o", tmp("b.exr"), "--preview", tmp("b.png"),
+                       "--report", tmp("b.json")) == (0, "")
+        seen, report = layers(tmp("b.exr")), json.loads(Path(tmp("b.json")).read_text())
+        weight = seen["lull.weight.V"]
+        assert report["criterion"]["id"] == "denoised" and abs(report["noisy_weight"] - weight.mean()) < 1e-5
+        mixed = weight * seen["noisy.G"] + (1 - weight) * seen["denoised.G"]
+        assert abs(seen["G"] - mixed).max() < 1e-5 and (seen["G"] == seen["ViewLayer.Combined.G"]).all()
+        assert not [name for name in seen if "Denoising" in name]  # nobody asked for these passes
+    with tap.denoiser("auxiliary", os.environ.get("BUILD", "build")):
+        bpy.ops.wm.open_mainfile(filepath=blend)
+        scene = bpy.context.scene
+        scene.view_layers[0].cycles.denoising_store_passes = True
+        settings = Settings("fixed", {"spp": "16"}, spp_max=16, block=24, denoise="full", output=tmp("full.exr"))
+        with Session(scene, settings) as session:
+            result = session.run()
+            assert result.outcome == "done" and session.write(result)[1] == []
+        seen = layers(tmp("full.exr"))
+        passes = [[seen[f"ViewLayer.Denoising {name}"] for name in names] for names in
+                  (("Albedo.R", "Albedo.G", "Albedo.B"), ("Normal.X", "Normal.Y", "Normal.Z"))]
+        for c, albedo, normal in zip("RGB", *passes):
+            assert abs(seen[c] - albedo - normal).max() < 1e-5
+        assert np.max(passes[0]) > .5 and np.min(passes[1]) < -.5
+    saved(scene, "denoise.blend")
+    assert bpy.context.scene.view_layers[0].cycles.denoising_store_passes
+    with tap.denoiser("/nowhere", "build"), NothingRendered():
+        status, text = command(blend, "--denoise=full", "-o", tmp("no.exr"))
+        assert status == 2 and "/nowhere" in text and text.count("\n") == 1 and not os.path.exists(tmp("no.exr")), text
+    with tap.denoiser("crash", os.environ.get("BUILD", "build")):
+        status, text = command(blend, "--denoise", "-c", "fixed", "-p", "spp=16", "-q", "-o", tmp("noisy.exr"))
+        assert status == 2 and "the picture is the noisy one: Open Image Denoise" in text and "noisy.R" not in layers(tmp("noisy.exr"))
+
+
+def test_really_denoised():
+    """with Open Image Denoise itself the blend is nearer to a long render than the noisy picture with the same samples"""
+    scene = cube(64, 48)
+    bpy.data.objects["Light"].data.shadow_soft_size = 3
+    bpy.ops.mesh.primitive_plane_add(size=20, location=(0, 0, -1))
+    truth = one_render(scene, 2048)
+    with tap.denoiser("real", "build"):
+        with Session(scene, Settings("fixed", {"spp": "16"}, spp_max=16, block=32, denoise="blend", output=tmp("r.exr"))) as session:
+            assert session.write(session.run())[1] == []
+            noisy, kept = (np.sqrt(((p - truth) ** 2).mean()) for p in (session.frame.mean(), session.denoised.picture))
+    assert kept < .7 * noisy, (kept, noisy)
 
 
 def test_told():

@@ -249,6 +249,38 @@ def test_quote():
         assert "visible 0.5 would take " in lines[0], lines
 
 
+def test_denoise():
+    """denoise keeps the blend, by albedo and shading normals of an AOV integrator; the layers are the film's own"""
+    with tap.denoiser("auxiliary", BUILD):
+        p = lull.mitsuba.render(scene("box"), "fixed", spp=16, block=48, spp_max=16, denoise="full")
+        f = p.driver.frame
+        assert f.planes == ("color", "half", "albedo", "normal") and p.layers == {} and p.undenoised is None
+        assert np.allclose(p.image, f.mean("albedo") + f.mean("normal"), atol=1e-5) and f.mean("albedo").max() > .65
+        own = lull.mitsuba.render(with_aovs(), "fixed", spp=16, block=48, spp_max=16, denoise="full")
+        assert {"A", "albedo.R", "normal.X", "where.Y", "depth.T"} <= set(own.layers)
+        assert np.allclose(own.driver.frame.mean("albedo"), f.mean("albedo"), atol=1e-5)
+    with tap.denoiser("box", BUILD):
+        p = lull.mitsuba.render(scene("box"), block=48, spp_max=64, denoise="blend")
+        assert p.driver.frame.criterion.info.id == "denoised" and (p.image == p.denoised.picture).all()
+        assert 0 < p.denoised.weight.mean() < 1 and (p.denoised.error < p.denoised.noisy_error).any()
+    with tap.denoiser("/nowhere", BUILD):
+        raises(lull.LullError, "/nowhere", lull.mitsuba.render, scene("box"), denoise="blend")
+    raises(ValueError, "expected one of blend, full", lull.mitsuba.render, scene("box"), denoise="much")
+    with tap.denoiser("crash", BUILD):
+        p = lull.mitsuba.render(scene("box"), "fixed", spp=16, block=48, spp_max=16, denoise="full")
+        assert "Open Image Denoise" in str(p.undenoised) and p.denoised is None and p.image.mean() > 0
+
+
+def test_really_denoised():
+    """with Open Image Denoise itself the blend is nearer to a long render than the noisy picture with the same samples"""
+    truth = np.array(mi.render(scene("box"), spp=512, seed=99))[..., :3]
+    with tap.denoiser("real", BUILD):
+        p = lull.mitsuba.render(scene("box"), "fixed", spp=16, block=48, spp_max=16, denoise="blend")
+    noisy, kept = (np.sqrt(((np.minimum(picture, 1) - np.minimum(truth, 1)) ** 2).mean())
+                   for picture in (p.driver.frame.mean(), p.image))  # as a display shows them
+    assert kept < .7 * noisy, (kept, noisy)
+
+
 def test_bad_input():
     """what cannot be rendered is named; an exception while rendering keeps what there is"""
     raises(lull.LullError, "no criterion nobody", lull.mitsuba.render, scene("box"), "nobody")

@@ -18,7 +18,7 @@ import numpy as np
 
 import lull
 import tap
-from lull import abi, checkpoint, exr, files, outputs, quote
+from lull import abi, checkpoint, denoising, exr, files, outputs, quote
 from renderer import Noise, Playback
 from tap import raises
 
@@ -759,6 +759,87 @@ def test_display_server():
     _, alone, _ = run(driver={"display_server": "localhost:1"})
     assert np.array_equal(alone.mean(), f.mean())
     raises(lull.LullError, "nosuch.invalid: no such host", lambda: run(driver={"display_server": "nosuch.invalid"}))
+
+
+def painted(criterion="fixed", parameters=None, **settings):
+    """A finished frame with the planes of a denoiser: albedo x / width, normal .25, noise around .5."""
+    rng = np.random.default_rng(7)
+
+    def render(rects, first, count, half):
+        for r in rects:
+            shape = (r.height, r.width, 3)
+            albedo = np.broadcast_to(np.arange(r.x0, r.x1)[:, None] / 32, shape).astype(float)
+            yield {"color": .5 + .1 * rng.standard_normal(shape), "albedo": albedo, "normal": np.full(shape, .25)}
+    parameters = {"spp": 32} if criterion == "fixed" else parameters or {}
+    f = lull.Frame(lull.load(criterion, **parameters), 32, 32, block=16, supplies=["albedo", "normal"], denoised=True,
+                   **{"spp_max": 64, **settings})
+    return f, lull.Driver(f, render)
+
+
+def box5(picture):
+    """Means of 5x5 pixels, fewer at the rim."""
+    h, w = picture.shape[:2]
+    return np.array([[picture[max(y - 2, 0):y + 3, max(x - 2, 0):x + 3].mean((0, 1)) for x in range(w)] for y in range(h)])
+
+
+def test_denoise():
+    """denoise() gives the blend, the denoised picture, the weight and both errors; planes reach the denoiser, as linear radiance"""
+    f, d = painted()
+    assert f.planes == ("color", "half", "albedo", "normal") and d.run().outcome == "done"
+    with tap.denoiser("auxiliary", BUILD):
+        made = lull.denoise(f, full=True)
+        assert np.allclose(made.denoised, f.mean("albedo") + f.mean("normal"), atol=1e-6), made.denoised[0]
+    with tap.denoiser("box", BUILD):
+        made, full = lull.denoise(f), lull.denoise(f, full=True, threads=1)
+    assert [a.shape for a in made] == [(32, 32, 3), (32, 32, 3), (32, 32), (4,), (4,)]
+    assert {a.dtype.name for a in made[:3]} == {"float32"} and np.isfinite([made.error, made.noisy_error]).all()
+    assert np.allclose(made.denoised, box5(f.mean()), atol=1e-5) and (full.picture == full.denoised).all() and not full.weight.any()
+    weight = made.weight[..., None]
+    assert 0 <= weight.min() < .2 and weight.max() <= 1
+    assert np.allclose(made.picture, weight * f.mean() + (1 - weight) * made.denoised, atol=1e-5)
+    assert (made.error < made.noisy_error).all()  # nothing but noise: a mean of pixels is nearer to the truth
+    outputs.write_exr(tmp("d.exr"), d, denoised=made)
+    stored = uncompressed(tmp("d.exr"))
+    assert (stored["G"] == made.picture[..., 1]).all() and np.allclose(stored["noisy.B"], f.mean()[..., 2])
+    assert (stored["denoised.R"] == made.denoised[..., 0]).all() and (stored["lull.weight.V"] == made.weight).all()
+    assert (stored["lull.noisy_error.V"][:16, 16:] == np.float32(made.noisy_error[1])).all()
+    assert (stored["lull.error.V"][16:, :16] == np.float32(made.error[2])).all()
+    outputs.write_report(tmp("d.json"), d, denoised=made)
+    report = json.loads(Path(tmp("d.json")).read_text())
+    assert abs(report["noisy_weight"] - made.weight.mean()) < 1e-6 and report["blocks"][3]["noisy_error"] == made.noisy_error[3]
+    outputs.write_preview(tmp("d.png"), d, made)
+    assert abs(grey_levels(tmp("d.png")) - files.srgb(made.picture).mean(-1)).max() < 1e-3
+    f, d = painted(display=lambda linear: .1 * linear)
+    d.run()
+    with tap.denoiser("identity", BUILD):
+        assert np.allclose(lull.denoise(f, full=True).picture, f.mean(), atol=1e-6)
+
+
+def test_denoised_stops():
+    """the criterion denoised stops blocks by what is seen of the blend; its own error is the one that is told, and its quote asks once"""
+    with tap.denoiser("box", BUILD):
+        f, d = painted("denoised", spp_max=2048)
+        assert d.run().outcome == "done" and "criterion" in {b.reason for b in f.blocks}, [b.reason for b in f.blocks]
+        assert (lull.denoise(f).error == [b.error for b in f.blocks]).all()
+        assert [r.name for r in quote.rows(d)] == ["chosen"] and quote.line(d) == ""
+        f.close()
+        assert lull.denoise(f).weight.shape == (32, 32)  # of a frame that is over, too
+
+
+def test_no_denoiser():
+    """a denoiser that is not there, or fails, is told in one line"""
+    f, d = painted()
+    d.run()
+    with tap.denoiser("/nowhere", BUILD):
+        raises(lull.LullError, "/nowhere", lull.denoise, f)
+        raises(lull.LullError, "/nowhere", denoising.check)
+    for kind in ("crash", "no-device", "commit", "memory"):
+        with tap.denoiser(kind, BUILD):
+            raises(lull.LullError, "Open Image Denoise", lull.denoise, f)
+    raises(ValueError, "expected one of blend, full", denoising.criterion_of, "much")
+    with tap.denoiser("identity", BUILD):
+        plain = lull.HostFrame(lull.load("fixed", spp=8), 8, 8, ["color"])
+        raises(lull.LullError, "a blend HALF besides", lull.denoise, plain, {"color": lull.Plane(np.zeros((8, 8, 3)))})
 
 
 tap.main(dict(globals()))

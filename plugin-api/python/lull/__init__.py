@@ -23,13 +23,14 @@ except ImportError:
     raise ImportError(NEEDED) from None
 
 from .criterion import Criterion, Plane, Rect, load
+from .denoising import Denoised, denoise
 from .driver import Driver, Result
 from .frame import Frame
 from .host import Block, HostFrame
 from .library import Info, LullError, Parameter, criteria, find
 
-__all__ = ["Block", "Criterion", "Driver", "Frame", "HostFrame", "Info", "LullError", "Parameter", "Plane", "Rect", "Result",
-           "criteria", "find", "load"]
+__all__ = ["Block", "Criterion", "Denoised", "Driver", "Frame", "HostFrame", "Info", "LullError", "Parameter", "Plane",
+           "Rect", "Result", "criteria", "denoise", "find", "load"]
 __version__ = "1.0"
 
 # The package is a Blender add-on too: scripts/hosts/blender-addon packs it.

@@ -17,7 +17,8 @@ FRAME_DETERMINISTIC, FRAME_INDEPENDENT, FRAME_SHARED = 2, 4, 8
 CONTINUE, STOP = 0, 1
 CAP_DETERMINISTIC, CAP_BATCH_INVARIANT, CAP_REOPENS = 1, 2, 4
 HOST_UNIFORM = 0x100
-REPORT_INTERRUPTED, REPORT_NO_RAYS = 1, 4
+REPORT_INTERRUPTED, REPORT_NO_RAYS, REPORT_DENOISED = 1, 4, 8
+DENOISE_FULL = 1
 REASON_NONE, REASON_CRITERION, REASON_SPP_MAX, REASON_UNIFORM, REASON_TIME, REASON_INTERRUPT, REASON_DROPPED, \
     REASON_COUNT = range(8)
 PATH_MAX = 4096
@@ -67,6 +68,8 @@ HostReport = _struct("HostReport", "u32 struct_size flags; text scene mask kerne
 HostQuoteRow = _struct("HostQuoteRow", "ptr blocks; f64 spp_min spp_mean spp_max spp_mean_low spp_mean_high thread_s "
                        "thread_low_s thread_high_s wall_s wall_low_s wall_high_s against_uniform; u32 unknown unmet capped; "
                        "i32 asked")
+HostDenoising = _struct("HostDenoising", "u32 struct_size flags threads zero; text library; ptr context cancelled")
+HostPicture = _struct("HostPicture", "u32 struct_size zero; ptr rgb denoised weight")
 HostOutput = _struct("HostOutput", "text option path")
 
 

@@ -24,11 +24,11 @@ class Display:
     def update(self) -> None:
         """Between samples, as often as one likes: it copies what has changed four times a second at most."""
         if self._pointer:
-            call("host_display_update", self._pointer, C.byref(self.frame._shown(None)))
+            call("host_display_update", self._pointer, C.byref(self.frame.view_of(None)))
 
     def close(self) -> bool:
         """Sends the last picture, for two seconds at most. Did the viewer take it?"""
-        return self._end(C.byref(self.frame._shown(None)))
+        return self._end(C.byref(self.frame.view_of(None)))
 
     def _end(self, view: object) -> bool:
         pointer, self._pointer = self._pointer, C.c_void_p()

@@ -27,16 +27,17 @@ class Frame(HostFrame):
     never judged. weighted: with every sample comes "weight" [h, w], that of the reconstruction filter, and the other planes
     are multiplied by it: the mean is the sum of weight · value over the sum of weights, as in one long render. display: maps
     linear radiance [..., 3] to linear display values in [0, 1], for hosts whose view is not transfer(exposure · value); the
-    criterion then judges these. settings: as HostFrame takes them (limits, mask, transfer …).
+    criterion then judges these. denoised: what lull.denoise reads is kept, too: the halves, and of albedo and normal what
+    the host supplies. settings: as HostFrame takes them (limits, mask, transfer …).
     sums: `color`, `half` [h, w, 3], `moment2` [h, w], … and the layers; `dropped`, `dropped_half` [h, w] uint32: samples
     left out for a value that is not finite. y grows downwards.
     """
 
     def __init__(self, criterion: Criterion, width: int, height: int, *, wave: int = 16, whole_waves: bool = True,
                  supplies: Sequence[str] = (), layers: Sequence[str] = (), weighted: bool = False,
-                 display: Optional[Callable[[np.ndarray], np.ndarray]] = None, **settings: Any):
+                 display: Optional[Callable[[np.ndarray], np.ndarray]] = None, denoised: bool = False, **settings: Any):
         self.wave, self.display = limits.checked("wave", wave), display
-        kept, self.layers = _choose_planes(criterion, supplies, display is not None), _layers(layers)
+        kept, self.layers = _choose_planes(criterion, supplies, display is not None, denoised), _layers(layers)
         if display:
             settings.update(exposure=1.0, transfer="srgb")  # pixels come as shown
         super().__init__(criterion, width, height, kept, check_step=2 * self.wave if whole_waves else 1, **settings)
@@ -126,11 +127,11 @@ class Frame(HostFrame):
         """The part of an array over the view that the crop asked for."""
         return array[self._slices(self.crop)]
 
-    def planes_now(self) -> dict[str, Plane]:
+    def planes_now(self, as_shown: bool = True) -> dict[str, Plane]:
         """What the criterion is shown: the sums; means where they have weights, or as they are displayed."""
-        names = [name for name in self.sums if name in CHANNELS]
-        if self.weights or self.display:
-            shown = {name: self.display for name in ("color", "half") if self.display}
+        names, display = [name for name in self.sums if name in CHANNELS], self.display if as_shown else None
+        if self.weights or display:
+            shown = {name: display for name in ("color", "half") if display}
             means = {name: shown.get(name, np.asarray)(self.mean(name)) for name in names}
             return {name: Plane(np.ascontiguousarray(mean, np.float64)) for name, mean in means.items()}
         planes = {name: Plane(self.sums[name], "half_spp" if name == "half" else "spp") for name in names}
@@ -182,8 +183,9 @@ def _files_crc(criterion: Criterion) -> str:
     return f"crc {crc:08x}"
 
 
-def _choose_planes(criterion: Criterion, supplies: Sequence[str], has_display: bool) -> tuple[str, ...]:
-    """Planes that the criterion is shown: what it reads of what there is."""
+def _choose_planes(criterion: Criterion, supplies: Sequence[str], has_display: bool,
+                   denoised: bool) -> tuple[str, ...]:
+    """Planes that the criterion is shown: what it or the denoiser reads of what there is."""
     if unknown := set(supplies) - {"moment2", "albedo", "normal", "depth"}:
         raise ValueError(f"planes {', '.join(sorted(unknown))}: a host supplies moment2, albedo, normal or depth")
     required, used = plane_names(criterion.needs.planes_required), plane_names(criterion.needs.planes_used)
@@ -192,7 +194,8 @@ def _choose_planes(criterion: Criterion, supplies: Sequence[str], has_display: b
         why = "is not there with a display mapping" if {*missing} <= {*supplies} else "this host does not supply"
         raise LullError(abi.E_PLANE, f"criterion {criterion.info.id} reads {', '.join(missing)}, which {why}: choose "
                         f"another criterion (observer, halfbuf), or write a host with Frame(supplies={missing})")
-    return tuple(name for name in CHANNELS if name in offered & (used | {"color"}))
+    read = used | {"color"} | ({"half", "albedo", "normal"} if denoised else set())
+    return tuple(name for name in CHANNELS if name in offered & read)
 
 
 def _layers(names: Sequence[str]) -> tuple[str, ...]:

@@ -157,13 +157,13 @@ class HostFrame:
 
     # --- asking --------------------------------------------------------------------------------------------------------
 
-    def planes_now(self) -> Mapping[str, Plane]:
-        """What a criterion is shown where no planes are given. "dropped" and "dropped_half" (uint32) are samples left out of
-        the sums of each pixel."""
+    def planes_now(self, as_shown: bool = True) -> Mapping[str, Plane]:
+        """What a criterion is shown where no planes are given; as_shown False: linear radiance in any case. "dropped" and
+        "dropped_half" (uint32) are samples left out of the sums of each pixel."""
         raise ValueError("this frame keeps no picture: give the planes")
 
-    def _shown(self, planes: Optional[Mapping[str, Plane]]) -> abi.HostView:
-        """The view."""
+    def view_of(self, planes: Optional[Mapping[str, Plane]]) -> abi.HostView:
+        """The view: planes by name, as they lie in memory; default the frame's own."""
         planes = dict(self.planes_now() if planes is None else planes)
         if "color" not in planes:
             raise ValueError("the plane color is missing")
@@ -192,22 +192,25 @@ class HostFrame:
     def check(self, planes: Optional[Mapping[str, Plane]] = None) -> None:
         """To be called when every active block is at its next_spp: asks about them, stops or schedules each. LullError when
         the criterion fails: all blocks go on. planes: by name, over the pixels of `view`, as they lie in memory."""
-        view = self._shown(planes)
+        view = self.view_of(planes)
         with self._asking():
             call("host_check", self.handle.pointer, C.byref(view))
 
     def stop(self, reason: int, planes: Optional[Mapping[str, Plane]] = None) -> None:
         """Closes the active blocks (reason: abi.REASON_TIME or REASON_INTERRUPT); the criterion is asked once more about
         them, for the report."""
-        view = self._shown(planes)
+        view = self.view_of(planes)
         with self._asking():
             call("host_stop", self.handle.pointer, reason, C.byref(view))
 
-    def evaluate(self, due: Sequence[int], planes: Optional[Mapping[str, Plane]] = None) -> list[abi.Decision]:
-        """Asks about blocks[i] for i in due, rising; nothing is noted."""
-        view, count = self._shown(planes), len(due)
+    def evaluate(self, due: Sequence[int], planes: Optional[Mapping[str, Plane]] = None,
+                 criterion: Optional[Criterion] = None) -> list[abi.Decision]:
+        """Asks about blocks[i] for i in due, rising; nothing is noted. criterion: a new one instead of the frame's own."""
+        view, count = self.view_of(planes), len(due)
         answers = (abi.Decision * max(count, 1))()
-        with self._asking() as judge:
+        with criterion.alone() if criterion else self._asking() as judge:
+            if criterion:
+                call("host_join", self.handle.pointer, judge)
             call("host_evaluate", judge, self.handle.pointer, C.byref(view), (C.c_uint32 * max(count, 1))(*due), None, count,
                  answers)
         return list(answers[:count])
@@ -215,7 +218,7 @@ class HostFrame:
     def quote(self, threads: int, name: str, values: Sequence[float], own: float) -> list[abi.HostQuoteRow]:
         """What the frame costs with other values of a parameter, `own` being the criterion's: struct lull_host_quote_row for
         each, without its blocks; also after close(). threads: of the renderer."""
-        view, rows, count = self._shown(None), C.POINTER(abi.HostQuoteRow)(), C.c_uint32()
+        view, rows, count = self.view_of(None), C.POINTER(abi.HostQuoteRow)(), C.c_uint32()
         with self._asking() if self._is_open() else contextlib.nullcontext():
             quote = Handle("lull_host_quote_end", self.handle)
             call("host_quote_begin", self.handle.pointer, threads, C.byref(quote.pointer))

@@ -25,12 +25,14 @@ from typing import Any, Callable, Iterator, NamedTuple, Optional, Sequence, Unio
 import numpy as np
 
 from . import checkpoint as checkpoints
-from . import limits
+from . import denoising, limits
 from . import quote as quotes
 from .criterion import Criterion, Rect, load
+from .denoising import Denoised
 from .driver import Driver, Result
 from .files import Output, check_outputs
 from .frame import Frame
+from .library import LullError
 
 # Planes that criteria can read, and the channels of an AOV of that name
 _AOVS = {"albedo": ("albedo.R", "albedo.G", "albedo.B"), "normal": ("normal.X", "normal.Y", "normal.Z"),
@@ -38,21 +40,25 @@ _AOVS = {"albedo": ("albedo.R", "albedo.G", "albedo.B"), "normal": ("normal.X", 
 
 
 class Picture(NamedTuple):
-    """What render gives back: image [height, width, 3] float64 linear, spp [height, width] uint32, layers: alpha ("A") and
-    AOVs by the film's names, [height, width] float64. unsaved: why the checkpoint could not be written, if so."""
+    """What render gives back: image [height, width, 3] linear, spp [height, width] uint32, layers: alpha ("A") and AOVs by
+    the film's names, [height, width] float64. unsaved: why the checkpoint could not be written, if so. denoised: over the
+    view, if it was asked for, and then image is its picture; undenoised: why that failed, if so."""
     image: np.ndarray
     spp: np.ndarray
     result: Result
     driver: Driver  # for lull.outputs and lull.checkpoint
     layers: dict[str, np.ndarray]
     unsaved: Optional[OSError] = None
+    denoised: Optional[Denoised] = None
+    undenoised: Optional[LullError] = None
 
 
 class Film:
     """One sensor's film, cropped to blocks. Use as a context manager: the crop is put back. layers: names of its channels
-    beside R, G and B; supplies: planes among them that criteria can read."""
+    beside R, G and B; supplies: planes that criteria can read, among its channels; denoised: a scene without AOVs gets
+    those that the denoiser reads."""
 
-    def __init__(self, scene: Any, sensor: int = 0, seed: int = 0):
+    def __init__(self, scene: Any, sensor: int = 0, seed: int = 0, denoised: bool = False):
         import mitsuba as mi
         if mi.variant() is None:
             raise ValueError("no Mitsuba variant is set: call mitsuba.set_variant first")
@@ -71,7 +77,10 @@ class Film:
         self.border = 0 if self.film.sample_border() else int(self.film.rfilter().border_size())
         self._channels = self._find_channels()
         self.layers = [name for name in self._channels if name not in ("R", "G", "B", "W")]
-        self.supplies = [plane for plane, names in _AOVS.items() if set(names) <= set(self.layers)]
+        if denoised and not self.integrator.aov_names():
+            self.integrator = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal", "i": self.integrator})
+            self._channels = self._find_channels()
+        self.supplies = [plane for plane, names in _AOVS.items() if set(names) <= set(self._channels)]
 
     def _find_channels(self) -> list[str]:
         """Of the film's sums, in order; ValueError if it makes other colours of them."""
@@ -179,7 +188,7 @@ def _cost_line(tell: Callable[[str], None]) -> Callable[[Driver], None]:
     return look
 
 
-def quote(scene: Any, criterion: Union[str, Criterion] = "observer", **settings: Any) -> str:
+def quote(scene: Any, criterion: Union[str, Criterion] = "", **settings: Any) -> str:
     """A table of what the quality parameter will cost, and coarser and finer ones, from a pilot of 128 samples or 30
     seconds. settings: as render takes them; with checkpoint=, render(…, resume=True) goes on from the pilot, nothing is
     lost."""
@@ -194,14 +203,16 @@ def quote(scene: Any, criterion: Union[str, Criterion] = "observer", **settings:
     return quotes.table(picture.driver)
 
 
-def render(scene: Any, criterion: Union[str, Criterion] = "observer", *, sensor: int = 0, spp_min: int = 16,
+def render(scene: Any, criterion: Union[str, Criterion] = "", *, sensor: int = 0, spp_min: int = 16,
            spp_max: int = 1024, time_budget_s: float = 0.0, block: Optional[int] = None, wave: int = 8, seed: int = 0,
            mask: Union[np.ndarray, str, None] = None, checkpoint: str = "", resume: bool = False,
            checkpoint_every_s: float = 60.0, after_call: Optional[Callable[[Driver], None]] = None,
-           tell: Optional[Callable[[str], None]] = _tell, display_server: str = "", **parameters: Any) -> Picture:
+           tell: Optional[Callable[[str], None]] = _tell, display_server: str = "", denoise: str = "",
+           **parameters: Any) -> Picture:
     """Renders a mi.Scene; each block until the criterion stops it.
 
-    criterion: a name, a path or a lull.Criterion; parameters are its own (threshold=…). The film's crop is kept to. mask:
+    criterion: a name, a path or a lull.Criterion, default observer, or denoised with denoise="blend" or "full", which keeps
+    the denoised picture (docs/denoised.md); parameters are its own (threshold=…). The film's crop is kept to. mask:
     an array, or the path of a PNG (lull.mask). checkpoint: a file that keeps the state at the end, however it ends, and
     every checkpoint_every_s seconds; resume: goes on from it, if it is there; with a higher spp_max a finished picture gets
     more samples. tell: is given one line at the first check, what the quality parameter costs and what coarser ones would
@@ -214,15 +225,20 @@ def render(scene: Any, criterion: Union[str, Criterion] = "observer", *, sensor:
     if checkpoint:
         check_outputs([Output("checkpoint", checkpoint)], [mask] if isinstance(mask, str) else [])
         checkpoints.check(checkpoint)
+    usual, library = denoising.criterion_of(denoise), str(parameters.get("library", ""))
+    if denoise:
+        denoising.check(library)
+        parameters = denoising.parameters_of(denoise, criterion or usual, parameters)
     shades = _read_mask(mask) if isinstance(mask, str) else mask
     with contextlib.ExitStack() as stack:
-        judge = criterion if isinstance(criterion, Criterion) else stack.enter_context(load(criterion, **parameters))
-        film = stack.enter_context(Film(scene, sensor, seed))
+        judge = (criterion if isinstance(criterion, Criterion) else
+                 stack.enter_context(load(criterion or usual, **parameters)))
+        film = stack.enter_context(Film(scene, sensor, seed, bool(denoise)))
         film.check_waves(wave, spp_max)
         frame = Frame(judge, film.width, film.height, block=block, crop=film.crop, spp_min=spp_min, spp_max=spp_max,
                       time_budget_s=time_budget_s, deterministic=time_budget_s <= 0, seed=seed, independent=True,
                       shared=film.splats, weighted=True, wave=wave, supplies=film.supplies, layers=film.layers,
-                      mask=shades)
+                      mask=shades, denoised=bool(denoise))
         stack.callback(frame.close)
         driver = Driver(frame, film.render, identity=film.identity() if checkpoint else None,
                         display_server=display_server)
@@ -238,5 +254,10 @@ def render(scene: Any, criterion: Union[str, Criterion] = "observer", *, sensor:
         result = driver.run()
         if kept:
             kept.finish(driver, result)
-    return Picture(frame.cropped(frame.mean()), frame.cropped(frame.spp()), result, driver,
-                   {name: frame.cropped(frame.mean(name)) for name in film.layers}, kept.unsaved if kept else None)
+    picture = Picture(frame.cropped(frame.mean()), frame.cropped(frame.spp()), result, driver,
+                      {name: frame.cropped(frame.mean(name)) for name in film.layers}, kept.unsaved if kept else None)
+    try:
+        made = denoising.denoise(frame, full=denoise == "full", library=library) if denoise else None
+    except LullError as error:
+        return picture._replace(undenoised=error)
+    return picture._replace(image=frame.cropped(made.picture), denoised=made) if made else picture

@@ -13,6 +13,7 @@ from typing import Mapping, Optional
 import numpy as np
 
 from . import abi, exr
+from .denoising import Denoised
 from .driver import Driver
 from .files import file_call, srgb, write_png
 from .frame import Frame
@@ -21,13 +22,15 @@ from .library import library
 
 
 def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull for Python 1.0",
-              more: Optional[Mapping[str, Optional[np.ndarray]]] = None) -> None:
+              more: Optional[Mapping[str, Optional[np.ndarray]]] = None, denoised: Optional[Denoised] = None) -> None:
     """R, G, B and the layer lull, which image programs show as spp, p_noisy, error and reason, then those of the frame;
-    cut to the crop. more: further channels over the frame's view, or instead of its layers; None leaves one out."""
+    cut to the crop. more: further channels over the frame's view, or instead of its layers; None leaves one out.
+    denoised: R, G, B are its picture, and the layers of docs/denoised.md are written."""
     frame = driver.frame
     values = {"p_noisy": lambda b: b.p_noisy, "error": lambda b: b.error, "reason": lambda b: reasons().index(b.reason)}
     channels = {**dict(zip("RGB", np.moveaxis(frame.mean(), -1, 0))), "lull.spp.V": frame.spp(),
                 **{f"lull.{name}.V": frame.per_pixel(value) for name, value in values.items()},
+                **(_denoised_layers(frame, denoised) if denoised else {}),
                 **{name: frame.mean(name) for name in frame.layers}, **(more or {})}
     info = frame.criterion.info
     settings = "".join(f" {key}={value}" for key, value in frame.criterion.parameters.items())
@@ -37,6 +40,15 @@ def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull 
         "lull:reasons": " ".join(f"{i}={name}" for i, name in enumerate(reasons())),
         "lull:block": f"{frame.layout.block_width}x{frame.layout.block_height}", "lull:seed": float(frame.seed),
         "lull:samples": float(driver.totals.samples), "software": software})
+
+
+def _denoised_layers(frame: Frame, denoised: Denoised) -> dict[str, np.ndarray]:
+    pictures = {"": denoised.picture, "noisy.": frame.mean(), "denoised.": denoised.denoised}
+    layers = {f"{name}{c}": rgb[..., k] for name, rgb in pictures.items() for k, c in enumerate("RGB")}
+    for name, errors in (("error", denoised.error), ("noisy_error", denoised.noisy_error)):
+        by_block = {b.id: error for b, error in zip(frame.blocks, errors)}
+        layers[f"lull.{name}.V"] = frame.per_pixel(lambda b: by_block[b.id])
+    return {**layers, "lull.weight.V": denoised.weight}
 
 
 def is_ours(path: str) -> bool:
@@ -50,15 +62,15 @@ def is_ours(path: str) -> bool:
     return not begin or b"lull.spp" in begin
 
 
-def shown(frame: Frame) -> np.ndarray:
+def shown(frame: Frame, denoised: Optional[Denoised] = None) -> np.ndarray:
     """[h, w, 3] uint8, cut to the crop: the display mapping of the frame if it has one, then the sRGB transfer."""
-    mean = frame.cropped(frame.mean())
+    mean = frame.cropped(denoised.picture if denoised else frame.mean())
     return srgb(frame.display(mean) if frame.display else mean)
 
 
-def write_preview(path: str, driver: Driver) -> None:
+def write_preview(path: str, driver: Driver, denoised: Optional[Denoised] = None) -> None:
     """PNG, as the frame is shown."""
-    write_png(path, shown(driver.frame))
+    write_png(path, shown(driver.frame, denoised))
 
 
 def write_stop_map(path: str, frame: HostFrame, scene: str = "") -> None:
@@ -68,14 +80,16 @@ def write_stop_map(path: str, frame: HostFrame, scene: str = "") -> None:
 
 
 def write_report(path: str, driver: Driver, scene: str = "", kernel: str = "", interrupted: bool = False,
-                 mask: Optional[str] = None) -> None:
+                 mask: Optional[str] = None, denoised: Optional[Denoised] = None) -> None:
     """Everything about the run as JSON, as the path tracer's --report; null: not known. mask: its file."""
     frame = driver.frame
-    flags = abi.REPORT_NO_RAYS | abi.REPORT_INTERRUPTED * interrupted
+    flags = abi.REPORT_NO_RAYS | abi.REPORT_INTERRUPTED * interrupted | abi.REPORT_DENOISED * (denoised is not None)
+    kept = {"noisy_weight": denoised.weight.mean(dtype=float), "noisy_error": denoised.noisy_error.ctypes.data} \
+        if denoised else {}
     file_call("host_report_write", frame.handle.pointer, C.byref(abi.sized(
         abi.HostReport, flags=flags, scene=os.fsencode(scene), mask=None if mask is None else os.fsencode(mask),
         kernel=kernel.encode(), threads=driver.threads, processes=1, film_pixels=frame.view.pixels, scene_bytes=math.nan,
-        film_bytes=sum(a.nbytes for a in frame.arrays().values()))), os.fsencode(path))
+        film_bytes=sum(a.nbytes for a in frame.arrays().values()), **kept)), os.fsencode(path))
 
 
 def progress_text(driver: Driver) -> str:

@@ -50,12 +50,17 @@ def _settings(parameter: Parameter, value: float) -> list[tuple[float, str]]:
     return sorted(((v, name) for v, name in names.items() if parameter.min <= v <= parameter.max), reverse=True)
 
 
+def _is_dear(driver: Driver) -> bool:
+    """Each further setting would denoise every block once more."""
+    return driver.frame.criterion.info.id == "denoised"
+
+
 def rows(driver: Driver) -> list[Row]:
     """Coarse to fine; [] if the criterion has no quality parameter or cannot be asked. Every active block has been
     checked once at least."""
     try:
         parameter, chosen = _dial_of(driver.frame)
-        settings = _settings(parameter, chosen)
+        settings = [(chosen, "chosen")] if _is_dear(driver) else _settings(parameter, chosen)
         costs = driver.frame.quote(driver.threads, parameter.name, [value for value, _ in settings], chosen)
     except (LullError, KeyError):
         return []
@@ -85,8 +90,8 @@ def table(driver: Driver) -> str:
 
 def line(driver: Driver) -> str:
     """One line for the first check: what the quality parameter costs, and what coarser ones would; "" if that cannot be
-    told."""
-    found = rows(driver)
+    told, or not without denoising every block."""
+    found = [] if _is_dear(driver) else rows(driver)
     own = next((r for r in found if r.chosen), None)
     if own is None:
         return ""

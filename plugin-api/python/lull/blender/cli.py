@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import NoReturn, Optional, Sequence
 
+from .. import denoising
 from ..stopping import EXIT_STATUS, Stopping
 
 # As Blender names them
@@ -17,6 +18,9 @@ DEVICES = ("CPU", "CUDA", "OPTIX", "HIP", "ONEAPI", "METAL")
 
 
 class _Parser(argparse.ArgumentParser):
+    def parse_args(self, args):  # type: ignore[override]
+        return super().parse_args(["--denoise=blend" if a == "--denoise" else a for a in args])  # and not the next word
+
     def error(self, message: str) -> NoReturn:
         print(f"lull: {message} (--help says more)", file=sys.stderr)
         sys.exit(2)
@@ -26,9 +30,13 @@ def parser() -> argparse.ArgumentParser:
     p = _Parser("python3 -m lull.blender", description="Render a Blender scene with Cycles, block by "
                                 "block, each until its noise can no longer be seen.")
     p.add_argument("file", nargs="?", help="the .blend file (inside Blender: default the open one)")
-    p.add_argument("-c", "--criterion", default="observer", help="name or PATH[:ID] of a criterion (default observer)")
+    p.add_argument("-c", "--criterion", default="", help="name or PATH[:ID] of a criterion (default observer; with "
+                   "--denoise denoised)")
     p.add_argument("-p", "--param", action="append", default=[], metavar="KEY=VALUE", help="parameter of the criterion")
     p.add_argument("--visible", metavar="SHARE", help="stop when at most this share of viewers would still see noise")
+    p.add_argument("--denoise", default="", choices=denoising.KINDS, metavar="blend|full", help="keep the denoised picture, "
+                   "and stop blocks by what is seen of it: =blend (default) keeps as much of the noisy one as the denoiser "
+                   "is wrong, =full none; needs Open Image Denoise 2")
     p.add_argument("--spp-min", type=int, default=16, metavar="N", help="samples before the first check (default 16)")
     p.add_argument("--spp-max", type=int, metavar="N", help="most samples of a block (default: the scene's Max Samples)")
     p.add_argument("--time-budget", type=float, metavar="SECONDS", help="per frame; 0 = no limit (default: the scene's Time "
@@ -140,7 +148,7 @@ def _settings(options: argparse.Namespace, scene, frame: Optional[int]):
         parameters["visible"] = options.visible
     settings = Settings(options.criterion, parameters, options.spp_min, options.spp_max, options.time_budget, options.block,
                         mask=options.mask, output=options.output, preview=options.preview, stop_map=options.stop_map,
-                        report=options.report, checkpoint=options.checkpoint).numbered(frame)
+                        report=options.report, checkpoint=options.checkpoint, denoise=options.denoise).numbered(frame)
     if not (options.quote or settings.output or settings.preview or settings.stop_map or settings.report):
         stem = Path(options.file or bpy.data.filepath or "untitled").stem
         settings.output = default_output(scene, frame, f"{stem}.exr")
@@ -157,7 +165,7 @@ def _render(options: argparse.Namespace, stopping: Stopping) -> int:
     scene = _scene(options)
     frames = [(frame, _settings(options, scene, frame)) for frame in _frames(options.frames, scene)]
     status = 0
-    with load(options.criterion, **frames[0][1].parameters) as criterion:
+    with load(frames[0][1].criterion, **frames[0][1].parameters) as criterion:
         check_files([settings for _, settings in frames], criterion)
         for frame, settings in frames:
             if frame is not None:
@@ -234,4 +242,5 @@ def summary(session) -> str:
     converged = sum(b.reason == "criterion" for b in blocks)
     counts = sorted(b.spp for b in blocks)
     mean = session.driver.totals.samples / session.frame.view.pixels
-    return f"{converged} of {len(blocks)} blocks converged, {counts[0]}..{counts[-1]} spp, mean {mean:.0f}"
+    line = f"{converged} of {len(blocks)} blocks converged, {counts[0]}..{counts[-1]} spp, mean {mean:.0f}"
+    return f"{line}; denoised, {session.denoised.weight.mean():.0%} is the noisy picture" if session.denoised else line

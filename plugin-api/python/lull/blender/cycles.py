@@ -44,6 +44,10 @@ def _silence() -> Iterator[None]:
         os.close(kept)
 
 
+# Of the view layer: the picture, and what its denoiser would read
+PLANES = {"color": [f"Combined.{c}" for c in "RGB"], "albedo": [f"Denoising Albedo.{c}" for c in "RGB"],
+          "normal": [f"Denoising Normal.{c}" for c in "XYZ"]}
+
 # Names of the colour passes by which Cycles divides light, in 4.x and in 5.x
 COLOURS = {"diffuse": {"DiffCol", "Diffuse Color"}, "glossy": {"GlossCol", "Glossy Color"},
            "transmission": {"TransCol", "Transmission Color"}, "subsurface": {"SubsurfaceCol", "Subsurface Color"}}
@@ -98,10 +102,11 @@ def choose_device(name: str) -> None:
 
 
 class Cycles:
-    """Use as a context manager around everything that renders. scene: borrowed; spp_max: the most samples of a pixel.
-    notes: lines for people about what is done otherwise than the scene says."""
+    """Use as a context manager around everything that renders. scene: borrowed; spp_max: the most samples of a pixel;
+    denoised: its denoising passes are rendered, too. notes: lines for people about what is done otherwise than the scene
+    says."""
 
-    def __init__(self, scene: bpy.types.Scene, spp_max: int):
+    def __init__(self, scene: bpy.types.Scene, spp_max: int, denoised: bool = False):
         if not hasattr(scene, "cycles"):
             raise HostError("Cycles is not available: enable the add-on 'Cycles Render Engine' in the preferences")
         if scene.render.engine != "CYCLES":
@@ -118,14 +123,14 @@ class Cycles:
             raise HostError(f"scene '{scene.name}' renders several views: turn stereoscopy off")
         if not any(layer.use for layer in scene.view_layers):
             raise HostError(f"scene '{scene.name}' has no view layer that is used for rendering")
-        self.scene, self.spp_max = scene, spp_max
+        self.scene, self.spp_max, self.denoised = scene, spp_max, denoised
         self.width = render.resolution_x * render.resolution_percentage // 100
         self.height = render.resolution_y * render.resolution_percentage // 100
         self.threads, self.crop = render.threads, self._region()
         self.notes: list[str] = []
         self.layer = next(layer for layer in scene.view_layers if layer.use)
-        if scene.cycles.use_denoising:
-            self.notes.append("the picture is not denoised; the Denoise node of the compositor can do that afterwards")
+        if scene.cycles.use_denoising and not denoised:
+            self.notes.append("the picture is not denoised: --denoise, or the panel's Denoise, keeps the denoised one")
         nodes = scene.compositing_node_group if hasattr(scene, "compositing_node_group") else scene.use_nodes
         if nodes and render.use_compositing:
             self.notes.append("the scene's compositor is not run: give it the picture by an Image node in place of Render "
@@ -197,7 +202,11 @@ class Cycles:
                 self._set(self.layer, **{colour: True})
                 hidden |= names
         x, y = self.crop[:2]
-        channels = self._render_area(Rect(x, y, x + 1, y + 1), 0, 1)
+        borrowed = self.denoised and not self.layer.cycles.denoising_store_passes
+        if borrowed:
+            self._set(self.layer.cycles, denoising_store_passes=True)
+        channels = [name for name in self._render_area(Rect(x, y, x + 1, y + 1), 0, 1)
+                    if not (borrowed and name.startswith("Denoising "))]
         self.passes = Passes(self.layer.name, channels, (self.width, self.height), hidden,
                              self.scene.render.film_transparent)
 
@@ -227,14 +236,16 @@ class Cycles:
     # --- rendering -----------------------------------------------------------------------------------------------------
 
     def render(self, rects: Sequence[Rect], first: int, count: int, _half: bool) -> Iterator[dict[str, np.ndarray]]:
-        """The driver's render function: means of samples [first, first + count), float32, per rectangle: "color" [h, w, 3]
-        and the passes [h, w]."""
+        """The driver's render function: means of samples [first, first + count), float32, per rectangle: "color" [h, w, 3],
+        the planes of PLANES likewise, and the passes [h, w]."""
+        planes = PLANES if self.denoised else {"color": PLANES["color"]}
         areas = {area: self._render_area(area, first, count) for area in merge(rects)}
         for r in rects:
             area, channels = next((a, c) for a, c in areas.items() if a.x0 <= r.x0 < a.x1 and a.y0 <= r.y0 < a.y1)
             at = np.s_[r.y0 - area.y0:r.y1 - area.y0, r.x0 - area.x0:r.x1 - area.x0]
             part = {name: plane[at] for name, plane in channels.items()}
-            yield {"color": np.stack([part[f"Combined.{c}"] for c in "RGB"], -1), **self.passes.sample(part, r, first)}
+            yield {**{plane: np.stack([part[name] for name in names], -1) for plane, names in planes.items()},
+                   **self.passes.sample(part, r, first)}
 
     def _render_area(self, area: Rect, first: int, count: int) -> dict[str, np.ndarray]:
         """The view layer's channels, [h, w] float32."""

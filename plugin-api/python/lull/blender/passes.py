@@ -67,8 +67,8 @@ class Passes:
         for name, plane in self._first.items():
             plane[v.y0:v.y1, v.x0:v.x1] = frame.mean(name)
 
-    def finished(self, frame: Frame) -> dict[str, Optional[np.ndarray]]:
-        """Channels for the picture's file, over the view: light divided by its colour, the picture as the view layer's
+    def finished(self, frame: Frame, rgb: np.ndarray) -> dict[str, Optional[np.ndarray]]:
+        """Channels for the picture's file, over the view: light divided by its colour, the picture rgb as the view layer's
         Combined, which is what Blender looks for. None: summed for another one's sake only."""
         means = {channel: frame.mean(name) for name, channel in self._kept.items()}
         out: dict[str, Optional[np.ndarray]] = {}
@@ -78,7 +78,6 @@ class Passes:
                 out[name] = np.divide(means[channel], divisor, out=np.zeros_like(divisor), where=divisor > 0)
             if channel.rpartition(".")[0] in self._hidden:
                 out[name] = None
-        rgb = frame.mean()
         for k, letter in enumerate("RGB"):
             out[self._named(f"Combined.{letter}")] = rgb[..., k]
         out[self._named("Combined.A")] = frame.mean("A") if self._transparent else np.ones(rgb.shape[:2])

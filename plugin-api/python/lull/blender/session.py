@@ -10,11 +10,13 @@ from typing import Any, Callable, Optional, Sequence
 import bpy
 import numpy as np
 
-from .. import checkpoint, outputs, quote
+from .. import checkpoint, denoising, outputs, quote
 from ..criterion import Criterion, load
 from ..driver import Driver, Result
 from ..files import Output, check_outputs, write_each
 from ..frame import Frame
+from ..library import LullError
+from . import shown
 from .cycles import Cycles
 from .view import display_of, is_plain, read_grey, view_text
 
@@ -25,7 +27,7 @@ _UNSET = ("", "/tmp/", "/tmp\\")
 @dataclass
 class Settings:
     """What a user chooses for a frame. Files: "" = not written."""
-    criterion: str = "observer"
+    criterion: str = ""  # "": observer, or what judges the denoised picture
     parameters: dict[str, str] = field(default_factory=dict)
     spp_min: int = 16
     spp_max: Optional[int] = None  # None: the scene's Max Samples
@@ -37,6 +39,11 @@ class Settings:
     stop_map: str = ""
     report: str = ""
     checkpoint: str = ""
+    denoise: str = ""  # of lull.denoising.KINDS; "": the noisy picture is kept
+
+    def __post_init__(self) -> None:
+        self.criterion = self.criterion or denoising.criterion_of(self.denoise)
+        self.parameters = denoising.parameters_of(self.denoise, self.criterion, self.parameters)
 
     def numbered(self, frame: Optional[int]) -> Settings:
         """The same with the frame's number before the ending of every file."""
@@ -81,8 +88,11 @@ def default_output(scene: bpy.types.Scene, frame: Optional[int], otherwise: str)
 
 
 def scene_inputs() -> list[str]:
-    """The files that the open scene is read from."""
+    """The files that the open scene is read from; not what the add-on shows of the render before."""
     paths = [bpy.data.filepath, *bpy.utils.blend_paths(absolute=True, packed=False, local=False)]
+    for image in filter(None, map(bpy.data.images.get, (shown.PICTURE, shown.STOP_MAP))):
+        if (path := bpy.path.abspath(image.filepath)) in paths:
+            paths.remove(path)  # once: another image may read the same file
     return sorted({os.path.realpath(p) for p in paths if p and os.path.isfile(p)})
 
 
@@ -127,16 +137,20 @@ class Session:
         assert judge is not None
         spp_max = scene.cycles.samples if settings.spp_max is None else settings.spp_max
         time_s = scene.cycles.time_limit if settings.time_budget_s is None else settings.time_budget_s
-        self.host = Cycles(scene, spp_max)
+        self.denoised: Optional[denoising.Denoised] = None  # at the end
+        if settings.denoise:
+            denoising.check(settings.parameters.get("library", ""))
+        self.host = Cycles(scene, spp_max, bool(settings.denoise))
         self.notes = self.host.notes
-        shown = {"exposure": 2.0 ** scene.view_settings.exposure if is_plain(scene) else 1.0, "display": display_of(scene)}
+        display = {"exposure": 2.0 ** scene.view_settings.exposure if is_plain(scene) else 1.0, "display": display_of(scene)}
         self.host.__enter__()
         try:
             self.frame = Frame(judge, self.host.width, self.host.height, block=settings.block, crop=self.host.crop,
                                layers=self.host.passes.names, spp_max=spp_max, time_budget_s=time_s,
-                               deterministic=time_s <= 0,
+                               deterministic=time_s <= 0, denoised=bool(settings.denoise),
+                               supplies=("albedo", "normal") if settings.denoise else (),
                                spp_min=min(settings.spp_min, spp_max) if settings.spp_max is None else settings.spp_min,
-                               mask=read_grey(settings.mask) if settings.mask else None, seed=scene.cycles.seed, **shown)
+                               mask=read_grey(settings.mask) if settings.mask else None, seed=scene.cycles.seed, **display)
             self.driver = Driver(self.frame, self.host.render, threads=self.host.threads, after_call=after_call,
                                  identity=_identity(scene, self.host) if settings.checkpoint else None)
         except BaseException:
@@ -187,13 +201,29 @@ class Session:
         return result
 
     def write(self, result: Result) -> tuple[list[str], list[str]]:
-        """Writes the files of the settings. Returns their names, and a line for each that could not be written."""
+        """Denoises the picture if that is asked for, and writes the files of the settings. Returns their names, and a line
+        for each that could not be written."""
+        failed = self._denoise()
         s, scene = self.settings, bpy.data.filepath or self.scene.name
         kernel = f"Cycles, Blender {bpy.app.version_string}"
         interrupted = result.outcome in ("interrupt", "failed")
-        return write_each((
+        kept = self.denoised
+        rgb = kept.picture if kept else self.frame.mean()
+        written, unwritten = write_each((
             (s.output, lambda p: outputs.write_exr(p, self.driver, scene, f"lull for Python 1.0; {kernel}",
-                                                    self.host.passes.finished(self.frame))),
-            (s.preview, lambda p: outputs.write_preview(p, self.driver)),
+                                                    self.host.passes.finished(self.frame, rgb), kept)),
+            (s.preview, lambda p: outputs.write_preview(p, self.driver, kept)),
             (s.stop_map, lambda p: outputs.write_stop_map(p, self.frame, scene)),
-            (s.report, lambda p: outputs.write_report(p, self.driver, scene, kernel, interrupted, s.mask or None))))
+            (s.report, lambda p: outputs.write_report(p, self.driver, scene, kernel, interrupted, s.mask or None, kept))))
+        return written, failed + unwritten
+
+    def _denoise(self) -> list[str]:
+        """A line if that failed."""
+        s = self.settings
+        try:
+            if s.denoise:
+                self.denoised = denoising.denoise(self.frame, full=s.denoise == "full", threads=self.host.threads,
+                                                  library=s.parameters.get("library", ""))
+        except LullError as error:
+            return [f"the picture is the noisy one: {error}"]
+        return []

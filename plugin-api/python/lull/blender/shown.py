@@ -9,6 +9,7 @@ import bpy.utils.previews
 import numpy as np
 
 from .. import outputs
+from ..denoising import Denoised
 from ..frame import Frame
 
 PICTURE, STOP_MAP = "Lull", "Lull Stop Map"
@@ -46,13 +47,13 @@ def _show_small(name: str, rgb: np.ndarray) -> None:
     picture.image_pixels_float.foreach_set(square.ravel())
 
 
-def show_picture(frame: Frame) -> None:
-    """The frame as far as it is."""
-    mean = frame.cropped(frame.mean())
+def show_picture(frame: Frame, denoised: Optional[Denoised] = None) -> None:
+    """The frame as far as it is, or its denoised picture."""
+    mean = frame.cropped(denoised.picture if denoised else frame.mean())
     image = _picture(mean.shape[1], mean.shape[0])
     image.pixels.foreach_set(_rgba(mean).ravel())
     image.update()
-    _show_small(PICTURE, outputs.shown(frame) / 255)
+    _show_small(PICTURE, outputs.shown(frame, denoised) / 255)
 
 
 def show_in_editors(screen: bpy.types.Screen) -> None:

@@ -11,6 +11,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 
 from .. import outputs
 from ..criterion import load
+from ..denoising import criterion_of
 from ..library import LullError, criteria, search_path
 from . import shown
 from .cli import summary
@@ -34,6 +35,12 @@ def _criteria(_self, _context) -> list[tuple[str, str, str]]:
     return _items
 
 
+def _choose_criterion(settings, _context) -> None:
+    """The one that judges the picture that is kept now, unless another was chosen."""
+    if settings.criterion in ("observer", "denoised"):
+        settings.criterion = criterion_of("blend" if settings.denoise else "")
+
+
 class LullSettings(bpy.types.PropertyGroup):
     """Kept with the scene."""
     criterion: EnumProperty(name="Criterion", items=_criteria, description="What decides that a block may stop")
@@ -43,6 +50,10 @@ class LullSettings(bpy.types.PropertyGroup):
                            set=lambda self, value: setattr(self, "share", value),
                            description="Stop a block when at most this share of viewers would still see its noise; 0 = the "
                            "criterion's own")
+    denoise: BoolProperty(name="Denoise", default=False, update=_choose_criterion, description="Keep the denoised picture; "
+                          "the criterion 'Denoised picture' stops by what is seen of it. Needs Open Image Denoise")
+    kept: EnumProperty(name="Keep", items=[
+        ("blend", "Blend", "As much of the noisy picture as the denoiser is wrong"), ("full", "Denoised", "Nothing of it")])
     parameters: StringProperty(name="Parameters", description="KEY=VALUE pairs of the criterion, with spaces between; for "
                                "example first-spp=64")
     spp_min: IntProperty(name="Min Samples", default=16, min=1, description="Samples before the first decision")
@@ -62,7 +73,8 @@ class LullSettings(bpy.types.PropertyGroup):
             raise ValueError(f"parameter {bad[0]}: expected KEY=VALUE")
         quality = {"visible": f"{self.share:.6g}"} if self.share and self.criterion in _visible else {}
         settings = Settings(self.criterion, {**quality, **dict(p.split("=", 1) for p in pairs)}, self.spp_min,
-                            block=self.block or None, mask=bpy.path.abspath(self.mask) if self.mask else "")
+                            block=self.block or None, mask=bpy.path.abspath(self.mask) if self.mask else "",
+                            denoise=self.kept if self.denoise else "")
         if self.folder:
             settings.output = os.path.join(bpy.path.abspath(self.folder), "lull.exr")
             settings = settings.numbered(frame)
@@ -95,7 +107,7 @@ class LULL_OT_render(bpy.types.Operator):
             self._frames = [(frame, scene.lull.chosen(scene, frame)) for frame in frames]
             if not self._frames:
                 raise ValueError("the scene's frame range is empty")
-            with load(scene.lull.criterion, **self._frames[0][1].parameters) as criterion:
+            with load(self._frames[0][1].criterion, **self._frames[0][1].parameters) as criterion:
                 check_files([settings for _, settings in self._frames], criterion)
         except REFUSED as error:
             self.report({"ERROR"}, str(error))
@@ -150,8 +162,8 @@ class LULL_OT_render(bpy.types.Operator):
         """Writes the frame; whether there is another one to render."""
         session, settings = self._session, context.scene.lull
         session.__exit__()
-        shown.show_picture(session.frame)
         written, failed = session.write(result)
+        shown.show_picture(session.frame, session.denoised)
         for name, path in ((shown.PICTURE, session.settings.output), (shown.STOP_MAP, session.settings.stop_map)):
             if path in written:
                 shown.keep(name, path)
@@ -225,6 +237,7 @@ class LULL_PT_render(bpy.types.Panel):
             quality = ("visible",) if settings.criterion in _visible else ()
             for properties in (((settings, "criterion"), *((settings, d) for d in quality), (settings, "parameters")),
                                ((settings, "spp_min"), (cycles, "samples"), (cycles, "time_limit")),
+                               ((settings, "denoise"), *(((settings, "kept"),) if settings.denoise else ())),
                                ((settings, "block"), (settings, "mask"), (settings, "folder"))):
                 column = layout.column(align=True)
                 for owner, name in properties:
