@@ -82,7 +82,7 @@ def table(rows, auc="%.4f", early="%.1f %%", times="%.1f"):
 
 
 def page(results):
-    return "%s; all with `%s`.\n\n%s" % (tables.told(results["measured"]), results["common"], table(results["rows"], "%.3f", "%.0f %%", "%.0f"))
+    return "%s; all with\n`%s`.\n\n%s" % (tables.told(results["measured"]), results["common"], table(results["rows"], "%.3f", "%.0f %%", "%.0f"))
 
 
 def main(o):

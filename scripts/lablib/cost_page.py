@@ -70,7 +70,7 @@ def wanted_of(points):
     figures = ["%s × (%d scenes with more than one block)" % (figure(median([f["total_ratio"] / f["limit"] for f in several])), len(several)),
                cell(default, "early"),
                "%d of %d" % (sum(f["overhead"] <= 0.01 for f in slow), len(slow)) if slow else "not timed", "%d of %d" % (good, n)]
-    text = ["On %s `%s` (%s %g) is as accurate in %s of the time." % (scene, p[0], p[1], p[2], figure(p[3][scene]["total_s"] / default[3][scene]["total_s"]))
+    text = ["on %s `%s` (%s %g), in %s of the time" % (scene, p[0], p[1], p[2], figure(p[3][scene]["total_s"] / default[3][scene]["total_s"]))
             for scene, p in sorted(beaten.items())]
     return figures, text
 
@@ -85,7 +85,7 @@ def wanted_table(out):
     text = table(["the default, `observer`"] + [t for _, t in names], [[row] + [f[0][i] for f in found] for i, row in enumerate(rows)])
     for (_, title), (_, lines) in zip(names, found):
         if lines:
-            text += "\n%s: %s\n" % (title, " ".join(lines))
+            text += "\nAs accurate for less, %s:\n\n%s" % (title, "".join("- %s\n" % line for line in lines))
     return text
 
 
