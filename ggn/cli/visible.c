@@ -9,7 +9,7 @@
 
 struct options {
     const char *paths[2];
-    const char *map_path, *observer_path;
+    const char *map_path, *observer_path, *second_path;
     int block, json;
 };
 
@@ -22,6 +22,8 @@ static const struct base_option list[] = {
      .help = "parameters of the observer (those this was built with)"},
     {"output", 'o', "MAP.png", TO(map_path), .output = BASE_FILE, .words = pictures,
      .help = "write where: black nothing, light yellow twice what is just seen; blocks with visible noise are framed"},
+    {"second", 's', "FILE", TO(second_path), .input = BASE_FILE,
+     .help = "another reference, as good and independent of the first: the noise of both is taken out"},
     {0}};
 
 struct result {
@@ -92,9 +94,10 @@ static int write_map(const char *path, const float *map, int width, int height, 
     return rc;
 }
 
-static int run(const struct options *o, const struct pic_image images[2], struct base_err *err)
+static int run(const struct options *o, const struct pic_image images[4], struct base_err *err)
 {
     int width = images[1].width, height = images[1].height, count = ggn_remaining_count(width, height, o->block);
+    const struct pic_image *const references[2] = {&images[0], o->second_path ? &images[2] : NULL};
     struct ggn_observer observer = ggn_observer_default;
     struct ggn_remaining *blocks = NULL;
     float *map = NULL;
@@ -105,7 +108,7 @@ static int run(const struct options *o, const struct pic_image images[2], struct
                 (o->map_path && !(map = malloc((size_t)width * (size_t)height * sizeof *map)))))
         rc = base_fail_nomem(err, "blocks of an image");
     if (!rc)
-        rc = ggn_remaining(&observer, &images[0], &images[1], o->block, blocks, map, err);
+        rc = ggn_remaining(&observer, references, &images[1], o->block, blocks, map, err);
     struct result result = {blocks, count, &observer};
     if (!rc && map)
         rc = write_map(o->map_path, map, width, height, &result, err);
@@ -128,14 +131,16 @@ int ggn_cmd_visible(int argc, char **argv)
         .doc = "Where the noise of an image is still seen, against a reference of the same view: the model observer's error "
                "of each block, 1 where noise is just not seen, and the share of viewers who see it."};
     struct options o = {.block = 200};
-    struct pic_image images[2] = {{0}, {0}};
+    struct pic_image images[4] = {{0}}; /* reference, image; second reference, image */
     struct base_err err = {0};
     int rc = base_options_parse(&options, argc, argv, &o, &err);
     if (!rc)
         rc = ggn_cmd_read_pair(argv[0], o.paths, images, &err);
+    if (!rc && o.second_path)
+        rc = ggn_cmd_read_pair(argv[0], (const char *const[]){o.second_path, o.paths[1]}, images + 2, &err);
     if (!rc)
         rc = run(&o, images, &err);
-    pic_release(&images[0]);
-    pic_release(&images[1]);
+    for (int i = 0; i < 4; i++)
+        pic_release(&images[i]);
     return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
 }

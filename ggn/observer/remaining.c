@@ -7,7 +7,7 @@
 #include "model/visibility.h"
 
 struct workspace { /* for one block; owns */
-    float *rgb, *image, *reference, *seen;
+    float *rgb, *image, *reference[2], *seen[2];
     double *texture, *scratch;
 };
 
@@ -15,8 +15,10 @@ static void release(struct workspace *w)
 {
     free(w->rgb);
     free(w->image);
-    free(w->reference);
-    free(w->seen);
+    for (int i = 0; i < 2; i++) {
+        free(w->reference[i]);
+        free(w->seen[i]);
+    }
     free(w->texture);
     free(w->scratch);
 }
@@ -26,11 +28,11 @@ static int init(struct workspace *w, int width, int height, struct base_err *err
     size_t n = (size_t)width * (size_t)height;
     *w = (struct workspace){.rgb = malloc(3 * n * sizeof *w->rgb),
                             .image = malloc(n * sizeof *w->image),
-                            .reference = malloc(n * sizeof *w->reference),
-                            .seen = malloc(n * sizeof *w->seen),
+                            .reference = {malloc(n * sizeof(float)), malloc(n * sizeof(float))},
+                            .seen = {malloc(n * sizeof(float)), malloc(n * sizeof(float))},
                             .texture = malloc(ggn_visible_patches(width, height) * sizeof *w->texture),
                             .scratch = malloc(ggn_visibility_scratch(width) * sizeof *w->scratch)};
-    if (w->rgb && w->image && w->reference && w->seen && w->texture && w->scratch)
+    if (w->rgb && w->image && w->reference[0] && w->reference[1] && w->seen[0] && w->seen[1] && w->texture && w->scratch)
         return 0;
     release(w);
     return base_fail_nomem(err, "blocks of an image");
@@ -48,25 +50,57 @@ static void lightness_of(const struct pic_image *image, const struct ggn_remaini
     ggn_visible_lightness(rgb, n, lightness);
 }
 
-static void measure(const struct ggn_observer *observer, struct ggn_remaining *b, struct workspace *w, float *map,
-                    int stride)
+/* Mean of the sixth power of the error over a patch, from its blurred differences to two references. */
+static double sixth_moment(const float *g, const float *h, int width, const int patch[4])
 {
-    size_t n = (size_t)b->width * (size_t)b->height;
-    ggn_visible_texture(w->reference, w->reference, b->width, b->height, w->scratch, w->texture);
-    for (size_t i = 0; i < n; i++)
-        w->image[i] -= w->reference[i];
-    b->error = ggn_visible_noise(w->image, b->width, b->height, w->texture, w->scratch, map ? w->seen : NULL);
-    b->error /= observer->level;
+    double sum = 0.0;
+    for (int y = patch[1]; y < patch[3]; y++)
+        for (int x = patch[0]; x < patch[2]; x++) {
+            const size_t i = (size_t)y * (size_t)width + (size_t)x;
+            const double m = 0.5 * ((double)g[i] + (double)h[i]), d = 0.5 * ((double)g[i] - (double)h[i]), mm = m * m,
+                         dd = d * d;
+            sum += mm * mm * mm - 15.0 * mm * dd * (mm - dd) - dd * dd * dd;
+        }
+    return fmax(0.0, sum) / ((double)(patch[2] - patch[0]) * (patch[3] - patch[1]));
+}
+
+/* Visible error from the blurred differences in units of what texture hides. */
+static double between(const struct workspace *w, int width, int height)
+{
+    const size_t patches = ggn_visible_patches(width, height);
+    double sum = 0.0;
+    for (size_t k = 0; k < patches; k++) {
+        int patch[4];
+        ggn_visible_patch(width, height, k, w->texture, patch);
+        sum += cbrt(sixth_moment(w->seen[0], w->seen[1], width, patch));
+    }
+    return sqrt(sum / (double)patches);
+}
+
+/* second: whether there is one. */
+static void measure(const struct ggn_observer *observer, struct ggn_remaining *b, int second, struct workspace *w,
+                    float *map, int stride)
+{
+    const size_t n = (size_t)b->width * (size_t)b->height;
+    ggn_visible_texture(w->reference[0], w->reference[second], b->width, b->height, w->scratch, w->texture);
+    for (int k = 0; k <= second; k++) {
+        for (size_t i = 0; i < n; i++)
+            w->reference[k][i] = w->image[i] - w->reference[k][i];
+        b->error = ggn_visible_noise(w->reference[k], b->width, b->height, w->texture, w->scratch, w->seen[k]);
+    }
+    b->error = (second ? between(w, b->width, b->height) : b->error) / observer->level;
     for (int y = 0; map && y < b->height; y++)
-        for (int x = 0; x < b->width; x++)
-            map[(size_t)(b->y + y) * (size_t)stride + (size_t)(b->x + x)] =
-                (float)(fabs((double)w->seen[(size_t)y * (size_t)b->width + (size_t)x]) / observer->level);
+        for (int x = 0; x < b->width; x++) {
+            const size_t i = (size_t)y * (size_t)b->width + (size_t)x;
+            const double seen = 0.5 * ((double)w->seen[0][i] + (double)w->seen[second][i]);
+            map[(size_t)(b->y + y) * (size_t)stride + (size_t)(b->x + x)] = (float)(fabs(seen) / observer->level);
+        }
 }
 
 int ggn_remaining_count(int width, int height, int block) { return ((width - 1) / block + 1) * ((height - 1) / block + 1); }
 
-int ggn_remaining(const struct ggn_observer *observer, const struct pic_image *reference, const struct pic_image *image,
-                  int block, struct ggn_remaining *blocks, float *map, struct base_err *err)
+int ggn_remaining(const struct ggn_observer *observer, const struct pic_image *const references[2],
+                  const struct pic_image *image, int block, struct ggn_remaining *blocks, float *map, struct base_err *err)
 {
     struct workspace w;
     int rc = init(&w, block < image->width ? block : image->width, block < image->height ? block : image->height, err);
@@ -76,9 +110,10 @@ int ggn_remaining(const struct ggn_observer *observer, const struct pic_image *r
         for (int x = 0; x < image->width; x += block, blocks++) {
             int right = image->width - x, below = image->height - y;
             *blocks = (struct ggn_remaining){x, y, block < right ? block : right, block < below ? block : below, 0.0};
-            lightness_of(reference, blocks, w.rgb, w.reference);
+            for (int k = 0; k < 2 && references[k]; k++)
+                lightness_of(references[k], blocks, w.rgb, w.reference[k]);
             lightness_of(image, blocks, w.rgb, w.image);
-            measure(observer, blocks, &w, map, image->width);
+            measure(observer, blocks, references[1] != NULL, &w, map, image->width);
         }
     release(&w);
     return 0;

@@ -1,5 +1,5 @@
 /*
- * A picture between the noisy and the denoised one: at each pixel alpha of the noisy, alpha = mse(F) / (mse(F) + var(M)),
+ * A picture between the noisy and the denoised one: at each pixel alpha of the noisy, alpha = mse(D) / (mse(D) + var(M)),
  * both pooled over the neighbourhood. Where the denoiser is right it is the denoised picture, where it is wrong the noisy
  * one; if the two errors were independent and known, no mixture would be better. Pure functions, thread-safe; the same bits
  * on every processor for the same inputs.

@@ -5,8 +5,7 @@
 /* Squares stay finite in float and in sums of it, whatever the pixels hold. */
 static const double MOST = 1e30;
 
-/* The derivative of L* by Y (CIE 15:2004), Y = 1 at white; goes on above it. */
-static double lightness_slope(double y)
+double lull_lightness_slope(double y)
 {
     const double knee = 216.0 / 24389.0;
     double root = cbrt(y > knee ? y : knee);
@@ -20,7 +19,7 @@ void lull_estimate_pixels(const struct lull_estimate_in *in, size_t n, const str
     const double split = in->share * (1.0 - in->share);
     for (size_t i = 0; i < n; i++) {
         const double a = (double)in->a[i], b = (double)in->b[i], fa = (double)in->fa[i], fb = (double)in->fb[i];
-        const double slope = lightness_slope(0.5 * (fa + fb)), unit = slope * slope;
+        const double slope = lull_lightness_slope(0.5 * (fa + fb)), unit = slope * slope;
         const double halves = (a - b) * (a - b), filtered = (fa - fb) * (fa - fb);
         const double crossed = 0.5 * ((fa - b) * (fa - b) + (fb - a) * (fb - a));
         out->denoised[i] = bounded(unit * (crossed - 0.5 * halves - 0.25 * filtered));

@@ -1,15 +1,16 @@
 /*
  * How wrong a denoised picture is, from two halves of the samples and no reference.
  *
- * A and B are the means of the halves, M that of all samples, F the denoiser. B is unbiased and independent of F(A), so
+ * A and B are the means of the halves, F the denoiser, D = (F(A) + F(B)) / 2 the picture. B is unbiased and independent of
+ * F(A), so
  *
  *     mse(F(A)) = E (F(A) - B)^2 - var(B),     var(B) from (A - B)^2
  *
- * holds with the denoiser's bias in it; likewise for F(B), and the two are averaged. F(M) has twice the samples: mse(F(M))
- * is taken as mse(F(half)) - var(F(half)) / 2, with var(F(half)) from (F(A) - F(B))^2 / 2, and never as less than
- * (F(A) - F(B))^2 / 4, by which the two halves already disagree. Differences of luminance count with the slope of L* at the
- * denoised value: L* itself of a noisy B would be biased. A single pixel's estimate is noise and often negative: pool, then
- * take the larger of the two. Pure functions, thread-safe.
+ * holds with the denoiser's bias in it; likewise for F(B). Then mse(D) is the mean of the two less (F(A) - F(B))^2 / 4,
+ * exactly, and never less than (F(A) - F(B))^2 / 4, by which the halves already disagree. Nothing so sharp can be said of F
+ * of all samples: it keeps bright specks that it removes from either half, where they stand out more. Differences of
+ * luminance count with the slope of L* at the denoised value: L* itself of a noisy B would be biased. A single pixel's
+ * estimate is noise and often negative: pool, then take the larger of the two. Pure functions, thread-safe.
  */
 #ifndef DENOISE_ESTIMATE_H
 #define DENOISE_ESTIMATE_H
@@ -23,10 +24,13 @@ struct lull_estimate_in { /* luminance, 1 = the display's white; [n]; finite */
 };
 
 struct lull_estimate { /* squares of L*; [n] each, the caller's */
-    float *denoised;   /* mse of F(M), unbiased; may be negative */
-    float *agreed;     /* (F(A) - F(B))^2 / 4: the pooled mse of F(M) is at least the pooled one of this */
-    float *noisy;      /* variance of M */
+    float *denoised;   /* mse of D, unbiased; may be negative */
+    float *agreed;     /* (F(A) - F(B))^2 / 4: the pooled mse of D is at least the pooled one of this */
+    float *noisy;      /* variance of the mean of all samples */
 };
+
+/* The derivative of L* by Y (CIE 15:2004), Y = 1 at white; goes on above it. */
+double lull_lightness_slope(double y);
 
 void lull_estimate_pixels(const struct lull_estimate_in *in, size_t n, const struct lull_estimate *out);
 

@@ -192,9 +192,11 @@ static int32_t make(struct picture *p, const struct lull_host_picture *out, stru
         code = weigh(p, weight, weight + p->pixels, err);
     if (code == LULL_OK) {
         each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), read_mean);
-        code = run(p, 1, err);
+        code = full ? run(p, 1, err) : LULL_OK;
     }
     if (code == LULL_OK) {
+        for (size_t i = 0; !full && i < 3 * p->pixels; i++)
+            p->clean[0][i] = 0.5f * p->clean[0][i] + 0.5f * p->clean[1][i];
         black_out(p, p->clean[0]);
         lull_blend(p->color[0], p->clean[0], weight, p->pixels, out->rgb);
         if (out->denoised)

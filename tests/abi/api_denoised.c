@@ -26,12 +26,12 @@ static double color[PIXELS][3], half[PIXELS][3], albedo[PIXELS][3];
 static char criteria[2048], stub[2048];
 static uint64_t state;
 
-/* Grey, with stripes of one pixel, and Gaussian noise whose deviation in the mean of all samples is sigma. */
+/* Grey, with stripes of three pixels, and Gaussian noise whose deviation in the mean of all samples is sigma. */
 static void make(double grey, double stripe, double sigma)
 {
     state = 5;
     for (int i = 0; i < PIXELS; i++) {
-        double truth = grey + (i % W % 2 ? stripe : -stripe), a = truth + sqrt(2) * sigma * splitmix_gauss(&state);
+        double truth = grey + (i % W % 6 < 3 ? stripe : -stripe), a = truth + sqrt(2) * sigma * splitmix_gauss(&state);
         double b = truth + sqrt(2) * sigma * splitmix_gauss(&state);
         for (int c = 0; c < 3; c++) {
             half[i][c] = a;
@@ -229,6 +229,39 @@ static void a_small_place(void **unused)
     end(&s);
 }
 
+/* One bright sample is in one half alone: what the mean shows of it counts, not half of what the half shows, L* being concave.
+ * 0.55 on 0.1 is 41.3 of L*, the kernel leaves 0.325 of it in the middle; half the halves' difference would be 31. */
+static void a_speck(void **unused)
+{
+    (void)unused;
+    struct session s;
+    make(0.1, 0, 0);
+    for (int c = 0; c < 3; c++)
+        color[20 * W + 20][c] = 0.55, half[20 * W + 20][c] = 1;
+    start(&s, "identity", "denoised");
+    answer(&s, 0, 64);
+    const double patch = 59 * 53, block = 117 * 105;
+    const double seen = 41.3 * 0.325 / sqrt(2) * pow(1.01 / patch, 1.0 / 6) / 2 / 0.261835 * (1 + 1.94 / sqrt(block));
+    assert_true(fabs(said_halves - seen) < 0.03 * seen);
+    end(&s);
+}
+
+/* A denoiser that blurs an edge is wrong there, on few of the pixels around. */
+static void an_edge(void **unused)
+{
+    (void)unused;
+    struct session s;
+    make(0.2, 0, 0.01);
+    for (int i = 0; i < PIXELS; i++)
+        for (int c = 0; c < 3 && i % W % 117 >= 60; c++)
+            color[i][c] += 0.1, half[i][c] += 0.1;
+    start(&s, "box", "denoised");
+    answer(&s, 0, 64);
+    printf("# figure edge: %.2f by halves, %.2f crossed\n", said_halves, said_crossed);
+    assert_true(said_crossed > 3);
+    end(&s);
+}
+
 /* Where the denoiser is wrong, the blend is the noisy picture: its error falls with the noise. */
 static void the_blend_is_no_worse_than_the_noise(void **unused)
 {
@@ -383,7 +416,8 @@ int main(void)
         return 1;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_looks_stop),    cmocka_unit_test(stripes_below_the_noise),
-        cmocka_unit_test(a_small_place),     cmocka_unit_test(the_blend_is_no_worse_than_the_noise),
+        cmocka_unit_test(a_small_place),     cmocka_unit_test(a_speck),
+        cmocka_unit_test(an_edge),           cmocka_unit_test(the_blend_is_no_worse_than_the_noise),
         cmocka_unit_test(hard_pixels),       cmocka_unit_test(sizes),
         cmocka_unit_test(failing_denoisers), cmocka_unit_test(no_library),
         cmocka_unit_test(warns_once),        cmocka_unit_test(neighbours),

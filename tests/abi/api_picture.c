@@ -140,6 +140,21 @@ static void blend_keeps_what_a_denoiser_removes(void **state)
     end(frame);
 }
 
+/* A speck of one sample is removed from its half, and would be kept in the mean of all, where it stands out less. */
+static void specks_are_removed_from_halves(void **state)
+{
+    (void)state;
+    const int at = 20 * W + 30;
+    render(0, flat);
+    for (int c = 0; c < 3; c++)
+        color[at][c] += 6, half[at][c] += 6; /* the half has 1.2, the mean 0.575 */
+    assert_int_equal(make("despeckle", 0, NULL), LULL_OK);
+    assert_true(clean[at][0] < 0.25f && rgb[at][0] < 0.25f);
+    assert_int_equal(make("despeckle", LULL_DENOISE_FULL, NULL), LULL_OK);
+    assert_true(clean[at][0] > 0.5f);
+    end(frame);
+}
+
 static void every_pixel_is_the_blend(void **state)
 {
     (void)state;
@@ -234,6 +249,7 @@ int main(void)
     char path[2048];
     const struct CMUnitTest tests[] = {cmocka_unit_test(blend_trusts_a_denoiser_that_is_right),
                                        cmocka_unit_test(blend_keeps_what_a_denoiser_removes),
+                                       cmocka_unit_test(specks_are_removed_from_halves),
                                        cmocka_unit_test(every_pixel_is_the_blend),
                                        cmocka_unit_test(full_is_the_denoised_picture),
                                        cmocka_unit_test(auxiliary_planes),

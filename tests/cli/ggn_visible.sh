@@ -30,8 +30,11 @@ $ggn visible "$tmp/clean.png" "$tmp/noisy.png" -b 40 --json >"$tmp/out" 2>"$tmp/
     python3 -c "import json, sys; r = json.load(open(sys.argv[1])); b = r['blocks']
 assert r['visible'] == 1 and len(b) == 2 and b[0]['error'] == 0 == b[0]['viewers'] and b[1]['error'] == r['worst'] > 2 and b[1]['x'] == 40" "$tmp/out"
 check "JSON" $?
+$ggn visible "$tmp/noisy.png" "$tmp/clean.png" --second "$tmp/clean.png" >"$tmp/out" 2>"$tmp/err" && grep -q ' 0.000 of what' "$tmp/out"
+check "noise of one reference alone is none of the image's" $?
 oiiotool --pattern constant:color=.5,.5,.5 80x30 3 -d uint8 -o "$tmp/small.png" >/dev/null 2>&1
 fails "sizes differ" 'small.png is 80x30: the sizes must be equal' $ggn visible "$tmp/clean.png" "$tmp/small.png"
+fails "a second reference of another size" 'small.png is 80x30' $ggn visible "$tmp/clean.png" "$tmp/clean.png" --second "$tmp/small.png"
 fails "no image" 'none.png' $ggn visible "$tmp/clean.png" "$tmp/none.png"
 head -c 60 "$tmp/clean.png" >"$tmp/cut.png"
 fails "a truncated image" 'cut.png' $ggn visible "$tmp/cut.png" "$tmp/clean.png"

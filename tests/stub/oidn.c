@@ -4,7 +4,7 @@
  *
  *     identity (also if not set), box (mean of 5x5 pixels), constant (0.5), nan (every third value), version (3.0.1),
  *     no-device, commit (fails when a filter is committed), crash (there), memory (fails when one is executed), endless,
- *     auxiliary (albedo + normal)
+ *     auxiliary (albedo + normal), despeckle (the box where a value is more than four times its mean)
  *
  * It also refuses what the real library would take in silence and get wrong: pictures that are not finite, no inputScale.
  */
@@ -16,10 +16,24 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { IDENTITY, BOX, CONSTANT, BAD_NUMBERS, VERSION, NO_DEVICE, COMMIT, MEMORY, ENDLESS, CRASH, AUXILIARY, KINDS };
+enum {
+    IDENTITY,
+    BOX,
+    CONSTANT,
+    BAD_NUMBERS,
+    VERSION,
+    NO_DEVICE,
+    COMMIT,
+    MEMORY,
+    ENDLESS,
+    CRASH,
+    AUXILIARY,
+    DESPECKLE,
+    KINDS
+};
 enum { INVALID_ARGUMENT = 2, INVALID_OPERATION = 3, OUT_OF_MEMORY = 4 };
-static const char *const kinds[KINDS] = {"identity", "box",    "constant", "nan",   "version",  "no-device",
-                                         "commit",   "memory", "endless",  "crash", "auxiliary"};
+static const char *const kinds[KINDS] = {"identity", "box",    "constant", "nan",   "version",   "no-device",
+                                         "commit",   "memory", "endless",  "crash", "auxiliary", "despeckle"};
 
 struct device {
     int kind, error;
@@ -181,6 +195,12 @@ static float mean_at(const struct image *i, size_t x, size_t y, size_t c)
     return sum / count;
 }
 
+static float despeckled_at(const struct image *i, size_t k, size_t x, size_t y, size_t c)
+{
+    const float mean = mean_at(i, x, y, c);
+    return i->data[k] > 4.0f * mean ? mean : i->data[k];
+}
+
 static float value_of(const struct image *i, size_t k) { return i->data ? i->data[k] : 0.0f; }
 
 void oidnExecuteFilter(void *filter)
@@ -200,6 +220,7 @@ void oidnExecuteFilter(void *filter)
                 f->output.data[k] = kind == BOX                         ? mean_at(in, x, y, c)
                                     : kind == CONSTANT                  ? 0.5f
                                     : kind == BAD_NUMBERS && k % 3 == 0 ? NAN
+                                    : kind == DESPECKLE                 ? despeckled_at(in, k, x, y, c)
                                     : kind == AUXILIARY                 ? value_of(&f->albedo, k) + value_of(&f->normal, k)
                                                                         : in->data[k];
 }

@@ -11,6 +11,7 @@
 #include "support/ggn_near.h"
 #include "support/ggn_noise.h"
 #include "support/ggn_observer_block.h"
+#include "support/splitmix.h"
 
 #include "base/files.h"
 #include "observer/remaining.h"
@@ -129,7 +130,8 @@ static void remaining_noise(void **state)
     struct pic_image reference = {.width = WIDTH, .height = HEIGHT, .channels = 3, .u8 = codes[0]}, image = reference;
     image.u8 = codes[1];
     assert_int_equal(ggn_remaining_count(WIDTH, HEIGHT, BLOCK), COUNT);
-    assert_int_equal(ggn_remaining(&ggn_observer_default, &reference, &image, BLOCK, blocks, map, &err), 0);
+    const struct pic_image *const references[2] = {&reference};
+    assert_int_equal(ggn_remaining(&ggn_observer_default, references, &image, BLOCK, blocks, map, &err), 0);
     for (int k = 0; k < COUNT; k++) {
         const struct ggn_remaining *b = blocks + k;
         int x0 = k % 3 * BLOCK, y0 = k / 3 * BLOCK, w = k % 3 == 2 ? 11 : BLOCK, h = k / 3 ? 18 : BLOCK;
@@ -147,6 +149,32 @@ static void remaining_noise(void **state)
         assert_near(pow(sixth, 1.0 / 6.0), b->error, 1e-4);
         assert_true(k < 3 ? b->error == 0.0 : b->error > 0.1);
     }
+}
+
+/* Two noisy references say what a clean one says: of an image with an error of its own, and of one without. */
+static void two_references(void **state)
+{
+    (void)state;
+    enum { WIDTH = 200, HEIGHT = 200, SIZE = WIDTH * HEIGHT };
+    static uint8_t codes[5][SIZE * 3];
+    struct pic_image image[5];
+    struct ggn_remaining got[2], none;
+    struct base_err err = {0};
+    uint64_t random = 9;
+    for (int i = 0; i < SIZE; i++) {
+        const double noise[5] = {0, splitmix_gauss(&random), splitmix_gauss(&random), splitmix_gauss(&random), 0};
+        for (int k = 0; k < 5; k++)
+            for (int c = 0; c < 3; c++)
+                codes[k][3 * i + c] = (uint8_t)(128.5 + 2 * noise[k]);
+    }
+    for (int k = 0; k < 5; k++)
+        image[k] = (struct pic_image){.width = WIDTH, .height = HEIGHT, .channels = 3, .u8 = codes[k]};
+    const struct pic_image *const clean[2] = {&image[0]}, *const two[2] = {&image[1], &image[2]};
+    assert_int_equal(ggn_remaining(&ggn_observer_default, clean, &image[3], WIDTH, &got[0], NULL, &err), 0);
+    assert_int_equal(ggn_remaining(&ggn_observer_default, two, &image[3], WIDTH, &got[1], NULL, &err), 0);
+    assert_int_equal(ggn_remaining(&ggn_observer_default, two, &image[4], WIDTH, &none, NULL, &err), 0);
+    assert_near(got[1].error / got[0].error, 1.0, 0.06);
+    assert_true(none.error < 0.4 * got[0].error);
 }
 
 static void kernel(void **state)
@@ -258,8 +286,9 @@ static void laws(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lightness), cmocka_unit_test(kernel), cmocka_unit_test(remaining_noise),
-        cmocka_unit_test(apart),     cmocka_unit_test(people), cmocka_unit_test(laws),
+        cmocka_unit_test(lightness),      cmocka_unit_test(kernel), cmocka_unit_test(remaining_noise),
+        cmocka_unit_test(two_references), cmocka_unit_test(apart),  cmocka_unit_test(people),
+        cmocka_unit_test(laws),
     };
     return cmocka_run_group_tests_name("observer kernel", tests, NULL, NULL);
 }

@@ -7,7 +7,9 @@
 #include "sequence/simulate.h"
 
 enum { HALF_A, HALF_B, ALBEDO, NORMAL, DENOISED_A, DENOISED_B, BOXES };
-enum { TILE = 25 };
+enum { TILE = 25, STRATA = 7 };
+
+static const double GAUSSIAN = 15.0; /* sixth moment of a normal distribution over the cube of its second */
 
 /* --- memory ------------------------------------------------------------------------------------------------------------ */
 
@@ -45,7 +47,7 @@ int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form,
 {
     const size_t pixels = (size_t)form->width * (size_t)form->height;
     const size_t patches = ggn_visible_patches(form->width, form->height);
-    const size_t box = 3 * (size_t)form->box.width * (size_t)form->box.height, planes = 3 + 4 + 4 + 7;
+    const size_t box = 3 * (size_t)form->box.width * (size_t)form->box.height, planes = 3 + 4 + 2 + 7;
     const size_t doubles = patches + ggn_visibility_scratch(form->width);
     struct gd_block_view l = {0};
     if (box > PTRDIFF_MAX / 64 / sizeof(double) || form->area.x1 > INT32_MAX / 2 || form->area.y1 > INT32_MAX / 2)
@@ -60,9 +62,8 @@ int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form,
         l.box[i] = at;
     l.rgb = at;
     at += 3 * pixels;
-    float **const maps[] = {&l.light[0],     &l.light[1],     &l.light[2],     &l.light[3], &l.lightness[0],
-                            &l.lightness[1], &l.lightness[2], &l.lightness[3], &l.maps[0],  &l.maps[1],
-                            &l.maps[2],      &l.crossed,      &l.agreed,       &l.scratch,  &l.alpha};
+    float **const maps[] = {&l.light[0], &l.light[1], &l.light[2], &l.light[3], &l.lightness[0], &l.lightness[1], &l.edges,
+                            &l.slope,    &l.crossed,  &l.blurred,  &l.apart,    &l.scratch,      &l.alpha};
     for (size_t i = 0; i < sizeof maps / sizeof maps[0]; i++, at += pixels)
         *maps[i] = at;
     int rc = lull_oidn_open(library, &l.oidn, err);
@@ -213,60 +214,82 @@ int gd_block_view_structure(const struct gd_block_view *seen, const struct gd_fo
 
 /* --- judging ----------------------------------------------------------------------------------------------------------- */
 
+/* Over [x0, x1) x [y0, y1), of visible errors in units of what texture hides: pixels, sums of the crossed square and of its
+ * square, of the second and sixth power of the halves' difference. */
 struct sums {
-    double n, q, square, agreed;
+    double n, q, qq, second, sixth;
 };
 
-/* Squares of visible error, in units of what texture hides, over [x0, x1) x [y0, y1). unit: of the denoised part. */
-static struct sums sum_over(const struct gd_block_view *l, const float *raw, int width, const int r[4], double unit)
+static void add(struct sums *s, const struct gd_block_view *l, size_t i)
 {
-    struct sums s = {0};
-    for (int y = r[1]; y < r[3]; y++)
-        for (int x = r[0]; x < r[2]; x++) {
-            const size_t i = (size_t)y * (size_t)width + (size_t)x;
-            const double alpha = (double)l->alpha[i], noise = alpha * alpha * (double)raw[i] * (double)raw[i];
-            const double rest = (1.0 - alpha) * (1.0 - alpha) * unit, q = rest * (double)l->crossed[i] + noise;
-            s.n += 1.0;
-            s.q += q;
-            s.square += q * q;
-            s.agreed += rest * (double)l->agreed[i] + noise;
-        }
-    return s;
+    const double q = (double)l->crossed[i], h = (double)l->apart[i] * (double)l->apart[i];
+    s->n += 1.0;
+    s->q += q;
+    s->qq += q * q;
+    s->second += h;
+    s->sixth += h * h * h;
 }
 
+/* Of the mean crossed square. Blurred pixels are not independent: about a third of them are. */
 static double standard_error(const struct sums *s)
 {
     const double mean = s->q / s->n;
-    return s->n > 1.0 ? sqrt(fmax(0.0, s->square / s->n - mean * mean) / s->n) : fabs(mean);
+    return s->n > 3.0 ? sqrt(3.0 * fmax(0.0, s->qq / s->n - mean * mean) / s->n) : fabs(mean);
 }
 
 static double cube(double v) { return v > 0.0 ? v * v * v : 0.0; }
 
-/* Mean of sixth powers of the error over a patch, for errors that are Gaussian inside it or inside its tiles. */
-static double sixth_moment(const struct gd_block_view *l, const float *raw, int width, const int patch[4], double unit)
+/* Sum of sixth powers of errors that are Gaussian, so many standard errors below what was found. */
+static double sixth_of(const struct sums *s, double less)
 {
-    struct sums whole = {0};
-    double tiles = 0.0;
-    for (int y = patch[1]; y < patch[3]; y += TILE)
-        for (int x = patch[0]; x < patch[2]; x += TILE) {
-            const int tile[4] = {x, y, least(x + TILE, patch[2]), least(y + TILE, patch[3])};
-            const struct sums s = sum_over(l, raw, width, tile, unit);
-            whole.n += s.n, whole.q += s.q, whole.square += s.square, whole.agreed += s.agreed;
-            tiles += s.n * cube(s.q / s.n - 2.0 * standard_error(&s));
-        }
-    const double safe = fmax(whole.q / whole.n + standard_error(&whole), whole.agreed / whole.n);
-    return 15.0 * fmax(cube(safe), tiles / whole.n);
+    return GAUSSIAN * s->n * cube(s->q / s->n - less * standard_error(s));
 }
 
-/* raw: noise of the mean as the observer sees it, in units of what texture hides. */
-static double crossed_error(const struct gd_block_view *l, const float *raw, int width, int height)
+/* Strength of the edge at a pixel of the denoised picture, in octaves of L*: 0 for less than one. */
+static int edge(const struct gd_block_view *l, int width, int height, int x, int y)
+{
+    const float *row = l->edges + (size_t)y * (size_t)width;
+    const int left = x > 0 ? x - 1 : 0, right = least(x + 1, width - 1);
+    const float *above = y > 0 ? row - width : row, *below = y + 1 < height ? row + width : row;
+    double step = fabs((double)(row[right] - row[left])) + fabs((double)(below[x] - above[x]));
+    int octave = 0;
+    for (; step >= 1.0 && octave + 1 < STRATA; step *= 0.5)
+        octave++;
+    return octave;
+}
+
+/* Mean of sixth powers of the error over a patch. */
+static double sixth_moment(const struct gd_block_view *l, int width, int height, const int patch[4])
+{
+    struct sums whole = {0}, strata[STRATA] = {{0}};
+    double tiles = 0.0, edges = 0.0;
+    for (int top = patch[1]; top < patch[3]; top += TILE)
+        for (int left = patch[0]; left < patch[2]; left += TILE) {
+            struct sums tile = {0};
+            for (int y = top; y < least(top + TILE, patch[3]); y++)
+                for (int x = left; x < least(left + TILE, patch[2]); x++) {
+                    const size_t i = (size_t)y * (size_t)width + (size_t)x;
+                    add(&whole, l, i);
+                    add(&tile, l, i);
+                    add(&strata[edge(l, width, height, x, y)], l, i);
+                }
+            tiles += sixth_of(&tile, 2.0);
+        }
+    for (int k = 0; k < STRATA; k++)
+        edges += strata[k].n > 0.0 ? sixth_of(&strata[k], 1.0) : 0.0;
+    const double halves = whole.second / whole.n, shape = halves > 0.0 ? whole.sixth / whole.n / cube(halves) : 0.0;
+    const double square = fmax(whole.q / whole.n + standard_error(&whole), halves);
+    return fmax(fmax(GAUSSIAN, shape) * cube(square), fmax(tiles, edges) / whole.n);
+}
+
+static double crossed_error(const struct gd_block_view *l, int width, int height)
 {
     const size_t patches = ggn_visible_patches(width, height);
     double sum = 0.0;
     for (size_t k = 0; k < patches; k++) {
         int patch[4];
-        const double hidden = ggn_visible_patch(width, height, k, l->texture, patch);
-        sum += cbrt(sixth_moment(l, raw, width, patch, 1.0 / hidden)); /* the square of what is seen */
+        ggn_visible_patch(width, height, k, l->texture, patch);
+        sum += cbrt(sixth_moment(l, width, height, patch)); /* the square of what is seen */
     }
     return sqrt(sum / (double)patches);
 }
@@ -287,6 +310,66 @@ static int denoise(struct gd_block_view *seen, const struct lull_kit *kit)
     return lull_oidn_run(seen->oidn, &p, host && host->cancelled ? cancelled : NULL, &host, &seen->err);
 }
 
+/* Where pixel i of the block lies in a box. */
+static float *pixel_of(struct gd_block_view *l, int which, struct lull_rect box, const struct lull_block *b, size_t i)
+{
+    const size_t width = (size_t)(b->x1 - b->x0), x = i % width, y = i / width;
+    return l->box[which] + 3 * ((y + (size_t)(b->y0 - box.y0)) * (size_t)(box.x1 - box.x0) + x + (size_t)(b->x0 - box.x0));
+}
+
+/* Each denoised half becomes that of the picture that is kept. */
+static void keep(struct gd_block_view *l, struct lull_rect box, const struct lull_block *b, size_t pixels)
+{
+    for (size_t i = 0; i < pixels; i++)
+        for (int k = 0; k < 2; k++)
+            lull_blend(pixel_of(l, HALF_A + k, box, b, i), pixel_of(l, DENOISED_A + k, box, b, i), &l->alpha[i], 1,
+                       pixel_of(l, DENOISED_A + k, box, b, i));
+}
+
+/* How far apart the kept halves are, at the strength of the mean: L* of the mean less that of the darker half. A speck that
+ * one sample made is in one half alone; half the difference of L* of the halves would be too little, L* being concave. */
+static void tell_apart(struct gd_block_view *l, struct lull_rect box, const struct lull_block *b, const struct lull_kit *kit,
+                       size_t pixels, double split)
+{
+    for (size_t i = 0; i < pixels; i++) {
+        const int darker = l->light[2][i] > l->light[3][i];
+        const float *low = pixel_of(l, DENOISED_A + darker, box, b, i);
+        float *high = pixel_of(l, DENOISED_A + !darker, box, b, i);
+        for (int c = 0; c < 3; c++)
+            high[c] = (float)((1.0 - split) * (double)low[c] + split * (double)high[c]);
+    }
+    float *shown[2] = {l->lightness[0], l->lightness[1]};
+    for (int k = 0; k < 2; k++)
+        show(l, DENOISED_A + k, box, b, kit, l->scratch, shown[k]);
+    for (size_t i = 0; i < pixels; i++)
+        l->apart[i] = l->lightness[0][i] - l->lightness[1][i];
+}
+
+/* The difference of two pictures in luminance times the slope of L*, blurred as the eye does. */
+static void difference(struct gd_block_view *l, int first, int second, int width, int height, float *to)
+{
+    for (size_t i = 0; i < (size_t)width * (size_t)height; i++)
+        l->scratch[i] = l->slope[i] * (l->light[first][i] - l->light[second][i]);
+    ggn_visible_noise(l->scratch, width, height, l->texture, l->rows, to);
+}
+
+/* crossed: mse of what is kept of all samples, estimate.h's formula of blurred differences. light: A, B, and the kept
+ * halves. */
+static void cross(struct gd_block_view *l, int width, int height)
+{
+    static const struct {
+        int first, second;
+        float weight;
+    } terms[] = {{2, 1, 0.5f}, {3, 0, 0.5f}, {0, 1, -0.5f}, {2, 3, -0.25f}};
+    const size_t pixels = (size_t)width * (size_t)height;
+    memset(l->crossed, 0, pixels * sizeof *l->crossed);
+    for (size_t k = 0; k < sizeof terms / sizeof terms[0]; k++) {
+        difference(l, terms[k].first, terms[k].second, width, height, l->blurred);
+        for (size_t i = 0; i < pixels; i++)
+            l->crossed[i] += terms[k].weight * l->blurred[i] * l->blurred[i];
+    }
+}
+
 int gd_block_view_errors(struct gd_block_view *l, const struct gd_form *form, const struct lull_kit *kit,
                          const struct lull_block *b, int blend, struct gd_errors *errors)
 {
@@ -295,30 +378,32 @@ int gd_block_view_errors(struct gd_block_view *l, const struct gd_form *form, co
     const int width = b->x1 - b->x0, height = b->y1 - b->y0;
     const size_t pixels = (size_t)lull_kit_pixels(b);
     const double n = (double)b->spp, h = (double)b->half_spp;
-    const float split = (float)(0.5 * seq_half_scale(n, h)); /* to noise as strong as the mean's */
-    const struct lull_estimate estimate = {l->maps[0], l->maps[1], l->maps[2]};
+    const double split = 0.5 * seq_half_scale(n, h); /* to noise as strong as the mean's */
+    const struct lull_estimate estimate = {l->slope, l->crossed, l->blurred};
 
     l->err = (struct base_err){0};
     if (denoise(l, kit))
         return l->err.code;
     for (size_t k = 0; k < 4; k++)
-        show(l, shown[k], box, b, kit, l->light[k], l->lightness[k]);
+        show(l, shown[k], box, b, kit, l->light[k], l->lightness[k % 2]);
+    ggn_visible_texture(l->lightness[0], l->lightness[1], width, height, l->rows, l->texture);
     struct lull_estimate_in in = {l->light[0], l->light[1], l->light[2], l->light[3], h / n};
     lull_estimate_pixels(&in, pixels, &estimate);
-    memcpy(l->crossed, estimate.denoised, pixels * sizeof *l->crossed);
-    memcpy(l->agreed, estimate.agreed, pixels * sizeof *l->agreed);
     lull_blend_weights(&estimate, width, height, l->scratch, l->alpha);
     if (!blend)
         memset(l->alpha, 0, pixels * sizeof *l->alpha);
 
-    ggn_visible_texture(l->lightness[2], l->lightness[3], width, height, l->rows, l->texture);
     for (size_t i = 0; i < pixels; i++) {
-        const float raw = split * (l->lightness[0][i] - l->lightness[1][i]);
-        l->lightness[0][i] = raw;
-        l->lightness[2][i] = l->alpha[i] * raw + (1.0f - l->alpha[i]) * 0.5f * (l->lightness[2][i] - l->lightness[3][i]);
+        l->slope[i] = (float)lull_lightness_slope(0.5 * ((double)l->light[2][i] + (double)l->light[3][i]));
+        l->edges[i] = 0.5f * (l->lightness[0][i] + l->lightness[1][i]);
     }
-    errors->halves = ggn_visible_noise(l->lightness[2], width, height, l->texture, l->rows, NULL);
-    ggn_visible_noise(l->lightness[0], width, height, l->texture, l->rows, l->lightness[1]);
-    errors->crossed = crossed_error(l, l->lightness[1], width, height);
+    keep(l, box, b, pixels);
+    for (size_t k = 2; k < 4; k++)
+        show(l, shown[k], box, b, kit, l->light[k], l->lightness[0]);
+    cross(l, width, height);
+    tell_apart(l, box, b, kit, pixels, split);
+    errors->halves = ggn_visible_noise(l->apart, width, height, l->texture, l->rows, l->scratch);
+    memcpy(l->apart, l->scratch, pixels * sizeof *l->apart);
+    errors->crossed = crossed_error(l, width, height);
     return 0;
 }

@@ -3,16 +3,17 @@
  * and two estimates say how visible the error is of the picture that will be kept (denoise/estimate.h,
  * model/visibility.h).
  *
- * The picture that is kept lies between the mean M of all samples and its denoised form F(M), M with the weight alpha of
- * denoise/blend.h, or F(M) alone.
+ * The picture that is kept is the mean of two, P(A) and P(B), each of one half: alpha of the noisy half, the rest of the
+ * denoised one (denoise/blend.h); alpha is 0 where the denoised picture alone is kept. Both estimates are of what the eye is
+ * left with after the observer's blur, over what texture hides:
  *
- * - halves: the difference of the two denoised halves. Bias, which they share, is not in it.
- * - crossed: the difference of each denoised half from the other, noisy one. Bias is in it. It is noise itself, so it is
- *   averaged twice, and the larger result counts:
- *   - over each patch of the observer, with one standard error more, so that luck stops nothing;
- *   - over tiles of 25 px, with two standard errors less, so that a small place where the denoiser fails counts where it is
- *     beyond doubt.
- *   Errors are taken as Gaussian inside: a sixth moment is 15 cubes of the mean square.
+ * - halves: how far P(A) and P(B) are apart. Bias, which they share, is not in it.
+ * - crossed: how far each is from the other, noisy half (estimate.h's formula, P in the place of F). Bias is in it. The
+ *   observer asks for the mean of sixth powers over each of its patches; the largest of three estimates counts:
+ *   - the mean square with one standard error more, so that luck stops nothing, and never below that of the halves; errors
+ *     as uneven as the halves' difference, and at least Gaussian (15 cubes of the mean square);
+ *   - over tiles of 25 px, with two standard errors less: a small place where the denoiser fails, beyond doubt;
+ *   - over the edges of each octave of strength, with one less: there denoisers err most.
  *
  * One struct gd_block_view per worker; nothing is allocated after gd_block_view_create.
  */
@@ -40,13 +41,14 @@ struct gd_block_view {
     struct lull_oidn *oidn;
     float *box[6];       /* [box][3]: half A, half B, albedo, normal, denoised A, denoised B */
     float *rgb;          /* [3][P], displayed light */
-    float *light[4];     /* [P]: displayed luminance of A, B and both denoised */
-    float *lightness[4]; /* [P]: L* of the same */
-    float *maps[3], *crossed, *agreed, *scratch, *alpha; /* [P] */
-    double *texture;                                     /* [patches] */
-    double *rows;                                        /* scratch of model/visibility.h */
-    void *memory;                                        /* owns all of the above but oidn */
-    struct base_err err;                                 /* of the last call that failed */
+    float *light[4];     /* [P]: displayed luminance of A, B and both denoised, later both kept */
+    float *lightness[2]; /* [P]: L* of a pair */
+    float *edges;        /* [P]: L* of the denoised picture */
+    float *slope, *crossed, *blurred, *apart, *scratch, *alpha; /* [P] */
+    double *texture;                                            /* [patches] */
+    double *rows;                                               /* scratch of model/visibility.h */
+    void *memory;                                               /* owns all of the above but oidn */
+    struct base_err err;                                        /* of the last call that failed */
 };
 
 /* frame: checked. quality: of struct lull_oidn_form. */

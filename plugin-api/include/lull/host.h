@@ -447,14 +447,16 @@ struct lull_host_picture {
     uint32_t struct_size;
     uint32_t zero;
     float *rgb;      /* [height][width][3]: what is kept */
-    float *denoised; /* [height][width][3]; may be NULL */
+    float *denoised; /* [height][width][3]: for the blend the mean of the denoised halves; may be NULL */
     float *weight;   /* [height][width], in [0, 1]: share of the noisy picture in rgb; may be NULL */
 };
 
 /* Denoises the picture of a frame at any moment, by Open Image Denoise in a process of its own; with the planes ALBEDO and
- * NORMAL, if the view has them. The blend weighs the two pictures at each pixel by their errors, which it estimates from the
- * halves; where there are none it is the denoised picture. Pixels without samples are black. LULL_E_INVALID: no library, one
- * that fails, or a view that lacks a plane; out is undefined then. Takes 170 bytes a pixel, the denoiser some 600 more. */
+ * NORMAL, if the view has them. For the blend, each half of the samples is denoised by itself and the two are averaged:
+ * their difference then tells the error of just this picture, by which the blend weighs it against the noisy one at each
+ * pixel; where there are no halves it is the denoised picture. Pixels without samples are black. LULL_E_INVALID: no library,
+ * one that fails, or a view that lacks a plane; out is undefined then. Takes 170 bytes a pixel, the denoiser some 600
+ * more. */
 LULL_EXPORT int32_t lull_host_denoise(const struct lull_host_frame *frame, const struct lull_host_view *view,
                                       const struct lull_host_denoising *how, const struct lull_host_picture *out,
                                       struct lull_error *err);
