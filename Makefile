@@ -124,7 +124,7 @@ REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
 FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install uninstall deb wheel man compdb clean help setup tests test-tools replay train-demo test-study test-hosts test-packages test-clang
+.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install uninstall deb wheel blender man compdb clean help setup tests test-tools replay train-demo test-study test-hosts test-packages test-clang
 .SECONDARY:
 
 all: $(PROGRAMS) $(CRITERIA) $(MODULES) $(HOST_LIB) $(EXAMPLES) ## build the programs and the criteria
@@ -380,6 +380,8 @@ uninstall: ## remove what install put under $(DESTDIR)$(PREFIX)
 
 wheel: $(BUNDLED) ## make the Python package with host library, criteria and model in build/wheel
 	@scripts/packages/bundle wheel
+blender: $(BUNDLED) ## make the add-on for Blender 3.4, which is an extension for 4.2 and later, in build/blender
+	@scripts/packages/bundle blender
 deb: all ## make the Debian packages lull, liblull-host1 and lull-dev in build/deb (needs debhelper)
 	@scripts/packages/deb
 

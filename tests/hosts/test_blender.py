@@ -18,7 +18,7 @@ from lull import Rect, exr  # noqa: E402
 from lull.blender import ui, view  # noqa: E402
 from lull.blender.cycles import Cycles, HostError, merge  # noqa: E402
 from lull.blender.session import Session, Settings  # noqa: E402
-from tap import Skip, raises  # noqa: E402
+from tap import raises  # noqa: E402
 
 
 def test_pattern():
@@ -276,10 +276,7 @@ def brightest(name):
 
 
 def test_addon():
-    """the package is an add-on: it installs from a zip, its operator renders, its panel is there"""
-    if not bpy.app.background or not hasattr(bpy.ops.preferences, "addon_install"):
-        raise Skip("no preferences")
-    subprocess.run([ROOT / "scripts/hosts/blender-addon", tmp("lull.zip")], check=True)
+    """the package is an add-on: its operator renders, its panel is there"""
     scene = cube()
     lull.register()
     try:
@@ -334,12 +331,6 @@ def test_addon():
                 assert wanted in str(error), error
     finally:
         lull.unregister()
-    code = ("import bpy; bpy.ops.preferences.addon_install(filepath=%r); bpy.ops.preferences.addon_enable(module='lull'); "
-            "print('ADDON', hasattr(bpy.types.Scene, 'lull'))" % tmp("lull.zip"))
-    if bpy.app.binary_path:
-        out = subprocess.run([bpy.app.binary_path, "-b", "--factory-startup", "-noaudio", "--python-expr", code], text=True,
-                             env={**os.environ, "BLENDER_USER_SCRIPTS": TMP.name}, capture_output=True).stdout
-        assert "ADDON True" in out, out
 
 
 tap.main(dict(globals()))

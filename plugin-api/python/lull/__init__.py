@@ -33,7 +33,7 @@ __all__ = ["Block", "Criterion", "Denoised", "Driver", "Frame", "HostFrame", "In
            "Rect", "Result", "criteria", "denoise", "find", "load"]
 __version__ = "1.0"
 
-# The package is a Blender add-on too: scripts/hosts/blender-addon packs it.
+# The package is a Blender add-on too: make blender packs it.
 bl_info = {"name": "Lull", "author": "Lull", "version": (1, 0), "blender": (3, 4, 0), "category": "Render",
            "location": "Render Properties > Lull", "support": "COMMUNITY",
            "description": "Cycles stops each block when its noise can no longer be seen"}
