@@ -40,7 +40,8 @@ def adaptive(scene, threshold, spp, path):
     render.filepath, render.use_file_extension, render.use_border = path, False, False
     bpy.ops.render.render(write_still=True)
     try:
-        return exr.read(path)[0]
+        channels, _ = exr.read(path)
+        return np.stack([channels[c] for c in "RGB"], -1)
     finally:
         os.unlink(path)
 

@@ -93,7 +93,7 @@ def saved(scene, name):
 def layers(path):
     """The channels of an EXR of ours, [h, w] float32."""
     subprocess.run(["oiiotool", path, "--compression", "none", "-o", tmp("layers.exr")], check=True)
-    return exr.read_layers(tmp("layers.exr"))[0]
+    return exr.read(tmp("layers.exr"))[0]
 
 
 def start(*arguments, **environment):

@@ -224,7 +224,7 @@ def test_denoise():
         scene.view_layers[0].cycles.denoising_store_passes = True
         settings = Settings("fixed", {"spp": "16"}, spp_max=16, block=24, denoise="full", output=tmp("full.exr"))
         with Session(scene, settings) as session:
-            result = session.run()
+            result = session.driver.run()
             assert result.outcome == "done" and session.write(result)[1] == []
         seen = layers(tmp("full.exr"))
         passes = [[seen[f"ViewLayer.Denoising {name}"] for name in names] for names in
@@ -250,7 +250,7 @@ def test_really_denoised():
     truth = one_render(scene, 2048)
     with tap.denoiser("real", "build"):
         with Session(scene, Settings("fixed", {"spp": "16"}, spp_max=16, block=32, denoise="blend", output=tmp("r.exr"))) as session:
-            assert session.write(session.run())[1] == []
+            assert session.write(session.driver.run())[1] == []
             noisy, kept = (np.sqrt(((p - truth) ** 2).mean()) for p in (session.frame.mean(), session.denoised.picture))
     assert kept < .7 * noisy, (kept, noisy)
 

@@ -47,13 +47,13 @@ def run(criterion="halfbuf", sigmas=SIGMAS, parameters=None, host=None, driver=N
 def grey_levels(path):
     """[height, width] of a PNG, the mean of its codes."""
     subprocess.run(["oiiotool", path, "--ch", "R,G,B", "-d", "float", "--compression", "none", "-o", tmp("grey.exr")], check=True)
-    return 255 * exr.read(tmp("grey.exr"))[0].mean(-1)
+    return 255 * np.mean([exr.read(tmp("grey.exr"))[0][c] for c in "RGB"], 0)
 
 
 def uncompressed(path):
     """An EXR's channels, [h, w] float32."""
     subprocess.run(["oiiotool", path, "--compression", "none", "-o", tmp("plain.exr")], check=True)
-    return exr.read_layers(tmp("plain.exr"))[0]
+    return exr.read(tmp("plain.exr"))[0]
 
 
 def test_layout():
@@ -570,12 +570,11 @@ def test_exr():
     info = subprocess.run(["oiiotool", "--info", "-v", tmp("a.exr")], text=True, capture_output=True, check=True).stdout
     assert "100 x 90" in info and "pixel data origin: x=5, y=6" in info and "lull:block" in info and "lull.spp" in info, info
     subprocess.run(["oiiotool", tmp("a.exr"), "--compression", "none", "-d", "float", "-o", tmp("b.exr")], check=True)
-    pixels, origin = exr.read(tmp("b.exr"), ("B", "lull.spp.V"))
-    assert origin == (5, 6) and (pixels[..., 0] == channels["B"]).all() and (pixels[..., 1] == 64).all()
+    stored, origin = exr.read(tmp("b.exr"))
+    assert origin == (5, 6) and all((stored[name] == plane).all() for name, plane in channels.items())
     subprocess.run(["oiiotool", tmp("b.exr"), "-d", "half", "-o", tmp("h.exr")], check=True)
-    assert (exr.read(tmp("h.exr"), ("G",))[0][..., 0] == channels["G"].astype(np.float16)).all()
+    assert (exr.read(tmp("h.exr"))[0]["G"] == channels["G"].astype(np.float16)).all()
     raises(ValueError, "it is compressed", exr.read, tmp("a.exr"))
-    raises(ValueError, "there is no X", exr.read, tmp("b.exr"), ("X",))
     data = Path(tmp("b.exr")).read_bytes()
     for cut in (0, 3, 9, 100, 700, len(data) - 1):
         Path(tmp("c.exr")).write_bytes(data[:cut])

@@ -67,13 +67,14 @@ def load(path: str, driver: Driver) -> None:
 
 class Keeper:
     """Keeps a driver's state in a file while it runs: every_s seconds apart (0: only at the end), before active blocks are
-    closed, and at the end (finish). unsaved: why that failed last; the picture is worth more than its checkpoint."""
+    closed, and at the end. unsaved: why that failed last; the picture is worth more than its checkpoint."""
 
     def __init__(self, path: str, driver: Driver, every_s: float = 60.0):
         self.path, self.every_s = path, limits.checked("checkpoint_every_s", every_s)
         self.unsaved: Optional[OSError] = None
         self._saved_s = time.monotonic()
         driver.suspend = self.save
+        driver.watchers.append(self._watch)
 
     def save(self, driver: Driver) -> None:
         try:
@@ -83,11 +84,7 @@ class Keeper:
             self.unsaved = error
         self._saved_s = time.monotonic()
 
-    def now_and_then(self, driver: Driver) -> None:
-        """For Driver.after_call."""
-        if 0 < self.every_s <= time.monotonic() - self._saved_s:
-            self.save(driver)
-
-    def finish(self, driver: Driver, result: Result) -> None:
-        if result.outcome == "done":
+    def _watch(self, driver: Driver, result: Optional[Result]) -> None:
+        due = result is None and 0 < self.every_s <= time.monotonic() - self._saved_s
+        if due or (result is not None and result.outcome == "done"):
             self.save(driver)

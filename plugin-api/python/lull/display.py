@@ -30,6 +30,13 @@ class Display:
         """Sends the last picture, for two seconds at most. Did the viewer take it?"""
         return self._end(C.byref(self.frame.view_of(None)))
 
+    def watch(self, _driver: object, result: object) -> None:
+        """For Driver.watchers."""
+        if result:
+            self.close()
+        else:
+            self.update()
+
     def _end(self, view: object) -> bool:
         pointer, self._pointer = self._pointer, C.c_void_p()
         return bool(pointer) and library().lull_host_display_close(pointer, view) == 1

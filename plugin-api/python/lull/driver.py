@@ -42,12 +42,16 @@ class Result(NamedTuple):
     exception: Optional[BaseException] = None
 
 
+Watcher = Callable[["Driver", Optional[Result]], None]
+
+
 class Driver:
     """Samples every active block up to its next check, lets the frame ask about all of them at once.
 
     threads: of the host, for the report and the time left. identity: what the samples depend on (scene, frame, camera, the
     renderer's version …), by name: a checkpoint is only resumed where all of it and of Frame.identity() is the same.
-    after_call: called after each call of the render function (progress, a partial picture). suspend: called before active
+    after_call: called after each call of the render function (progress, a partial picture). watchers: a list of what is
+    called after each step with the driver and its result (lull.checkpoint.Keeper, lull.quote.telling). suspend: called before active
     blocks are closed for time, interrupt or failure, the moment for lull.checkpoint.save. display_server: "HOST" or
     "HOST:PORT" of an image viewer that shows the picture while it is made (lull.display).
     """
@@ -63,6 +67,7 @@ class Driver:
         self.percent_told = 0.0  # of the work, by the progress line, which never goes back
         self.interrupted = False
         self.display = Display(frame, display_server) if display_server else None
+        self.watchers: list[Watcher] = [self.display.watch] if self.display else []
 
     def _identity(self, of_host: Mapping[str, str]) -> dict[str, str]:
         own = self.frame.identity()
@@ -96,10 +101,8 @@ class Driver:
     def step(self) -> Optional[Result]:
         """One call of the render function or one round of checks, for hosts with an event loop. The end, or None."""
         result = self._step()
-        if self.display and result:
-            self.display.close()
-        elif self.display:
-            self.display.update()
+        for watcher in self.watchers:
+            watcher(self, result)
         return result
 
     def _step(self) -> Optional[Result]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from typing import Mapping, Optional, Sequence, Union
+from typing import Mapping, Optional, Union
 
 import numpy as np
 
@@ -58,15 +58,7 @@ def write(path: str, channels: Mapping[str, np.ndarray], size: tuple[int, int], 
         file.write(head + offsets.astype("<u8").tobytes() + b"".join(chunks))
 
 
-def read(path: str, wanted: Sequence[str] = ("R", "G", "B")) -> tuple[np.ndarray, tuple[int, int]]:
-    """The wanted channels [h, w, len(wanted)] float32 of an uncompressed file, and its data window's origin (x, y)."""
-    channels, origin = read_layers(path)
-    if missing := [name for name in wanted if name not in channels]:
-        raise ValueError(f"{path}: not a picture with the channels {', '.join(wanted)}: there is no {missing[0]}")
-    return np.stack([channels[name] for name in wanted], -1), origin
-
-
-def read_layers(path: str) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
+def read(path: str) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
     """All channels by name, [h, w] float32, of an uncompressed file; its data window's origin (x, y)."""
     with open(path, "rb") as file:
         data = file.read()

@@ -175,19 +175,6 @@ def _tell(line: str) -> None:
     print(f"lull: {line}", file=sys.stderr)
 
 
-def _cost_line(tell: Callable[[str], None]) -> Callable[[Driver], None]:
-    """An after_call that tells once, when every block was checked, what the quality parameter costs."""
-    told = False
-
-    def look(driver: Driver) -> None:
-        nonlocal told
-        if not told and all(b.asked_spp > 0 or not b.active for b in driver.frame.blocks):
-            told = True
-            if line := quotes.line(driver):
-                tell(line)
-    return look
-
-
 def quote(scene: Any, criterion: Union[str, Criterion] = "", **settings: Any) -> str:
     """A table of what the quality parameter will cost, and coarser and finer ones, from a pilot of 128 samples or 30
     seconds. settings: as render takes them; with checkpoint=, render(…, resume=True) goes on from the pilot, nothing is
@@ -240,20 +227,14 @@ def render(scene: Any, criterion: Union[str, Criterion] = "", *, sensor: int = 0
                       shared=film.splats, weighted=True, wave=wave, supplies=film.supplies, layers=film.layers,
                       mask=shades, denoised=bool(denoise))
         stack.callback(frame.close)
-        driver = Driver(frame, film.render, identity=film.identity() if checkpoint else None,
+        driver = Driver(frame, film.render, identity=film.identity() if checkpoint else None, after_call=after_call,
                         display_server=display_server)
-        hooks: list[Callable[[Driver], None]] = [after_call] if after_call else []
         if tell:
-            hooks.append(_cost_line(tell))
+            driver.watchers.append(quotes.telling(tell))
         kept = checkpoints.Keeper(checkpoint, driver, checkpoint_every_s) if checkpoint else None
-        if kept:
-            hooks.append(kept.now_and_then)
         if resume and os.path.exists(checkpoint):
             checkpoints.load(checkpoint, driver)
-        driver.after_call = lambda d: [hook(d) for hook in hooks] and None
         result = driver.run()
-        if kept:
-            kept.finish(driver, result)
     picture = Picture(frame.cropped(frame.mean()), frame.cropped(frame.spp()), result, driver,
                       {name: frame.cropped(frame.mean(name)) for name in film.layers}, kept.unsaved if kept else None)
     try:

@@ -4,9 +4,9 @@ its setting and at coarser and finer ones, as `lull-render --quote` tells them (
 render's own instance changes."""
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Callable, NamedTuple, Optional
 
-from .driver import Driver
+from .driver import Driver, Result, Watcher
 from .host import HostFrame
 from .library import LullError, Parameter
 
@@ -66,6 +66,19 @@ def rows(driver: Driver) -> list[Row]:
         return []
     return [Row(parameter.name, value, name, (cost.spp_min, cost.spp_mean, cost.spp_max), cost.wall_s, cost.unknown > 0,
                 value == chosen) for (value, name), cost in zip(settings, costs)]
+
+
+def telling(tell: Callable[[str], None]) -> Watcher:
+    """For Driver.watchers: tells the line once, when every block was checked, unless it is empty."""
+    told = False
+
+    def watch(driver: Driver, _result: Optional[Result]) -> None:
+        nonlocal told
+        if not told and all(b.asked_spp > 0 or not b.active for b in driver.frame.blocks):
+            told = True
+            if text := line(driver):
+                tell(text)
+    return watch
 
 
 def time_text(seconds: float) -> str:

@@ -263,7 +263,7 @@ class Cycles:
             status = bpy.ops.render.render(write_still=True, scene=self.scene.name)
         if "FINISHED" not in status:
             raise HostError("Cycles did not finish the wave")
-        channels, _ = exr.read_layers(render.filepath)
+        channels, _ = exr.read(render.filepath)
         own = f"{self.layer.name}."
         channels = {name.removeprefix(own): plane for name, plane in channels.items() if name.startswith(own)}
         shape = channels["Combined.R"].shape

@@ -122,7 +122,7 @@ def _identity(scene: bpy.types.Scene, host: Cycles) -> dict[str, str]:
 
 
 class Session:
-    """The frame that the scene is at, in the making. Use as a context manager; call run(), or step() from an event loop.
+    """The frame that the scene is at, in the making. Use as a context manager; call step() until it returns a result.
 
     notes: lines for people about what is done otherwise than the scene says. quote: what the quality parameter
     costs and what coarser ones would, one line, "" before the first check.
@@ -156,7 +156,8 @@ class Session:
         except BaseException:
             self.host.__exit__()
             raise
-        self.quote, self._told = "", False
+        self.quote = ""
+        self.driver.watchers.append(quote.telling(lambda line: setattr(self, "quote", line)))
         self.keeper: Optional[checkpoint.Keeper] = None
 
     def __enter__(self) -> Session:
@@ -186,19 +187,7 @@ class Session:
 
     def step(self) -> Optional[Result]:
         """One call of the renderer or one round of checks; the end, or None."""
-        result = self.driver.step()
-        if not self._told and all(b.asked_spp > 0 or not b.active for b in self.frame.blocks):
-            self._told, self.quote = True, quote.line(self.driver)
-        if self.keeper and result:
-            self.keeper.finish(self.driver, result)
-        elif self.keeper:
-            self.keeper.now_and_then(self.driver)
-        return result
-
-    def run(self) -> Result:
-        while (result := self.step()) is None:
-            pass
-        return result
+        return self.driver.step()
 
     def write(self, result: Result) -> tuple[list[str], list[str]]:
         """Denoises the picture if that is asked for, and writes the files of the settings. Returns their names, and a line
