@@ -3,10 +3,12 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "render/checkpoint.h"
 #include "render/host_find.h"
 #include "render/output.h"
+#include "shot_table.h"
 #include "watch.h"
 
 /* What the criterion of noisy pictures says of this one, [blocks], the caller's; NULL when nobody can say. */
@@ -105,6 +107,18 @@ void pt_action_summary(const struct pt_render *r, struct base_log *log)
                      (unsigned long long)r->totals->dropped, dropped[0].x, dropped[0].y, dropped[0].sample);
 }
 
+/* Samples of the shot's table, which has to be one of such pictures. */
+static int plan_blocks(const struct pt_cli *cli, struct pt_render *r, struct base_err *err)
+{
+    char grid[PT_SHOT_GRID];
+    pt_shot_table_grid(&r->config, grid);
+    if (strcmp(grid, cli->table->grid) != 0 || cli->table->block_count != r->blocks->count)
+        return base_fail(err, BASE_EINVAL, "%s: made for %s with %zu blocks, this frame has %s with %u", cli->shot.table,
+                         cli->table->grid, cli->table->block_count, grid, r->blocks->count);
+    pt_render_plan(r, cli->block_spp);
+    return 0;
+}
+
 int pt_action_status(enum pt_render_outcome outcome)
 {
     return outcome == PT_RENDER_INTERRUPTED ? PT_EXIT_INTERRUPTED : outcome == PT_RENDER_LOST ? PT_EXIT_BAD_INPUT : 0;
@@ -119,6 +133,8 @@ int pt_action_image(const struct pt_cli *cli, struct pt_open *o, struct base_log
         if (rc)
             return rc;
     }
+    if (cli->table && plan_blocks(cli, o->render, err) != 0)
+        return BASE_EINVAL;
     pt_watch_init(&watch, o, &cli->checkpoint, cli->files.preview, log);
     if (cli->display) {
         int rc = pt_watch_display(&watch, cli->display, cli->scene, err);
@@ -129,6 +145,10 @@ int pt_action_image(const struct pt_cli *cli, struct pt_open *o, struct base_log
     int rc = pt_render_run(o->render, &hooks, &outcome, err);
     pt_watch_end(&watch);
     struct base_err write_err = {0};
+    if (cli->files.whole_only && (rc || pt_action_status(outcome) != 0)) {
+        *status = pt_action_status(outcome);
+        return rc;
+    }
     if (write_outputs(cli, o, pt_action_status(outcome) != 0, log, &write_err) != 0) {
         if (rc)
             base_log_say(log, "%s", write_err.text); /* besides the render's own error: it tells where the image is */

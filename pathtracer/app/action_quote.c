@@ -22,10 +22,10 @@ static int print_quote(const struct pt_cli *cli, const struct pt_open *o, struct
                        struct base_err *err)
 {
     const struct pt_quote_info info = {cli->scene, o->scene->stats.bytes, o->load_s, was_interrupted};
-    int rc = pt_quote_finish(quote, o->render, err);
-    if (!rc && cli->json)
+    int rc = 0;
+    if (cli->json)
         rc = pt_quote_json(stdout, quote, o->render, &info, err);
-    else if (!rc)
+    else
         pt_quote_text(stdout, quote, o->render, &info);
     return rc || !cli->quote_map ? rc : pt_quote_map(cli->quote_map, quote, o->render, err);
 }
@@ -41,7 +41,8 @@ static int open_quote(const struct pt_cli *cli, const struct pt_open *o, struct 
 }
 
 /* When the pilot is over the checkpoint is the render's, whoever goes on with it. */
-int pt_action_quote(const struct pt_cli *cli, struct pt_open *o, struct base_log *log, int *status, struct base_err *err)
+int pt_action_pilot(const struct pt_cli *cli, struct pt_open *o, struct base_log *log, struct pt_quote **out, int *status,
+                    struct base_err *err)
 {
     enum pt_render_outcome outcome;
     struct pilot pilot = {0};
@@ -57,7 +58,17 @@ int pt_action_quote(const struct pt_cli *cli, struct pt_open *o, struct base_log
     if (!rc && cli->checkpoint.path && *status == 0)
         rc = pt_checkpoint_save(cli->checkpoint.path, o->render, o->settings, err);
     if (!rc && outcome != PT_RENDER_LOST)
-        rc = print_quote(cli, o, pilot.quote, outcome == PT_RENDER_INTERRUPTED, err);
-    pt_quote_destroy(pilot.quote);
+        rc = pt_quote_finish(pilot.quote, o->render, err);
+    *out = pilot.quote;
+    return rc;
+}
+
+int pt_action_quote(const struct pt_cli *cli, struct pt_open *o, struct base_log *log, int *status, struct base_err *err)
+{
+    struct pt_quote *quote = NULL;
+    int rc = pt_action_pilot(cli, o, log, &quote, status, err);
+    if (!rc && *status != PT_EXIT_BAD_INPUT) /* a worker that was lost */
+        rc = print_quote(cli, o, quote, *status == PT_EXIT_INTERRUPTED, err);
+    pt_quote_destroy(quote);
     return rc;
 }

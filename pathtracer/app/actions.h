@@ -4,6 +4,7 @@
 #define PT_ACTIONS_H
 
 #include "open.h"
+#include "render/quote.h"
 
 enum { PT_EXIT_FAILED = 1, PT_EXIT_BAD_INPUT = 2, PT_EXIT_INTERRUPTED = 130 };
 
@@ -13,6 +14,9 @@ int pt_action_image(const struct pt_cli *cli, struct pt_open *open, struct base_
 /* The last line of a render: what it came to. */
 void pt_action_summary(const struct pt_render *render, struct base_log *log);
 
+/* A pilot and its answer, which the caller destroys. *status not 0: it was ended before. */
+int pt_action_pilot(const struct pt_cli *cli, struct pt_open *open, struct base_log *log, struct pt_quote **quote,
+                    int *status, struct base_err *err);
 int pt_action_quote(const struct pt_cli *cli, struct pt_open *open, struct base_log *log, int *status, struct base_err *err);
 int pt_action_record(const struct pt_cli *cli, struct pt_open *open, struct base_log *log, int *status,
                      struct base_err *err);

@@ -79,10 +79,9 @@ static int set_crop(void *into, const char *value, struct base_err *err)
     return 0;
 }
 
-static int set_look_at(void *into, const char *value, struct base_err *err)
+int pt_cli_look_at(const char *value, struct pt_view *view, struct base_err *err)
 {
     static const double far = 1e9; /* what single precision can still tell apart from the scene */
-    struct pt_view *view = &((struct pt_cli *)into)->load.view;
     double *v = view->look_at_world;
     const char *at = value;
     struct pt_xform unused;
@@ -98,6 +97,11 @@ static int set_look_at(void *into, const char *value, struct base_err *err)
         return expected(err, "eye and point looked at apart, and up not along the view");
     view->has_look_at = 1;
     return 0;
+}
+
+static int set_look_at(void *into, const char *value, struct base_err *err)
+{
+    return pt_cli_look_at(value, &((struct pt_cli *)into)->load.view, err);
 }
 
 static int set_param(void *into, const char *value, struct base_err *err)
@@ -207,6 +211,7 @@ static int set_quote_pilot(void *into, const char *value, struct base_err *err)
 
 /* --- options -------------------------------------------------------------------------------------------------------- */
 
+static const char *const frame_seed_words[] = {"fresh", "fixed", NULL};
 static const char *const effect_words[] = {"auto", "all", NULL};
 static const char *const exr[] = {"exr", NULL}, *const png[] = {"png", NULL}, *const json[] = {"json", NULL};
 
@@ -296,6 +301,21 @@ static const struct base_option options[] = {
     {"quote-map", 0, "FILE.png", TO(quote_map), .output = BASE_FILE, .words = png,
      .help = "The predicted time of each block"},
     {"json", 0, NULL, TO(json), .help = "Print the quote as JSON"},
+    {.help = "Frames that belong together (names have the frame's number in the place of %d or %04d):"},
+    {"frames", 0, "LIST", TO(shot.frames),
+     .help =
+         "Render these frames of SCENE_%04d.pbrt, e.g. 1-24, 1,5,9 or 1-24:2, whose image (-o OUT_%04d.exr) is not there "
+         "yet"},
+    {"camera-path", 0, "FILE.csv", TO(shot.camera_path), .input = BASE_FILE,
+     .help = "Frames of one scene: below the line frame;eye;at;up;fov one line for each, as for --look-at and --fov"},
+    {"frame-seed", 0, NULL, TO(shot.same_seed), .words = frame_seed_words,
+     .help = "fresh: each frame has noise of its own (default); fixed: --seed is that of every frame"},
+    {"plan-shot", 0, "TABLE.csv", TO(shot.plan), .output = BASE_FILE,
+     .help = "Render pilots of some frames only, write what samples each block of each frame needs, say what all will cost, "
+             "and exit"},
+    {"plan-every", 0, "N", TO(shot.plan_every), 1, 1000000, .help = "The pilots: every N-th frame and the last (default 8)"},
+    {"shot-table", 0, "TABLE.csv", TO(shot.table), .input = BASE_FILE,
+     .help = "Give every block the samples of this table, instead of asking a criterion"},
     {.help = "Looking inside:"},
     {"explain", 0, NULL, TO(action), PT_CLI_EXPLAIN,
      .help = "Print the scene's effects, why, and the kernel chosen, and exit"},
@@ -356,7 +376,7 @@ static int check_quote(struct pt_cli *cli, struct base_err *err)
 
 static int check_no_quote(const struct pt_cli *cli, struct base_err *err)
 {
-    if (cli->render.pilot_spp > 0 || cli->quote_map || cli->json)
+    if ((cli->render.pilot_spp > 0 && !cli->shot.plan) || cli->quote_map || cli->json)
         return base_fail(err, BASE_EINVAL, "--quote-pilot, --quote-map and --json belong to --quote");
     return 0;
 }
@@ -399,12 +419,57 @@ static int check_samples(struct pt_cli *cli, struct base_err *err)
     return 0;
 }
 
+int pt_cli_is_shot(const struct pt_cli *cli) { return cli->shot.frames || cli->shot.camera_path; }
+
+static int check_plan(struct pt_cli *cli, struct base_err *err)
+{
+    struct pt_render_config *r = &cli->render;
+    if (pt_cli_writes_image(cli) || cli->checkpoint.path || cli->shot.table)
+        return base_fail(err, BASE_EINVAL, "--plan-shot writes no image: leave out all other outputs and --shot-table");
+    if (cli->spp > 0 || r->max_seam > 0 || r->time_budget_s > 0)
+        return base_fail(err, BASE_EINVAL, "--plan-shot goes with neither --spp, --max-seam nor --time-budget");
+    if (r->pilot_spp == 0)
+        r->pilot_spp = 128;
+    if (r->pilot_s <= 0)
+        r->pilot_s = 30.0;
+    return 0;
+}
+
+static int check_shot(struct pt_cli *cli, struct base_err *err)
+{
+    const struct pt_shot_plan *s = &cli->shot;
+    const struct pt_render_config *r = &cli->render;
+    if (!pt_cli_is_shot(cli))
+        return !s->plan && !s->table && !s->same_seed && !s->plan_every
+                   ? 0
+                   : base_fail(err, BASE_EINVAL,
+                               "--plan-shot, --plan-every, --shot-table and --frame-seed belong to "
+                               "--frames or --camera-path");
+    if (cli->action != PT_CLI_RENDER || cli->quote || cli->sequence.directory)
+        return base_fail(err, BASE_EINVAL, "--frames goes with none of --quote, --sequence, --explain and --debug-path");
+    if (s->camera_path && cli->load.view.has_look_at)
+        return base_fail(err, BASE_EINVAL, "--camera-path and --look-at are two cameras: leave out one");
+    if (s->plan_every > 0 && !s->plan)
+        return base_fail(err, BASE_EINVAL, "--plan-every belongs to --plan-shot");
+    cli->shot.plan_every = s->plan_every > 0 ? s->plan_every : 8;
+    if (s->plan)
+        return check_plan(cli, err);
+    if (!cli->files.output)
+        return base_fail(err, BASE_EINVAL, "--frames needs -o OUT_%%04d.exr");
+    if (s->table && (cli->criterion || cli->params.count > 0 || cli->mask || cli->spp > 0 || r->spp_min > 0 ||
+                     r->spp_max > 0 || r->max_seam > 0))
+        return base_fail(err, BASE_EINVAL, "--shot-table says how many samples: leave out everything else that does");
+    return 0;
+}
+
 static int check_together(struct pt_cli *cli, struct base_err *err)
 {
     if (cli->action == PT_CLI_LIST_CRITERIA)
         return 0;
     if (!cli->scene)
         return base_fail(err, BASE_EINVAL, "a scene file is needed (--help says more)");
+    if (check_shot(cli, err) != 0)
+        return BASE_EINVAL;
     if (check_samples(cli, err) != 0)
         return BASE_EINVAL;
     if (cli->checkpoint.resume && !cli->checkpoint.path)

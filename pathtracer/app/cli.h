@@ -28,6 +28,7 @@ struct pt_image_files {
     const char *stop_maps[PT_CLI_MAX_STOP_MAPS];
     int stop_map_count;
     int reproducible;          /* leave times out of the EXR */
+    int whole_only;            /* nothing is written of an image that was interrupted */
     char default_output[1024]; /* of pt_open, when nothing is asked for */
 };
 
@@ -36,6 +37,14 @@ struct pt_checkpoint_plan {
     double every_s;
     int resume;
 };
+
+/* Frames that belong together (shot.h). */
+struct pt_shot_plan {
+    const char *frames, *camera_path; /* list; file; one of them: a shot */
+    const char *plan, *table;         /* --plan-shot, --shot-table */
+    int plan_every, same_seed;
+};
+struct pt_shot_table;
 
 /* Text is borrowed from argv. Each part is what one piece of the program takes. */
 struct pt_cli {
@@ -56,6 +65,9 @@ struct pt_cli {
     struct pt_checkpoint_plan checkpoint;
     struct pt_sequence_config sequence; /* directory NULL: none */
     const char *display;                /* address of a viewer; NULL: none */
+    struct pt_shot_plan shot;
+    const struct pt_shot_table *table; /* of this frame's shot, and the samples of its blocks there; NULL: none */
+    const uint32_t *block_spp;
     const char *quote_map;
     int quote, json;
     int debug[3]; /* x, y, sample of --debug-path */
@@ -67,6 +79,10 @@ struct pt_cli {
 int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err);
 void pt_cli_release(struct pt_cli *cli);
 
+/* It is about the frames of a shot. */
+int pt_cli_is_shot(const struct pt_cli *cli);
+/* Nine numbers, as for --look-at. BASE_EINVAL says what was expected. */
+int pt_cli_look_at(const char *text, struct pt_view *view, struct base_err *err);
 /* It draws samples: an image, a quote or a recording, in which other processes can help. */
 int pt_cli_samples(const struct pt_cli *cli);
 /* It names a file that an image is written to. */

@@ -5,6 +5,7 @@
 #include "base/interrupt.h"
 #include "render/farm.h"
 #include "render/host_find.h"
+#include "shot.h"
 
 static int list_criteria(struct base_log *log, struct base_err *err)
 {
@@ -71,9 +72,9 @@ int main(int argc, char **argv)
         rc = err.code;
     struct base_log log;
     base_log_init(&log, job_rank(job) == 0 ? stderr : NULL, "lull-render", cli.quiet);
-    job_watch(job, cli.rank_timeout_s, &base_interrupted);
+    job_watch(job, pt_cli_is_shot(&cli) ? 0.0 : cli.rank_timeout_s, &base_interrupted); /* whole frames take long */
     if (!rc)
-        rc = run(&cli, job, &log, &status, &err);
+        rc = pt_cli_is_shot(&cli) ? pt_shot_run(&cli, job, run, &log, &status, &err) : run(&cli, job, &log, &status, &err);
     if (rc) {
         base_log_say(&log, "%s", err.text);
         status = rc == BASE_EINVAL || rc == BASE_EIO ? PT_EXIT_BAD_INPUT : PT_EXIT_FAILED;

@@ -207,6 +207,8 @@ int pt_open_render(struct pt_cli *cli, struct job *job, struct base_log *log, st
     rc = open_denoiser(cli, o, err);
     if (!rc && (cli->criterion || !(records || c->uniform)))
         rc = open_criterion(cli, log, o, err);
+    if (!rc && cli->shot.table)
+        rc = base_inputs_add(&o->judging, cli->shot.table, err);
     if (!rc && !records && job_rank(job) == 0) /* the others write nothing */
         rc = check_outputs(cli, o, err);
     if (!rc && (cli->checkpoint.path || job))

@@ -20,7 +20,7 @@ struct pt_open {
     double start_s; /* wall time of the beginning … */
     double load_s;  /* … and how long until the scene was there */
     struct base_threads *threads;
-    struct base_inputs scene_files, judging; /* what was read; judging: plugin and mask */
+    struct base_inputs scene_files, judging; /* what was read; judging: plugin, mask, shot table */
     struct pt_scene *scene;
     pt_kernel *kernel;
     const char *kernel_name;

@@ -155,6 +155,15 @@ void pt_render_destroy(struct pt_render *r)
     free(r);
 }
 
+void pt_render_plan(struct pt_render *r, const uint32_t *spp)
+{
+    for (uint32_t i = 0; i < r->blocks->count; i++) {
+        struct lull_host_block *b = &r->blocks->list[i];
+        b->next_spp = spp[i];
+        b->reason = b->spp < spp[i] ? LULL_REASON_NONE : LULL_REASON_UNIFORM;
+    }
+}
+
 /* --- one slice ------------------------------------------------------------------------------------------------------ */
 
 static void sample_row(void *data, long n, int worker)

@@ -85,6 +85,9 @@ int pt_render_create(const struct pt_render_config *config, const struct pt_scen
                      struct base_err *err);
 void pt_render_destroy(struct pt_render *render);
 
+/* Of a uniform render: block i gets spp[i] samples instead, 1 … spp_max. To be said again after a state was loaded. */
+void pt_render_plan(struct pt_render *render, const uint32_t *spp);
+
 /* Renders until all blocks are stopped, time is up, a pilot is over, or *interrupted is set. A pilot leaves the render
  * as it is between two slices: going on gives what it would have been without. */
 int pt_render_run(struct pt_render *render, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,

@@ -29,11 +29,13 @@ struct lull_host_stop_at lull_host_expect(const struct lull_host_said *said, uin
 struct lull_host_stop_at lull_host_expect_block(const struct lull_host_blocks *blocks, const struct lull_host_block *b)
 {
     struct lull_host_said said = {.spp = b->asked ? b->asked_spp : 0, .predicted = b->predicted_spp};
-    double most = (double)blocks->spp_max, has = (double)b->spp;
+    double has = (double)b->spp;
     if (b->reason != LULL_REASON_NONE)
         return (struct lull_host_stop_at){has, has, has, 1};
-    if (blocks->flags & LULL_HOST_UNIFORM)
-        return (struct lull_host_stop_at){most, most, most, 1};
+    if (blocks->flags & LULL_HOST_UNIFORM) {
+        double end = (double)b->next_spp;
+        return (struct lull_host_stop_at){end, end, end, 1};
+    }
     struct lull_host_stop_at stop = lull_host_expect(&said, b->spp, blocks->spp_max);
     stop.spp = fmax(stop.spp, (double)b->next_spp); /* nobody asks before */
     return stop;

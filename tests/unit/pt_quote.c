@@ -314,7 +314,9 @@ static void outlooks_in_closed_form(void **state)
     struct lull_host_blocks blocks = {.spp_max = 500}, uniform = {.spp_max = 500, .flags = LULL_HOST_UNIFORM};
     struct lull_host_stop_at s = lull_host_expect_block(&blocks, &b);
     assert_true(s.spp == 60 && fabs(s.low / (40 / exp2(0.23)) - 1) < 1e-12 && s.known); /* said at 20, an octave ahead */
-    assert_true(lull_host_expect_block(&uniform, &b).low == 500 && lull_host_expect_block(&uniform, &b).spp == 500);
+    struct lull_host_block planned = {.spp = 30, .next_spp = 70};
+    assert_true(lull_host_expect_block(&uniform, &planned).low == 70 &&
+                lull_host_expect_block(&uniform, &planned).spp == 70);
     assert_true(fabs(lull_host_expect_checks(&b, 60) - 1) < 1e-12 &&
                 fabs(lull_host_expect_checks(&b, 540) - 3) < 1e-12); /* threefold from check to check */
     b.asked = 0;

@@ -1,0 +1,357 @@
+#include "shot.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "actions.h"
+#include "base/files.h"
+#include "base/options.h"
+#include "render/checkpoint.h"
+#include "render/output.h"
+#include "sample/rng.h"
+#include "shot_table.h"
+
+enum { FRAMES_MAX = 1000000, PATH_BYTES_MAX = 1 << 26, NAME_ROOM = 4096, LINE_ROOM = 512 };
+
+/* --- which frames --------------------------------------------------------------------------------------------------- */
+
+static int add_frame(struct pt_shot *s, long frame, size_t *room, struct base_err *err)
+{
+    if (s->count == *room) {
+        size_t more = *room > 0 ? 2 * *room : 64;
+        int *frames = realloc(s->frames, more * sizeof *frames);
+        if (!frames)
+            return base_fail_nomem(err, "frames");
+        s->frames = frames;
+        *room = more;
+    }
+    s->frames[s->count++] = (int)frame;
+    return 0;
+}
+
+/* A number of the list and what stands behind it. */
+static int number(const char **at, long *out)
+{
+    char *end;
+    if (**at < '0' || **at > '9')
+        return 0;
+    *out = strtol(*at, &end, 10);
+    *at = end;
+    return *out <= PT_SHOT_LAST_FRAME;
+}
+
+int pt_shot_parse_frames(const char *text, struct pt_shot *s, struct base_err *err)
+{
+    size_t room = 0;
+    const char *at = text;
+    for (;;) {
+        long first, last, step = 1;
+        int good = number(&at, &first);
+        last = first;
+        if (good && *at == '-')
+            good = (at++, number(&at, &last)) && last >= first;
+        if (good && *at == ':')
+            good = (at++, number(&at, &step)) && step > 0;
+        if (!good || (*at != ',' && *at != '\0') || (s->count > 0 && first <= s->frames[s->count - 1]))
+            return base_fail(err, BASE_EINVAL, "--frames %s: expected a rising list like 1-24, 1,5,9 or 1-24:2", text);
+        if ((last - first) / step >= FRAMES_MAX - (long)s->count)
+            return base_fail(err, BASE_EINVAL, "--frames %s: more than %d frames", text, FRAMES_MAX);
+        for (long frame = first; frame <= last; frame += step)
+            if (add_frame(s, frame, &room, err) != 0)
+                return BASE_ENOMEM;
+        if (*at++ == '\0')
+            return 0;
+    }
+}
+
+/* --- the camera's path ---------------------------------------------------------------------------------------------- */
+
+static const char PATH_HEAD[] = "frame;eye;at;up;fov";
+
+/* One line, NUL-terminated, in which ';' becomes a blank. */
+static int parse_view(char *line, int *frame, struct pt_view *view, struct base_err *err)
+{
+    char *field[5] = {line};
+    int64_t n;
+    for (int i = 1; i < 5; i++) {
+        char *separator = strchr(field[i - 1], ';');
+        if (!separator)
+            return base_fail(err, BASE_EINVAL, "expected five fields with ';' between them");
+        *separator = i == 2 || i == 3 ? ' ' : '\0'; /* eye, at and up stay together */
+        field[i] = separator + 1;
+    }
+    if (!base_parse_integer(field[0], 0, PT_SHOT_LAST_FRAME, &n))
+        return base_fail(err, BASE_EINVAL, "expected a frame from 0 to %d", PT_SHOT_LAST_FRAME);
+    *frame = (int)n;
+    field[4] += strspn(field[4], " ");
+    if (*field[4] != '\0' && !base_parse_real(field[4], 1e-3, 179.9, &view->fov_deg))
+        return base_fail(err, BASE_EINVAL, "expected a field of view from 0.001 to 179.9 degrees, or nothing");
+    return pt_cli_look_at(field[1], view, err);
+}
+
+static int parse_line(const char *name, const char *begin, size_t length, size_t at, struct pt_shot *s, size_t *room,
+                      struct base_err *err)
+{
+    char line[LINE_ROOM];
+    struct base_err why = {0};
+    struct pt_view view = {0};
+    int frame = 0;
+    if (length >= sizeof line || memchr(begin, '\0', length))
+        return base_fail(err, BASE_EINVAL, "%s:%zu: expected a line of text below %d bytes", name, at, LINE_ROOM);
+    memcpy(line, begin, length);
+    line[length] = '\0';
+    line[strcspn(line, "\r")] = '\0';
+    if (at == 1)
+        return strcmp(line, PATH_HEAD) == 0 ? 0 : base_fail(err, BASE_EINVAL, "%s:1: expected %s", name, PATH_HEAD);
+    int rc = parse_view(line, &frame, &view, &why);
+    if (!rc && s->count > 0 && frame <= s->frames[s->count - 1])
+        rc = base_fail(&why, BASE_EINVAL, "expected rising frames");
+    if (rc)
+        return base_fail(err, rc, "%s:%zu: %s", name, at, why.text);
+    rc = add_frame(s, frame, room, err);
+    if (!rc)
+        s->views[s->count - 1] = view;
+    return rc;
+}
+
+int pt_shot_parse_path(const char *name, const char *text, size_t size, struct pt_shot *s, struct base_err *err)
+{
+    const char *end = text + size, *at = text;
+    size_t lines = 1, room = 0;
+    for (const char *p = text; p < end; p++)
+        lines += *p == '\n';
+    s->views = calloc(lines, sizeof *s->views);
+    if (!s->views)
+        return base_fail_nomem(err, "camera path");
+    for (size_t line = 1; at < end; line++) {
+        const char *newline = memchr(at, '\n', (size_t)(end - at)), *stop = newline ? newline : end;
+        int rc = parse_line(name, at, (size_t)(stop - at), line, s, &room, err);
+        if (rc)
+            return rc;
+        at = newline ? newline + 1 : end;
+    }
+    return s->count > 0 ? 0 : base_fail(err, BASE_EINVAL, "%s: expected %s and a line for each frame", name, PATH_HEAD);
+}
+
+/* Of the path, the frames that --frames lists. */
+static int choose(struct pt_shot *path, const struct pt_shot *list, const char *name, struct base_err *err)
+{
+    size_t k = 0;
+    for (size_t i = 0; i < list->count; i++) {
+        while (k < path->count && path->frames[k] < list->frames[i])
+            k++;
+        if (k == path->count || path->frames[k] != list->frames[i])
+            return base_fail(err, BASE_EINVAL, "%s: frame %d is not on this path", name, list->frames[i]);
+        path->frames[i] = path->frames[k]; /* i <= k: both rise */
+        path->views[i] = path->views[k];
+    }
+    path->count = list->count;
+    return 0;
+}
+
+static int read_path(const struct pt_shot_plan *plan, struct pt_shot *s, struct base_err *err)
+{
+    char *text;
+    size_t size;
+    int rc = base_file_read(plan->camera_path, PATH_BYTES_MAX, &text, &size, err);
+    if (rc)
+        return rc;
+    rc = pt_shot_parse_path(plan->camera_path, text, size, s, err);
+    free(text);
+    if (rc || !plan->frames)
+        return rc;
+    struct pt_shot list = {0};
+    rc = pt_shot_parse_frames(plan->frames, &list, err);
+    if (!rc)
+        rc = choose(s, &list, plan->camera_path, err);
+    pt_shot_release(&list);
+    return rc;
+}
+
+/* --- names ---------------------------------------------------------------------------------------------------------- */
+
+/* Where the number's place begins and how long it is; 0: there is none; -1: something else has a '%'. */
+static int find_place(const char *pattern, size_t *begin, int *digits)
+{
+    const char *percent = strchr(pattern, '%'), *at = percent + 1;
+    if (!percent)
+        return 0;
+    *begin = (size_t)(percent - pattern);
+    *digits = 1;
+    if (at[0] == '0' && at[1] >= '1' && at[1] <= '9') {
+        *digits = at[1] - '0';
+        at += 2;
+    }
+    return *at == 'd' && !strchr(at, '%') ? (int)(at + 1 - percent) : -1;
+}
+
+int pt_shot_name(const char *pattern, int frame, char *out, size_t room, struct base_err *err)
+{
+    size_t begin = strlen(pattern);
+    int digits = 1, length = find_place(pattern, &begin, &digits);
+    if (length < 0)
+        return base_fail(err, BASE_EINVAL, "%s: expected one %%d or %%04d in the place of the frame's number", pattern);
+    int n = length ? snprintf(out, room, "%.*s%0*d%s", (int)begin, pattern, digits, frame, pattern + begin + length)
+                   : snprintf(out, room, "%s", pattern);
+    return (size_t)n < room ? 0 : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", pattern);
+}
+
+/* Frames would replace each other's files. */
+static int check_names(const struct pt_cli *cli, const struct pt_shot *s, struct base_err *err)
+{
+    for (int i = 0; i < cli->outputs.count && s->count > 1; i++)
+        if (cli->outputs.list[i].path != cli->shot.plan && !strchr(cli->outputs.list[i].path, '%'))
+            return base_fail(err, BASE_EINVAL, "--%s %s: several frames need a number in the name, as in out_%%04d.exr",
+                             cli->outputs.list[i].option, cli->outputs.list[i].path);
+    for (size_t i = 0; i < s->count; i++) {
+        char name[NAME_ROOM];
+        int rc = pt_shot_name(cli->scene, s->frames[i], name, sizeof name, err);
+        if (!rc && base_file_check_input(name, err) != 0)
+            rc = err->code = BASE_EINVAL;
+        if (rc)
+            return rc;
+    }
+    return 0;
+}
+
+int pt_shot_init(const struct pt_cli *cli, struct pt_shot *s, struct base_err *err)
+{
+    *s = (struct pt_shot){0};
+    int rc = cli->shot.camera_path ? read_path(&cli->shot, s, err) : pt_shot_parse_frames(cli->shot.frames, s, err);
+    return rc ? rc : check_names(cli, s, err);
+}
+
+void pt_shot_release(struct pt_shot *s)
+{
+    free(s->frames);
+    free(s->views);
+    *s = (struct pt_shot){0};
+}
+
+/* --- one frame ------------------------------------------------------------------------------------------------------ */
+
+uint32_t pt_shot_seed(uint32_t seed, int frame)
+{
+    return pt_hash32((uint32_t)frame + pt_hash32(seed + 0x9e3779b9u)); /* both hashes are bijections */
+}
+
+/* Puts the frame's name for *path in the place of it; NULL stays. */
+static int rename_one(char **names, const char **path, int frame, struct base_err *err)
+{
+    if (!*path)
+        return 0;
+    int rc = pt_shot_name(*path, frame, *names, NAME_ROOM, err);
+    *path = *names;
+    *names += NAME_ROOM;
+    return rc;
+}
+
+static int rename_all(struct pt_frame_cli *f, const struct pt_cli *from, int frame, struct base_err *err)
+{
+    struct pt_cli *c = &f->cli;
+    char *names = f->names;
+    const char **paths[] = {&c->scene, &c->files.output, &c->files.preview, &c->files.report, &c->checkpoint.path};
+    int rc = 0;
+    for (size_t i = 0; i < sizeof paths / sizeof *paths && !rc; i++)
+        rc = rename_one(&names, paths[i], frame, err);
+    for (int i = 0; i < c->files.stop_map_count && !rc; i++)
+        rc = rename_one(&names, &c->files.stop_maps[i], frame, err);
+    c->outputs.count = 0;
+    for (int i = 0; i < from->outputs.count && !rc; i++) {
+        const char *path = from->outputs.list[i].path;
+        rc = rename_one(&names, &path, frame, err);
+        if (!rc)
+            rc = base_outputs_add(&c->outputs, from->outputs.list[i].option, path, err);
+    }
+    return rc;
+}
+
+int pt_frame_cli_init(struct pt_frame_cli *f, const struct pt_cli *cli, const struct pt_shot *s, size_t i,
+                      struct base_err *err)
+{
+    f->cli = *cli;
+    f->names = calloc((size_t)(5 + cli->files.stop_map_count + cli->outputs.count), NAME_ROOM);
+    if (!f->names)
+        return base_fail_nomem(err, "names");
+    if (!cli->shot.same_seed)
+        f->cli.render.integrator.seed = pt_shot_seed(cli->render.integrator.seed, s->frames[i]);
+    if (s->views) {
+        const double fov_deg = cli->load.view.fov_deg;
+        f->cli.load.view = s->views[i];
+        f->cli.load.view.fov_deg = s->views[i].fov_deg > 0 ? s->views[i].fov_deg : fov_deg;
+    }
+    f->cli.files.whole_only = 1;
+    return rename_all(f, cli, s->frames[i], err);
+}
+
+void pt_frame_cli_release(struct pt_frame_cli *f) { free(f->names); }
+
+/* --- all frames ----------------------------------------------------------------------------------------------------- */
+
+static int is_there(const char *path) { return access(path, F_OK) == 0; }
+
+/* Samples by the table instead of a criterion. */
+static int use_table(struct pt_cli *c, const struct pt_shot_table *table, int frame, struct base_err *err)
+{
+    const uint32_t *spp = pt_shot_table_frame(table, frame);
+    if (!spp)
+        return base_fail(err, BASE_EINVAL, "%s: frame %d is not in it", c->shot.table, frame);
+    c->block_spp = spp;
+    c->table = table;
+    c->render.uniform = 1;
+    c->render.spp_min = c->render.spp_max = 1;
+    for (size_t i = 0; i < table->block_count; i++)
+        if (spp[i] > c->render.spp_max)
+            c->render.spp_min = c->render.spp_max = spp[i];
+    return 0;
+}
+
+static int render_frame(const struct pt_cli *cli, const struct pt_shot *s, const struct pt_shot_table *table, size_t i,
+                        pt_shot_render *render, struct base_log *log, int *status, struct base_err *err)
+{
+    struct pt_frame_cli f;
+    int rc = pt_frame_cli_init(&f, cli, s, i, err);
+    const char *checkpoint = f.cli.checkpoint.path;
+    if (!rc && is_there(f.cli.files.output) && pt_output_is_ours(f.cli.files.output)) {
+        base_log_note(log, "frame %d: %s is there", s->frames[i], f.cli.files.output);
+        goto out;
+    }
+    if (!rc && table)
+        rc = use_table(&f.cli, table, s->frames[i], err);
+    if (!rc)
+        rc = base_file_check_kind(checkpoint, &pt_checkpoint_kind, err);
+    if (!rc) {
+        base_log_note(log, "frame %d (%zu of %zu)", s->frames[i], i + 1, s->count);
+        f.cli.checkpoint.resume = checkpoint && is_there(checkpoint);
+        rc = render(&f.cli, NULL, log, status, err);
+    }
+    if (!rc && *status == 0 && checkpoint && is_there(checkpoint) && unlink(checkpoint) != 0)
+        base_log_say(log, "%s: cannot be removed, though its frame is done", checkpoint);
+out:
+    pt_frame_cli_release(&f);
+    return rc;
+}
+
+int pt_shot_run(const struct pt_cli *cli, struct job *job, pt_shot_render *render, struct base_log *log, int *status,
+                struct base_err *err)
+{
+    struct pt_shot s;
+    struct pt_shot_table table = {0};
+    struct pt_cli own = *cli; /* params are the caller's */
+    int rc = pt_shot_init(cli, &s, err);
+    if (job && cli->threads == 0)
+        own.threads = job_threads(job);
+    if (!rc && cli->shot.plan)
+        rc = job ? base_fail(err, BASE_EINVAL, "--plan-shot is the work of one process: leave out mpirun")
+                 : pt_shot_plan(cli, &s, log, status, err);
+    if (!rc && cli->shot.table)
+        rc = pt_shot_table_read(cli->shot.table, &table, err);
+    size_t first = (size_t)job_rank(job), step = (size_t)job_count(job);
+    for (size_t i = first; i < s.count && !rc && *status == 0 && !cli->shot.plan; i += step)
+        rc = render_frame(&own, &s, cli->shot.table ? &table : NULL, i, render, log, status, err);
+    pt_shot_table_release(&table);
+    pt_shot_release(&s);
+    return rc;
+}

@@ -1,0 +1,84 @@
+#!/bin/sh
+# lull-render --frames, --camera-path, --plan-shot, --shot-table: frames by name, seeds, going on, tables, refusals.
+. "$(dirname "$0")/lull_render_setup"
+small="-q --size 48x32 --block 16 --reproducible"
+fails() { ! "$@"; }
+made() { [ "$(ls "$@" 2>/dev/null | wc -l)" -eq $# ]; }
+
+# --- frames ---
+cp "$scene" s_0001.pbrt
+sed 's/"float fov" 45/"float fov" 50/' "$scene" >s_0002.pbrt
+sed 's/"float fov" 45/"float fov" 55/' "$scene" >s_0003.pbrt
+t "frames of numbered scenes" "$P" s_%04d.pbrt --frames 1-3 $small --spp 4 -o f_%03d.exr --stop-map m_%d.csv --preview p%02d.png
+t "  …each with its files" made f_001.exr f_002.exr f_003.exr m_1.csv m_2.csv m_3.csv p01.png p02.png p03.png
+"$P" s_0002.pbrt $small --spp 4 -o alone.exr --frames 2
+t "  …and the bytes of that frame alone" cmp alone.exr f_002.exr
+touch -d 2001-01-01 f_001.exr f_003.exr
+rm f_002.exr
+"$P" s_%04d.pbrt --frames 1-3 $small --spp 8 -o f_%03d.exr
+t "what is there is left" test f_001.exr -ot s_0001.pbrt -a f_003.exr -ot s_0001.pbrt -a f_002.exr -nt s_0001.pbrt
+
+# --- seeds ---
+"$P" "$scene" --frames 1-2 $small --spp 4 -o fresh_%d.exr
+"$P" "$scene" --frames 1-2 $small --spp 4 -o fixed_%d.exr --frame-seed fixed
+"$P" "$scene" $small --spp 4 -o one.exr
+t "each frame has noise of its own" fails oiiotool --fail 0 --warn 0 fresh_1.exr fresh_2.exr --diff
+t "--frame-seed fixed: the seed of the command line" cmp fixed_1.exr fixed_2.exr
+t "  …as without frames" cmp fixed_1.exr one.exr
+
+# --- the camera's path ---
+cat >path.csv <<'CSV'
+frame;eye;at;up;fov
+1;0 1 3.4;0 1 0;0 1 0;
+2;0.5 1 3.4;0 1 0;0 1 0;60
+5;1 1 3.4;0 1 0;0 1 0;60
+CSV
+"$P" "$scene" --camera-path path.csv $small --spp 4 -o c_%d.exr --frame-seed fixed
+"$P" "$scene" --look-at "0.5 1 3.4  0 1 0  0 1 0" --fov 60 $small --spp 4 -o look.exr
+t "a path of the camera" made c_1.exr c_2.exr c_5.exr
+t "  …is --look-at and --fov for each frame" cmp c_2.exr look.exr
+t "  …or the scene's fov" cmp c_1.exr one.exr
+
+# --- tables ---
+"$P" "$scene" --camera-path path.csv $small --plan-shot T.csv --plan-every 2 --quote-pilot 32 --spp-max 400 >price
+t "--plan-shot says what all frames will cost" grep -q '^3 frames of 6 blocks, by 2 pilots: ' price
+t "  …and writes a line for each" test "$(grep -c '^[125];' T.csv)" -eq 3
+awk 'BEGIN { FS = OFS = ";" } NR > 2 { for (i = 2; i <= NF; i++) $i = 5 * i + NR } { print }' T.csv >own.csv
+"$P" "$scene" --camera-path path.csv $small --shot-table own.csv -o a_%d.exr --stop-map a_%d.csv -t 1
+t "--shot-table gives every block its samples" test "$(cut -d';' -f2- a_2.csv)" = "$(sed -n 's/^2;//p' own.csv);"
+"$P" "$scene" --camera-path path.csv $small --shot-table own.csv -o b_%d.exr -t 3 --frames 2,5
+t "  …the same bytes frame by frame and with other threads" cmp a_5.exr b_5.exr
+
+# --- interrupted ---
+long="$scene --frames 1-2 $small --spp 1500 -t 1"
+"$P" $long -o whole_%d.exr
+"$P" $long -o i_%d.exr --checkpoint k_%d & pid=$!
+while [ ! -e i_1.exr ] && kill -0 $pid 2>/dev/null; do sleep 0.02; done
+sleep 0.3
+kill -INT $pid
+wait $pid
+t "an interrupt ends the shot" test $? -eq 130
+t "  …with a checkpoint, without half a frame" test -e k_2 -a ! -e i_2.exr -a ! -e k_1
+t "the same command goes on" "$P" $long -o i_%d.exr --checkpoint k_%d
+t "  …to the same bytes" cmp i_2.exr whole_2.exr
+t "  …and clears up" test ! -e k_2
+
+# --- refusals ---
+refused "--frames needs -o" "$scene" --frames 1-2
+refused "--frames 3-1: expected a rising list" "$scene" --frames 3-1 -o x_%d.exr
+refused "--output x.exr: several frames need a number" "$scene" --frames 1-2 -o x.exr
+refused "--checkpoint k: several frames need a number" "$scene" --frames 1-2 -o x_%d.exr --checkpoint k
+refused "x_%s.exr: expected one %d or %04d" "$scene" --frames 1-2 -o x_%s.exr
+refused "s_0004.pbrt: No such file" s_%04d.pbrt --frames 1-4 $small -o x_%d.exr
+refused "belong to --frames" "$scene" --shot-table own.csv -o x.exr
+refused "goes with none of --quote" "$scene" --frames 1 --quote -o x.exr
+refused "two cameras" "$scene" --camera-path path.csv --look-at "0 0 5  0 0 0  0 1 0" -o x_%d.exr
+refused "path.csv: frame 3 is not on this path" "$scene" --camera-path path.csv --frames 1-3 -o x_%d.exr
+refused "own.csv: frame 3 is not in it" "$scene" --frames 3 $small --shot-table own.csv -o x_%d.exr
+refused "own.csv: made for size=48x32" "$scene" --frames 2 -q --size 32x32 --block 16 --shot-table own.csv -o x_%d.exr
+refused "path.csv:1: expected lull-shot-table 1" "$scene" --frames 1 $small --shot-table path.csv -o x_%d.exr
+refused "leave out everything else" "$scene" --frames 1 $small --shot-table own.csv --spp 3 -o x_%d.exr
+refused "--plan-shot writes no image" "$scene" --frames 1-2 --plan-shot U.csv -o x_%d.exr
+refused "neither --spp" "$scene" --frames 1-2 --plan-shot U.csv --spp 4
+echo "1..$n"
+exit $bad
