@@ -424,8 +424,10 @@ int pt_cli_is_shot(const struct pt_cli *cli) { return cli->shot.frames || cli->s
 static int check_plan(struct pt_cli *cli, struct base_err *err)
 {
     struct pt_render_config *r = &cli->render;
-    if (pt_cli_writes_image(cli) || cli->checkpoint.path || cli->shot.table)
-        return base_fail(err, BASE_EINVAL, "--plan-shot writes no image: leave out all other outputs and --shot-table");
+    if (check_no_image(cli, "--plan-shot", err) != 0)
+        return BASE_EINVAL;
+    if (cli->checkpoint.path || cli->shot.table)
+        return base_fail(err, BASE_EINVAL, "--plan-shot goes with neither --checkpoint nor --shot-table");
     if (cli->spp > 0 || r->max_seam > 0 || r->time_budget_s > 0)
         return base_fail(err, BASE_EINVAL, "--plan-shot goes with neither --spp, --max-seam nor --time-budget");
     if (r->pilot_spp == 0)
