@@ -114,12 +114,9 @@ int ggn_baseline_save(const struct ggn_baseline *b, const char *path, enum ggn_t
 
 static int get_number(const cJSON *root, const char *name, double min, double max, double *out, struct base_err *err)
 {
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(root, name);
-
-    if (!cJSON_IsNumber(item) || !(item->valuedouble >= min && item->valuedouble <= max))
-        return base_fail(err, BASE_EINVAL, "'%s' is missing or not a number in %g..%g", name, min, max);
-    *out = item->valuedouble;
-    return 0;
+    return base_json_get(root, name, min, max, out)
+               ? 0
+               : base_fail(err, BASE_EINVAL, "'%s' is missing or not a number in %g..%g", name, min, max);
 }
 
 static int get_int(const cJSON *root, const char *name, int min, int max, int *out, struct base_err *err)

@@ -1,7 +1,6 @@
 #include "study/api.h"
 
 #include <fcntl.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -239,10 +238,8 @@ static void post_profile(const struct ggn_study_site *site, const struct ggn_stu
 /* A whole number in [lo, hi]; absent counts as 0. */
 static int get_whole(const cJSON *o, const char *name, double lo, double hi, double *out)
 {
-    const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
-    double value = v ? (cJSON_IsNumber(v) ? v->valuedouble : (double)NAN) : 0.0;
-    *out = value;
-    return value >= lo && value <= hi && floor(value) == value;
+    *out = 0.0;
+    return cJSON_GetObjectItemCaseSensitive(o, name) ? base_json_get_whole(o, name, lo, hi, out) : lo <= 0.0 && hi >= 0.0;
 }
 
 /* NULL, or what is wrong with the body. */

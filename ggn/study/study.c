@@ -60,14 +60,6 @@ int ggn_study_find_view(const struct ggn_study *study, const char *name)
     return -1;
 }
 
-int ggn_study_find_block(const struct ggn_study_view *view, uint32_t id)
-{
-    for (int i = 0; i < view->n_blocks; i++)
-        if (view->blocks[i].id == id)
-            return i;
-    return -1;
-}
-
 /* --- reading --- */
 
 struct reader {
@@ -78,13 +70,10 @@ struct reader {
 /* A number in [lo, hi]; whole: it must be one. */
 static int number(const struct reader *r, const cJSON *o, const char *name, double lo, double hi, int whole, double *out)
 {
-    const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
-    if (!cJSON_IsNumber(v) || !(v->valuedouble >= lo && v->valuedouble <= hi) ||
-        (whole && floor(v->valuedouble) != v->valuedouble))
-        return base_fail(r->err, BASE_EINVAL, "%s: '%s' must be a %snumber in %g … %g", r->path, name, whole ? "whole " : "",
-                         lo, hi);
-    *out = v->valuedouble;
-    return 0;
+    if (whole ? base_json_get_whole(o, name, lo, hi, out) : base_json_get(o, name, lo, hi, out))
+        return 0;
+    return base_fail(r->err, BASE_EINVAL, "%s: '%s' must be a %snumber in %g … %g", r->path, name, whole ? "whole " : "", lo,
+                     hi);
 }
 
 static int whole(const struct reader *r, const cJSON *o, const char *name, double lo, double hi, int *out)

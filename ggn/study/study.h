@@ -82,8 +82,7 @@ int ggn_study_plain_name(const char *name);
 int ggn_study_plain_line(const char *text);
 /* Index of a level in the block, or -1. */
 int ggn_study_level(const struct ggn_study_block *block, uint32_t spp);
-/* Index of a view by name, of a block by id, or -1. */
+/* Index of a view by name, or -1. */
 int ggn_study_find_view(const struct ggn_study *study, const char *name);
-int ggn_study_find_block(const struct ggn_study_view *view, uint32_t id);
 
 #endif

@@ -1,6 +1,5 @@
 #include "study/transfer.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -112,16 +111,6 @@ struct reader {
     struct base_err *err;
 };
 
-static int get_number(const cJSON *o, const char *name, double lo, double hi, int whole, double *out)
-{
-    const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
-    if (!cJSON_IsNumber(v) || !(v->valuedouble >= lo && v->valuedouble <= hi) ||
-        (whole && floor(v->valuedouble) != v->valuedouble))
-        return 0;
-    *out = v->valuedouble;
-    return 1;
-}
-
 static int get_text(const cJSON *o, const char *name, char *out, size_t room)
 {
     const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
@@ -135,9 +124,9 @@ static int read_trial(const struct reader *r, const cJSON *o, const struct ggn_s
 {
     double slot, revision, level, answer, rating, ms;
     *t = (struct ggn_study_trial){0};
-    if (!get_number(o, "slot", 0, plan->n - 1, 1, &slot) || !get_number(o, "revision", 0, 1000, 1, &revision) ||
-        !get_number(o, "level", 0, 1e9, 1, &level) || !get_number(o, "answer", 0, 2, 1, &answer) ||
-        !get_number(o, "rating", 0, 5, 1, &rating) || !get_number(o, "ms", 0, 86400000, 0, &ms) ||
+    if (!base_json_get_whole(o, "slot", 0, plan->n - 1, &slot) || !base_json_get_whole(o, "revision", 0, 1000, &revision) ||
+        !base_json_get_whole(o, "level", 0, 1e9, &level) || !base_json_get_whole(o, "answer", 0, 2, &answer) ||
+        !base_json_get_whole(o, "rating", 0, 5, &rating) || !base_json_get(o, "ms", 0, 86400000, &ms) ||
         !get_text(o, "layout", t->layout, sizeof t->layout) || !get_text(o, "at", t->at, sizeof t->at))
         return 0;
     t->slot = (int)slot;
@@ -174,8 +163,8 @@ static int import_person(const struct reader *r, const cJSON *o)
                 *trials = cJSON_GetObjectItemCaseSensitive(o, "trials");
     double seed = 0.0;
     if (!get_text(o, "id", p.id, sizeof p.id) || strspn(p.id, "0123456789abcdef") != GGN_STUDY_ID - 1 ||
-        !get_number(o, "seed", 0, 9007199254740991.0, 1, &seed) || !get_text(o, "created", p.created, sizeof p.created) ||
-        !cJSON_IsObject(profile) || !cJSON_IsArray(trials))
+        !base_json_get_whole(o, "seed", 0, 9007199254740991.0, &seed) ||
+        !get_text(o, "created", p.created, sizeof p.created) || !cJSON_IsObject(profile) || !cJSON_IsArray(trials))
         return base_fail(r->err, BASE_EINVAL, "%s: a person without a proper id, seed, created, profile or trials", r->path);
     p.seed = (uint64_t)seed;
     int rc = ggn_study_store_find(r->store, NULL, p.id, &there, r->err);

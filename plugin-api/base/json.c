@@ -46,3 +46,21 @@ int base_json_write(const char *path, const cJSON *root, int failed, struct base
     cJSON_free(text);
     return rc;
 }
+
+int base_json_get(const cJSON *object, const char *key, double lo, double hi, double *out)
+{
+    const cJSON *v = cJSON_GetObjectItemCaseSensitive(object, key);
+    if (!cJSON_IsNumber(v) || !(v->valuedouble >= lo && v->valuedouble <= hi))
+        return 0;
+    *out = v->valuedouble;
+    return 1;
+}
+
+int base_json_get_whole(const cJSON *object, const char *key, double lo, double hi, double *out)
+{
+    double value;
+    if (!base_json_get(object, key, lo, hi, &value) || floor(value) != value)
+        return 0;
+    *out = value;
+    return 1;
+}

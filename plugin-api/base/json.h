@@ -1,6 +1,6 @@
 /*
  * Building JSON so that running out of memory is noticed: a failed addition sets *failed and is looked at once, at the end.
- * Objects passed in may be NULL (an earlier failure). Not thread-safe.
+ * Objects passed in may be NULL (an earlier failure). Numbers of what was read, held to their range. Not thread-safe.
  */
 #ifndef BASE_JSON_H
 #define BASE_JSON_H
@@ -23,5 +23,10 @@ void base_json_item(cJSON *to, const char *key, cJSON *item, int *failed);
 
 /* Writes root as text, unless failed: atomically, or (path NULL) to standard output. root stays the caller's. */
 int base_json_write(const char *path, const cJSON *root, int failed, struct base_err *err);
+
+/* Whether object has a number `key` in [lo, hi]; then *out is it. */
+int base_json_get(const cJSON *object, const char *key, double lo, double hi, double *out);
+/* And a whole one. */
+int base_json_get_whole(const cJSON *object, const char *key, double lo, double hi, double *out);
 
 #endif

@@ -1,6 +1,5 @@
 #include "sequence/manifest.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,16 +39,6 @@ static int get_crc(const cJSON *o, const char *name, uint32_t *crc)
     return 1;
 }
 
-/* A whole number in [lo, hi]. */
-static int get_number(const cJSON *o, const char *name, double lo, double hi, double *out)
-{
-    const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
-    if (!cJSON_IsNumber(v) || !(v->valuedouble >= lo && v->valuedouble <= hi) || floor(v->valuedouble) != v->valuedouble)
-        return 0;
-    *out = v->valuedouble;
-    return 1;
-}
-
 static int get_levels(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
 {
     const cJSON *levels = cJSON_GetObjectItemCaseSensitive(root, "levels"), *v;
@@ -74,12 +63,12 @@ static int get_block(const cJSON *o, const struct seq_manifest *m, struct seq_ma
     const cJSON *seconds = cJSON_GetObjectItemCaseSensitive(o, "seconds");
     double id, x0, y0, x1, y1, bytes, dropped = 0;
     uint32_t crc;
-    if (!get_number(o, "id", 0, UINT32_MAX, &id) || !get_number(o, "x0", 0, m->width - 1.0, &x0) ||
-        !get_number(o, "y0", 0, m->height - 1.0, &y0) || !get_number(o, "x1", x0 + 1, m->width, &x1) ||
-        !get_number(o, "y1", y0 + 1, m->height, &y1) || !get_number(o, "bytes", 1, 1 << 30, &bytes) ||
-        (cJSON_HasObjectItem(o, "dropped") && !get_number(o, "dropped", 0, 1e15, &dropped)) || !get_crc(o, "crc32", &crc) ||
-        !cJSON_IsString(file) || strlen(file->valuestring) >= sizeof b->file || strchr(file->valuestring, '/') ||
-        file->valuestring[0] == '.' || file->valuestring[0] == '\0')
+    if (!base_json_get_whole(o, "id", 0, UINT32_MAX, &id) || !base_json_get_whole(o, "x0", 0, m->width - 1.0, &x0) ||
+        !base_json_get_whole(o, "y0", 0, m->height - 1.0, &y0) || !base_json_get_whole(o, "x1", x0 + 1, m->width, &x1) ||
+        !base_json_get_whole(o, "y1", y0 + 1, m->height, &y1) || !base_json_get_whole(o, "bytes", 1, 1 << 30, &bytes) ||
+        (cJSON_HasObjectItem(o, "dropped") && !base_json_get_whole(o, "dropped", 0, 1e15, &dropped)) ||
+        !get_crc(o, "crc32", &crc) || !cJSON_IsString(file) || strlen(file->valuestring) >= sizeof b->file ||
+        strchr(file->valuestring, '/') || file->valuestring[0] == '.' || file->valuestring[0] == '\0')
         return 0;
     *b = (struct seq_manifest_block){.id = (uint32_t)id,
                                      .x0 = (uint32_t)x0,
@@ -137,12 +126,13 @@ static int get_view(const char *path, const cJSON *root, struct seq_manifest *m,
 static int get_sizes(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
 {
     double width, height, block, spp = 0, seed = 0, reference_seed = 0;
-    if (!get_number(root, "width", 1, 1 << 20, &width) || !get_number(root, "height", 1, 1 << 20, &height) ||
-        !get_number(root, "block", 1, SEQ_MAX_SIDE, &block))
+    if (!base_json_get_whole(root, "width", 1, 1 << 20, &width) ||
+        !base_json_get_whole(root, "height", 1, 1 << 20, &height) ||
+        !base_json_get_whole(root, "block", 1, SEQ_MAX_SIDE, &block))
         return base_fail(err, BASE_EINVAL, "%s: width, height or block is missing or out of range", path);
-    get_number(root, "reference_spp", 0, MAX_SPP, &spp);
-    get_number(root, "seed", 0, 9007199254740992.0, &seed);
-    get_number(root, "reference_seed", 0, 9007199254740992.0, &reference_seed);
+    base_json_get_whole(root, "reference_spp", 0, MAX_SPP, &spp);
+    base_json_get_whole(root, "seed", 0, 9007199254740992.0, &seed);
+    base_json_get_whole(root, "reference_seed", 0, 9007199254740992.0, &reference_seed);
     m->width = (uint32_t)width;
     m->height = (uint32_t)height;
     m->block = (uint32_t)block;
@@ -159,7 +149,7 @@ static int get_all(const char *path, const cJSON *root, struct seq_manifest *m, 
     double version;
     if (!cJSON_IsString(format) || strcmp(format->valuestring, "lull-sequence") != 0)
         return base_fail(err, BASE_EINVAL, "%s: not the manifest of a sequence", path);
-    if (!get_number(root, "version", 1, 1, &version))
+    if (!base_json_get_whole(root, "version", 1, 1, &version))
         return base_fail(err, BASE_EINVAL, "%s: this version of the format is not known", path);
     get_text(root, "scene", m->scene, sizeof m->scene);
     get_text(root, "source", m->source, sizeof m->source);

@@ -103,8 +103,6 @@ void lc_film_release(struct lc_film *f);
 int lc_film_init_for(struct lc_film *f, const struct lull_requirements *req, uint32_t seed, int nominal);
 /* Adds samples until the block has spp; nothing if it has. */
 void lc_film_advance(struct lc_film *f, uint32_t id, uint64_t spp);
-/* The estimate that a plane holds at a pixel. */
-double lc_film_estimate(const struct lc_film *f, unsigned plane, int32_t x, int32_t y, unsigned channel);
 void lc_film_frame(const struct lc_film *f, struct lull_frame *frame, uint32_t planes);
 
 /* How an image is stored. All zero: tight interleaved float estimates, top-down. */

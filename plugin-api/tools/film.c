@@ -135,14 +135,6 @@ void lc_film_advance(struct lc_film *f, uint32_t id, uint64_t spp)
     b->half_spp = half_spp;
 }
 
-static const struct lull_block *block_at(const struct lc_film *f, int32_t x, int32_t y)
-{
-    for (uint32_t i = 0; i < f->block_count; i++)
-        if (x >= f->blocks[i].x0 && x < f->blocks[i].x1 && y >= f->blocks[i].y0 && y < f->blocks[i].y1)
-            return &f->blocks[i];
-    return NULL;
-}
-
 static double estimate_in(const struct lc_film *f, const struct lull_block *b, unsigned plane, size_t at, unsigned channel)
 {
     if (plane == LULL_PLANE_SPP)
@@ -153,11 +145,6 @@ static double estimate_in(const struct lc_film *f, const struct lull_block *b, u
     const double *sum = plane == LULL_PLANE_HALF ? f->half_sum : f->sum[plane];
     double value = n > 0 ? sum[at * lc_plane_channels[plane] + channel] / n : 0;
     return fmin(fmax(rint(value * 256) / 256, -7), 7);
-}
-
-double lc_film_estimate(const struct lc_film *f, unsigned plane, int32_t x, int32_t y, unsigned channel)
-{
-    return estimate_in(f, block_at(f, x, y), plane, (size_t)y * (size_t)f->width + (size_t)x, channel);
 }
 
 void lc_film_frame(const struct lc_film *f, struct lull_frame *frame, uint32_t planes)
