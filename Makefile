@@ -150,6 +150,9 @@ $(OBJ)/%.c.double.o: %.c
 	@echo "  CC   $< (double)"
 	@$(CC) $(CFLAGS_ALL) -DGGN_DOUBLE $(call inc,$<) $(call isa,$<) -c $< -o $@
 
+# What it takes in by .incbin no compiler lists.
+$(OBJ)/plugin-api/host/page.c.o: plugin-api/host/page.html
+
 $(OBJ)/%.cpp.o: %.cpp
 	@mkdir -p $(@D)
 	@echo "  CXX  $<"

@@ -5,6 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <cjson/cJSON.h>
+
+#include "base/files.h"
 #include "render/checkpoint.h"
 #include "render/host_find.h"
 #include "render/output.h"
@@ -49,13 +52,29 @@ static void write_all(const struct pt_image_files *files, const struct pt_open *
     for (int i = 0; i < files->stop_map_count; i++)
         pt_output_or_keep(pt_output_stop_map, files->stop_maps[i], o->render, info, err);
     pt_output_or_keep(pt_output_report, files->report, o->render, info, err);
+    pt_output_or_keep(pt_output_page, files->page, o->render, info, err);
+}
+
+/* The processor's name; NULL where the system does not say. */
+static const char *processor_name(char text[128])
+{
+    char line[256];
+    FILE *file = fopen("/proc/cpuinfo", "r");
+    text[0] = '\0';
+    while (file && text[0] == '\0' && fgets(line, sizeof line, file))
+        if (strncmp(line, "model name", 10) == 0 && strchr(line, ':'))
+            snprintf(text, 128, "%.*s", (int)strcspn(strchr(line, ':') + 2, "\n"), strchr(line, ':') + 2);
+    if (file)
+        fclose(file);
+    return text[0] ? text : NULL;
 }
 
 /* Writes what was asked for; goes on after a failure so that one missing folder, or a denoiser that fails, does not cost the
  * other files. */
-static int write_outputs(const struct pt_cli *cli, const struct pt_open *o, int was_interrupted, struct base_log *log,
-                         struct base_err *err)
+static int write_outputs(const struct pt_cli *cli, const struct pt_open *o, const char *quote, int was_interrupted,
+                         struct base_log *log, struct base_err *err)
 {
+    char processor[128];
     struct pt_output_info info = {.scene = cli->scene,
                                   .params = cli->params.list,
                                   .param_count = cli->params.count,
@@ -64,7 +83,11 @@ static int write_outputs(const struct pt_cli *cli, const struct pt_open *o, int 
                                   .kernel = o->kernel_name,
                                   .reproducible = cli->files.reproducible,
                                   .scene_bytes = o->scene->stats.bytes,
-                                  .interrupted = was_interrupted};
+                                  .interrupted = was_interrupted,
+                                  .command = (const char *const *)cli->argv,
+                                  .command_count = cli->argc,
+                                  .processor = processor_name(processor),
+                                  .quote = quote};
     struct pt_denoised denoised = {0};
     struct base_err why = {0};
     double *noisy_error = NULL;
@@ -124,7 +147,8 @@ int pt_action_status(enum pt_render_outcome outcome)
     return outcome == PT_RENDER_INTERRUPTED ? PT_EXIT_INTERRUPTED : outcome == PT_RENDER_LOST ? PT_EXIT_BAD_INPUT : 0;
 }
 
-int pt_action_image(const struct pt_cli *cli, struct pt_open *o, struct base_log *log, int *status, struct base_err *err)
+static int render_image(const struct pt_cli *cli, struct pt_open *o, const char *quote, struct base_log *log, int *status,
+                        struct base_err *err)
 {
     enum pt_render_outcome outcome;
     struct pt_watch watch;
@@ -149,7 +173,7 @@ int pt_action_image(const struct pt_cli *cli, struct pt_open *o, struct base_log
         *status = pt_action_status(outcome);
         return rc;
     }
-    if (write_outputs(cli, o, pt_action_status(outcome) != 0, log, &write_err) != 0) {
+    if (write_outputs(cli, o, quote, pt_action_status(outcome) != 0, log, &write_err) != 0) {
         if (rc)
             base_log_say(log, "%s", write_err.text); /* besides the render's own error: it tells where the image is */
         else
@@ -158,5 +182,33 @@ int pt_action_image(const struct pt_cli *cli, struct pt_open *o, struct base_log
     }
     pt_action_summary(o->render, log);
     *status = pt_action_status(outcome);
+    return rc;
+}
+
+/* What was quoted, the caller's: looked at before the work, because the page is written after it. */
+static int read_quote(const char *path, char **text, struct base_err *err)
+{
+    const size_t most = 1 << 28;
+    size_t size;
+    int rc = base_file_read(path, most, text, &size, err);
+    if (rc)
+        return rc;
+    cJSON *quote = cJSON_Parse(*text);
+    if (!cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(quote, "rows"))) {
+        free(*text);
+        *text = NULL;
+        rc = base_fail(err, BASE_EINVAL, "--quoted %s: no quote (expected what --quote --json prints)", path);
+    }
+    cJSON_Delete(quote);
+    return rc;
+}
+
+int pt_action_image(const struct pt_cli *cli, struct pt_open *o, struct base_log *log, int *status, struct base_err *err)
+{
+    char *quote = NULL;
+    int rc = cli->files.quoted ? read_quote(cli->files.quoted, &quote, err) : 0;
+    if (!rc)
+        rc = render_image(cli, o, quote, log, status, err);
+    free(quote);
     return rc;
 }

@@ -213,7 +213,8 @@ static int set_quote_pilot(void *into, const char *value, struct base_err *err)
 
 static const char *const frame_seed_words[] = {"fresh", "fixed", NULL};
 static const char *const effect_words[] = {"auto", "all", NULL};
-static const char *const exr[] = {"exr", NULL}, *const png[] = {"png", NULL}, *const json[] = {"json", NULL};
+static const char *const exr[] = {"exr", NULL}, *const png[] = {"png", NULL}, *const json[] = {"json", NULL},
+                         *const html[] = {"html", "htm", NULL};
 
 #define TO(member) BASE_TO(struct pt_cli, member)
 
@@ -277,6 +278,12 @@ static const struct base_option options[] = {
     {"stop-map", 0, "FILE.png|FILE.csv", .set = set_stop_map, .output = BASE_FILE,
      .help = "Samples per block as a picture or a table; may be repeated"},
     {"report", 0, "FILE.json", TO(files.report), .output = BASE_FILE, .words = json, .help = "Everything about the run"},
+    {"html", 0, "FILE.html", TO(files.page), .output = BASE_FILE, .words = html,
+     .help =
+         "All of that as one page for a browser: the picture beside maps of samples, error and time, the history of each "
+         "block, what was run where"},
+    {"quoted", 0, "FILE.json", TO(files.quoted), .input = BASE_FILE, .words = json,
+     .help = "What --quote --json printed before: the page compares it with what became of it"},
     {"aov", 0, "LIST", .set = set_aov, .help = "More layers: albedo,normal,depth"},
     {"denoise", 0, "blend|full", .set = set_denoise, .optional = 1,
      .help =
@@ -342,14 +349,15 @@ int pt_cli_samples(const struct pt_cli *cli)
 int pt_cli_writes_image(const struct pt_cli *cli)
 {
     const struct pt_image_files *files = &cli->files;
-    return files->output || files->preview || files->report || files->stop_map_count > 0;
+    return files->output || files->preview || files->report || files->page || files->stop_map_count > 0;
 }
 
 /* What goes with an image alone. */
 static int check_no_image(const struct pt_cli *cli, const char *option, struct base_err *err)
 {
     if (pt_cli_writes_image(cli))
-        return base_fail(err, BASE_EINVAL, "%s writes no image: leave out -o, --preview, --report and --stop-map", option);
+        return base_fail(err, BASE_EINVAL, "%s writes no image: leave out -o, --preview, --report, --html and --stop-map",
+                         option);
     if (cli->display)
         return base_fail(err, BASE_EINVAL, "%s shows no image: leave out --display-server", option);
     return 0;
@@ -478,6 +486,8 @@ static int check_together(struct pt_cli *cli, struct base_err *err)
         return base_fail(err, BASE_EINVAL, "--resume needs --checkpoint FILE");
     if (cli->sequence.directory ? check_sequence(cli, err) != 0 : check_no_sequence(cli, err) != 0)
         return BASE_EINVAL;
+    if (cli->files.quoted && !cli->files.page)
+        return base_fail(err, BASE_EINVAL, "--quoted belongs to --html");
     if (cli->mask && cli->spp > 0)
         return base_fail(err, BASE_EINVAL, "--mask %s: --spp takes the same samples everywhere", cli->mask);
     if (cli->quote ? check_quote(cli, err) != 0 : check_no_quote(cli, err) != 0)
@@ -510,6 +520,8 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err
         .checkpoint = {.every_s = 60.0},
         .rank_timeout_s = 120.0};
     int rc = base_options_parse(&command, argc, argv, cli, err);
+    cli->argv = argv;
+    cli->argc = argc;
     if (!rc)
         rc = check_together(cli, err);
     if (rc)

@@ -24,7 +24,8 @@ struct pt_cli_params {
 
 /* What an image is written to; NULL = not asked for. */
 struct pt_image_files {
-    const char *output, *preview, *report;
+    const char *output, *preview, *report, *page;
+    const char *quoted; /* what was quoted for it, to be compared with on the page */
     const char *stop_maps[PT_CLI_MAX_STOP_MAPS];
     int stop_map_count;
     int reproducible;          /* leave times out of the EXR */
@@ -70,7 +71,9 @@ struct pt_cli {
     const uint32_t *block_spp;
     const char *quote_map;
     int quote, json;
-    int debug[3]; /* x, y, sample of --debug-path */
+    int debug[3];      /* x, y, sample of --debug-path */
+    char *const *argv; /* borrows; [argc], options first */
+    int argc;
     int all_effects, quiet;
     uint64_t spp; /* the same everywhere, 0 = not given; render.spp_min and spp_max are it, then */
 };

@@ -252,7 +252,8 @@ static int rename_all(struct pt_frame_cli *f, const struct pt_cli *from, int fra
 {
     struct pt_cli *c = &f->cli;
     char *names = f->names;
-    const char **paths[] = {&c->scene, &c->files.output, &c->files.preview, &c->files.report, &c->checkpoint.path};
+    const char **paths[] = {&c->scene,        &c->files.output, &c->files.preview,
+                            &c->files.report, &c->files.page,   &c->checkpoint.path};
     int rc = 0;
     for (size_t i = 0; i < sizeof paths / sizeof *paths && !rc; i++)
         rc = rename_one(&names, paths[i], frame, err);
@@ -272,7 +273,7 @@ int pt_frame_cli_init(struct pt_frame_cli *f, const struct pt_cli *cli, const st
                       struct base_err *err)
 {
     f->cli = *cli;
-    f->names = calloc((size_t)(5 + cli->files.stop_map_count + cli->outputs.count), NAME_ROOM);
+    f->names = calloc((size_t)(6 + cli->files.stop_map_count + cli->outputs.count), NAME_ROOM);
     if (!f->names)
         return base_fail_nomem(err, "names");
     if (!cli->shot.same_seed)

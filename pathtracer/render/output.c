@@ -200,25 +200,30 @@ int pt_output_is_ours(const char *path)
 
 /* --- pictures ------------------------------------------------------------------------------------------------------- */
 
-int pt_output_preview(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
+/* sRGB codes of a picture over the crop: `shown` over the film's pixels, NULL: the noisy one. The caller's. */
+static uint8_t *encode(const struct pt_render *r, const float *shown, struct base_err *err)
 {
-    const struct pt_denoised *denoised = info ? info->denoised : NULL;
     const int *crop = r->config.crop;
-    int width = crop[2] - crop[0], height = crop[3] - crop[1];
-    uint8_t *pixels = malloc((size_t)width * (size_t)height * 3);
+    uint8_t *pixels = malloc((size_t)(crop[2] - crop[0]) * (size_t)(crop[3] - crop[1]) * 3), *out = pixels;
     if (!pixels)
-        return base_fail_nomem(err, "preview");
-    uint8_t *out = pixels;
-    for (int y = crop[1]; y < crop[3]; y++) {
+        base_fail_nomem(err, "picture");
+    for (int y = crop[1]; pixels && y < crop[3]; y++) {
         for (int x = crop[0]; x < crop[2]; x++, out += 3) {
             const size_t i = pt_film_index(&r->film, x, y);
             double rgb[3];
             pt_film_mean(&r->film, i, block_at(r->blocks, x, y)->spp, rgb);
             for (int c = 0; c < 3; c++)
-                out[c] = base_srgb_code(denoised ? (double)denoised->rgb[3 * i + (size_t)c] : rgb[c]);
+                out[c] = base_srgb_code(shown ? (double)shown[3 * i + (size_t)c] : rgb[c]);
         }
     }
-    int rc = pic_write_png(path, width, height, 3, pixels, err);
+    return pixels;
+}
+
+int pt_output_preview(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
+{
+    const int *crop = r->config.crop;
+    uint8_t *pixels = encode(r, info && info->denoised ? info->denoised->rgb : NULL, err);
+    int rc = pixels ? pic_write_png(path, crop[2] - crop[0], crop[3] - crop[1], 3, pixels, err) : BASE_ENOMEM;
     free(pixels);
     return rc;
 }
@@ -238,14 +243,13 @@ int pt_output_stop_map(const char *path, const struct pt_render *r, const struct
 
 /* --- report --------------------------------------------------------------------------------------------------------- */
 
-int pt_output_report(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
+/* effects: room for PT_FX_COUNT names. */
+static struct lull_host_report describe(const struct pt_render *r, const struct pt_output_info *info, const char **effects)
 {
-    const char *effects[PT_FX_COUNT];
     uint32_t n = 0;
     for (int i = 0; i < PT_FX_COUNT; i++)
         if (info->effects >> i & 1)
             effects[n++] = pt_effects_name(i);
-    struct lull_error e = {.struct_size = sizeof e};
     struct lull_host_report report = {
         .struct_size = sizeof report,
         .flags = info->interrupted ? LULL_REPORT_INTERRUPTED : 0,
@@ -259,6 +263,10 @@ int pt_output_report(const char *path, const struct pt_render *r, const struct p
         .film_bytes = r->film.bytes,
         .film_pixels = r->film.pixels,
         .scene_bytes = info->scene_bytes >= 0 ? (double)info->scene_bytes : (double)NAN,
+        .software = "lull-render " BASE_VERSION,
+        .processor = info->processor,
+        .command = info->command,
+        .command_count = (uint64_t)info->command_count,
     };
     if (info->denoised) {
         report.flags |= LULL_REPORT_DENOISED;
@@ -272,8 +280,65 @@ int pt_output_report(const char *path, const struct pt_render *r, const struct p
         report.message_bytes = traffic.bytes;
         report.message_wait_s = traffic.waiting_s;
     }
+    return report;
+}
+
+int pt_output_report(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
+{
+    const char *effects[PT_FX_COUNT];
+    const struct lull_host_report report = describe(r, info, effects);
+    struct lull_error e = {.struct_size = sizeof e};
     int32_t code = lull_host_report_write(r->frame, &report, path, &e);
     return code == LULL_OK ? 0 : pt_output_fail(code, &e, err);
+}
+
+/* --- page ----------------------------------------------------------------------------------------------------------- */
+
+static int32_t write_text(const struct lull_writer *writer, const void *data, uint64_t size)
+{
+    return fwrite(data, 1, (size_t)size, writer->context) == size ? LULL_OK : LULL_E_MEMORY;
+}
+
+/* The report as text, the caller's; NULL: no memory. */
+static char *report_text(const struct pt_render *r, const struct pt_output_info *info)
+{
+    const char *effects[PT_FX_COUNT];
+    const struct lull_host_report report = describe(r, info, effects);
+    char *text = NULL;
+    size_t size = 0;
+    FILE *file = open_memstream(&text, &size);
+    const struct lull_writer writer = {.struct_size = sizeof writer, .context = file, .write = write_text};
+    int32_t code = file ? lull_host_report_text(r->frame, &report, &writer, NULL) : LULL_E_MEMORY;
+    if (file && fclose(file) == 0 && code == LULL_OK)
+        return text;
+    free(text);
+    return NULL;
+}
+
+int pt_output_page(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
+{
+    static const char *const names[3] = {"picture", "noisy", "denoised"};
+    const struct pt_denoised *d = info->denoised;
+    const float *const shown[3] = {d ? d->rgb : NULL, NULL, d ? d->denoised : NULL};
+    const uint32_t count = d ? 3 : 1;
+    const int *crop = r->config.crop;
+    struct lull_host_layer layers[3];
+    uint8_t *codes[3] = {NULL};
+    char *report = report_text(r, info);
+    int rc = report ? 0 : base_fail_nomem(err, "page");
+    for (uint32_t i = 0; i < count && !rc; i++) {
+        codes[i] = encode(r, shown[i], err);
+        layers[i] = (struct lull_host_layer){names[i], codes[i]};
+        rc = codes[i] ? 0 : BASE_ENOMEM;
+    }
+    struct lull_error e = {.struct_size = sizeof e};
+    int32_t code = rc ? LULL_OK
+                      : lull_host_page(report, info->quote, layers, count, (uint32_t)(crop[2] - crop[0]),
+                                       (uint32_t)(crop[3] - crop[1]), path, &e);
+    for (int i = 0; i < 3; i++)
+        free(codes[i]);
+    free(report);
+    return code == LULL_OK ? rc : pt_output_fail(code, &e, err);
 }
 
 void pt_output_or_keep(pt_output_writer *write, const char *path, const struct pt_render *r,

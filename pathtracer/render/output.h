@@ -1,6 +1,6 @@
 /*
- * What a render leaves behind, made from film and blocks: EXR, preview, stop map (picture or table), JSON report. Every file
- * is replaced as a whole or not at all.
+ * What a render leaves behind, made from film and blocks: EXR, preview, stop map (picture or table), JSON report, page. Each
+ * file is replaced as a whole or not at all.
  */
 #ifndef PT_RENDER_OUTPUT_H
 #define PT_RENDER_OUTPUT_H
@@ -19,6 +19,10 @@ struct pt_output_info {
     int reproducible;    /* leave times out of the EXR, so that equal renders are equal files */
     int64_t scene_bytes; /* memory of the scene; < 0 = not known */
     int interrupted;
+    const char *const *command; /* [command_count] words of the command line */
+    int command_count;
+    const char *processor;              /* its name; NULL: not known */
+    const char *quote;                  /* JSON of the quote that the page compares with; NULL: none */
     const struct pt_denoised *denoised; /* the picture; NULL: the noisy one */
     const double *noisy_error; /* [blocks] of the noisy picture, beside `error` of the denoised one; NULL: not known */
 };
@@ -36,6 +40,8 @@ int pt_output_is_ours(const char *path);
 pt_output_writer pt_output_preview;
 /* PNG or CSV by the name's ending. */
 pt_output_writer pt_output_stop_map, pt_output_report;
+/* The report with its pictures, as HTML. */
+pt_output_writer pt_output_page;
 
 /* What cannot be written to `path` (NULL: not asked for) is kept where temporary files go. On failure err says so; on
  * success it stays. */

@@ -39,6 +39,15 @@ static inline int lull_host_wants_counts(const struct lull_host_criterion *c)
     return (c->needs.planes_required & LULL_HOST_COUNTS) != 0;
 }
 
+/* What was said about a block at each check, for the report; of a loaded state from there on. */
+struct lull_host_answer {
+    uint64_t spp;
+    double error, p_noisy;
+};
+
+/* Answers of one block that are kept, even; of a full list every second goes. Fewer where there are many blocks. */
+enum { LULL_HOST_ANSWERS = 64, LULL_HOST_ANSWERS_IN_ALL = 1 << 22 };
+
 struct lull_host_frame {
     struct lull_host_config config;        /* layout and mask: NULL, they were read */
     struct lull_host_criterion *criterion; /* borrows; may be NULL */
@@ -46,9 +55,12 @@ struct lull_host_frame {
     struct lull_host_totals totals;
     struct lull_host_sample dropped[LULL_HOST_DROPPED_KEPT];
     uint32_t dropped_count;
-    uint32_t *due;                   /* owns; [blocks], as the next two: scratch of lull_host_check */
-    uint8_t *final;                  /* owns */
-    struct lull_decision *decisions; /* owns */
+    uint32_t *due;                    /* owns; [blocks], as the next two: scratch of lull_host_check */
+    uint8_t *final;                   /* owns */
+    struct lull_decision *decisions;  /* owns */
+    struct lull_host_answer *answers; /* owns; [blocks][answer_room] */
+    uint32_t *answer_count;           /* owns; [blocks] */
+    uint32_t answer_room;             /* 0: none are kept */
 };
 
 /* What a row of a quote asks, and what it was told. */

@@ -295,7 +295,11 @@ static int32_t fill_frame(struct lull_host_frame *f, const struct lull_plane *ma
     f->due = calloc(b->count, sizeof *f->due);
     f->final = calloc(b->count, sizeof *f->final);
     f->decisions = calloc(b->count, sizeof *f->decisions);
-    if (!f->due || !f->final || !f->decisions)
+    uint32_t room = LULL_HOST_ANSWERS_IN_ALL / b->count / 2 * 2;
+    f->answer_room = room < LULL_HOST_ANSWERS ? room : LULL_HOST_ANSWERS;
+    f->answers = calloc((size_t)b->count * f->answer_room + 1, sizeof *f->answers);
+    f->answer_count = calloc(b->count, sizeof *f->answer_count);
+    if (!f->due || !f->final || !f->decisions || !f->answers || !f->answer_count)
         return lull_host_no_memory(err, "blocks");
     int32_t code = mask ? read_mask(f->criterion, mask, b, err) : LULL_OK;
     if (code == LULL_OK && f->criterion)
@@ -337,6 +341,8 @@ void lull_host_end(struct lull_host_frame *f)
     free(f->due);
     free(f->final);
     free(f->decisions);
+    free(f->answers);
+    free(f->answer_count);
     free(f);
 }
 

@@ -108,6 +108,49 @@ static void add_memory(cJSON *root, const struct lull_host_report *r, int *faile
     base_json_number(o, "scene_bytes", r->scene_bytes, failed);
 }
 
+/* What was said at each check, by block: [samples, error, p_noisy]. */
+static void add_history(cJSON *root, const struct lull_host_frame *f, int *failed)
+{
+    uint32_t told = 0;
+    for (uint32_t i = 0; i < f->blocks.count && f->answer_room > 0; i++)
+        told += f->answer_count[i];
+    if (told == 0)
+        return;
+    cJSON *list = base_json_array(root, "history", failed);
+    for (uint32_t i = 0; i < f->blocks.count; i++) {
+        cJSON *block = base_json_array(list, NULL, failed);
+        for (uint32_t k = 0; k < f->answer_count[i]; k++) {
+            const struct lull_host_answer *a = &f->answers[(size_t)i * f->answer_room + k];
+            cJSON *answer = base_json_array(block, NULL, failed);
+            base_json_number(answer, NULL, (double)a->spp, failed);
+            base_json_number(answer, NULL, a->error, failed);
+            base_json_number(answer, NULL, a->p_noisy, failed);
+        }
+    }
+}
+
+/* Where it was made, as far as the renderer says. */
+static void add_origin(cJSON *root, const struct lull_host_report *r, int *failed)
+{
+    if (!LULL_HAS(struct lull_host_report, r, command_count))
+        return;
+    base_json_text(root, "software", r->software, failed);
+    base_json_text(root, "processor", r->processor, failed);
+    cJSON *command = base_json_array(root, "command", failed);
+    for (uint64_t i = 0; i < r->command_count; i++)
+        base_json_text(command, NULL, r->command[i], failed);
+}
+
+static void add_crop(cJSON *root, const struct lull_host_config *config, int *failed)
+{
+    if (config->crop[2] == 0 || ((uint32_t)(config->crop[2] - config->crop[0]) == config->width &&
+                                 (uint32_t)(config->crop[3] - config->crop[1]) == config->height))
+        return;
+    cJSON *crop = base_json_array(root, "crop", failed);
+    for (int i = 0; i < 4; i++)
+        base_json_number(crop, NULL, config->crop[i], failed);
+}
+
 /* The caller deletes it. */
 static cJSON *make(const struct lull_host_frame *f, const struct lull_host_report *r, int *failed)
 {
@@ -115,6 +158,7 @@ static cJSON *make(const struct lull_host_frame *f, const struct lull_host_repor
     base_json_text(root, "scene", r->scene, failed);
     base_json_number(root, "width", f->config.width, failed);
     base_json_number(root, "height", f->config.height, failed);
+    add_crop(root, &f->config, failed);
     add_block_size(root, f->blocks.block_width, f->blocks.block_height, failed);
     base_json_number(root, "seed", (double)f->config.seed, failed);
     base_json_number(root, "threads", r->threads, failed);
@@ -125,6 +169,7 @@ static cJSON *make(const struct lull_host_frame *f, const struct lull_host_repor
     for (uint32_t i = 0; i < r->effect_count; i++)
         base_json_text(effects, NULL, r->effects[i], failed);
     add_blocks(root, f, r->flags & LULL_REPORT_DENOISED ? r->noisy_error : NULL, failed);
+    add_history(root, f, failed);
     add_totals(root, &f->totals, !(r->flags & LULL_REPORT_NO_RAYS), failed);
     base_json_bool(root, "interrupted", (r->flags & LULL_REPORT_INTERRUPTED) != 0, failed);
     base_json_text(root, "kernel", r->kernel, failed);
@@ -132,13 +177,15 @@ static cJSON *make(const struct lull_host_frame *f, const struct lull_host_repor
         base_json_number(root, "noisy_weight", r->noisy_weight, failed);
     add_dropped(root, f, failed);
     add_memory(root, r, failed);
+    add_origin(root, r, failed);
     return root;
 }
 
 static int32_t check_report(const struct lull_host_report *r, struct lull_error *err)
 {
-    return r->struct_size >= sizeof *r ? LULL_OK
-                                       : lull_error_set(err, LULL_E_VERSION, "the report is smaller than in version 1.0");
+    return r->struct_size >= offsetof(struct lull_host_report, software)
+               ? LULL_OK
+               : lull_error_set(err, LULL_E_VERSION, "the report is smaller than in version 1.0");
 }
 
 int32_t lull_host_report_write(const struct lull_host_frame *f, const struct lull_host_report *r, const char *path,

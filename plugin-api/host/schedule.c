@@ -107,6 +107,19 @@ uint32_t lull_host_extend(struct lull_host_blocks *b)
 
 /* --- a check -------------------------------------------------------------------------------------------------------- */
 
+static void keep_answer(struct lull_host_frame *f, uint32_t block)
+{
+    const struct lull_host_block *b = &f->blocks.list[block];
+    struct lull_host_answer *list = f->answers + (size_t)block * f->answer_room;
+    uint32_t *count = &f->answer_count[block];
+    if (*count == f->answer_room) {
+        *count /= 2;
+        for (uint32_t i = 0; i < *count; i++)
+            list[i] = list[2 * i];
+    }
+    list[(*count)++] = (struct lull_host_answer){b->spp, b->error, b->p_noisy};
+}
+
 void lull_host_note(struct lull_host_frame *f, const uint32_t *due, uint32_t count, const struct lull_decision *decisions)
 {
     for (uint32_t k = 0; k < count; k++) {
@@ -117,6 +130,8 @@ void lull_host_note(struct lull_host_frame *f, const uint32_t *due, uint32_t cou
         b->p_noisy = decisions[k].p_noisy;
         b->error = decisions[k].error;
         b->predicted_spp = decisions[k].predicted_spp;
+        if (f->answer_room > 0)
+            keep_answer(f, due[k]);
     }
 }
 

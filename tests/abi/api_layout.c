@@ -116,7 +116,10 @@ LAYOUT(lull_host_report, F(lull_host_report, struct_size), F(lull_host_report, f
        F(lull_host_report, effect_count), F(lull_host_report, threads), F(lull_host_report, processes),
        F(lull_host_report, zero), F(lull_host_report, messages), F(lull_host_report, message_bytes),
        F(lull_host_report, message_wait_s), F(lull_host_report, film_bytes), F(lull_host_report, film_pixels),
-       F(lull_host_report, scene_bytes), F(lull_host_report, noisy_weight), F(lull_host_report, noisy_error));
+       F(lull_host_report, scene_bytes), F(lull_host_report, noisy_weight), F(lull_host_report, noisy_error),
+       F(lull_host_report, software), F(lull_host_report, processor), F(lull_host_report, command),
+       F(lull_host_report, command_count));
+LAYOUT(lull_host_layer, F(lull_host_layer, name), F(lull_host_layer, rgb));
 LAYOUT(lull_host_denoising, F(lull_host_denoising, struct_size), F(lull_host_denoising, flags),
        F(lull_host_denoising, threads), F(lull_host_denoising, zero), F(lull_host_denoising, library),
        F(lull_host_denoising, context), F(lull_host_denoising, cancelled));
@@ -135,37 +138,14 @@ LAYOUT(lull_host_quote_row, F(lull_host_quote_row, blocks), F(lull_host_quote_ro
 
 /* The criterion's, then the host library's. */
 static const struct layout layouts[] = {
-    ENTRY(lull_error),
-    ENTRY(lull_host),
-    ENTRY(lull_param),
-    ENTRY(lull_pair),
-    ENTRY(lull_requirements),
-    ENTRY(lull_rect),
-    ENTRY(lull_frame),
-    ENTRY(lull_plane),
-    ENTRY(lull_block),
-    ENTRY(lull_view),
-    ENTRY(lull_decision),
-    ENTRY(lull_criterion),
-    ENTRY(lull_writer),
-    ENTRY(lull_reader),
-    ENTRY(lull_state),
-    ENTRY(lull_host_services),
-    ENTRY(lull_host_config),
-    ENTRY(lull_host_block),
-    ENTRY(lull_host_blocks),
-    ENTRY(lull_host_totals),
-    ENTRY(lull_host_view),
-    ENTRY(lull_host_said),
-    ENTRY(lull_host_stop_at),
-    ENTRY(lull_host_work),
-    ENTRY(lull_host_forecast),
-    ENTRY(lull_host_sample),
-    ENTRY(lull_host_report),
-    ENTRY(lull_host_denoising),
-    ENTRY(lull_host_picture),
-    ENTRY(lull_host_output),
-    ENTRY(lull_host_quote_block),
+    ENTRY(lull_error),          ENTRY(lull_host),         ENTRY(lull_param),        ENTRY(lull_pair),
+    ENTRY(lull_requirements),   ENTRY(lull_rect),         ENTRY(lull_frame),        ENTRY(lull_plane),
+    ENTRY(lull_block),          ENTRY(lull_view),         ENTRY(lull_decision),     ENTRY(lull_criterion),
+    ENTRY(lull_writer),         ENTRY(lull_reader),       ENTRY(lull_state),        ENTRY(lull_host_services),
+    ENTRY(lull_host_config),    ENTRY(lull_host_block),   ENTRY(lull_host_blocks),  ENTRY(lull_host_totals),
+    ENTRY(lull_host_view),      ENTRY(lull_host_said),    ENTRY(lull_host_stop_at), ENTRY(lull_host_work),
+    ENTRY(lull_host_forecast),  ENTRY(lull_host_sample),  ENTRY(lull_host_report),  ENTRY(lull_host_denoising),
+    ENTRY(lull_host_layer),     ENTRY(lull_host_picture), ENTRY(lull_host_output),  ENTRY(lull_host_quote_block),
     ENTRY(lull_host_quote_row),
 };
 enum { LAYOUTS = sizeof layouts / sizeof *layouts, OF_THE_ABI = 15 };
@@ -233,10 +213,10 @@ static void growing_structs_begin_with_their_size(void **state)
 {
     (void)state;
     static const char *const elements[] = {
-        "lull_param",         "lull_pair",          "lull_rect",        "lull_plane",       "lull_block",
-        "lull_decision",      "lull_host_block",    "lull_host_totals", "lull_host_said",   "lull_host_stop_at",
-        "lull_host_work",     "lull_host_forecast", "lull_host_sample", "lull_host_output", "lull_host_quote_block",
-        "lull_host_quote_row"};
+        "lull_param",          "lull_pair",          "lull_rect",        "lull_plane",       "lull_block",
+        "lull_decision",       "lull_host_block",    "lull_host_totals", "lull_host_said",   "lull_host_stop_at",
+        "lull_host_work",      "lull_host_forecast", "lull_host_sample", "lull_host_output", "lull_host_quote_block",
+        "lull_host_quote_row", "lull_host_layer"};
     for (int i = 0; i < LAYOUTS; i++) {
         int is_element = 0;
         for (size_t k = 0; k < sizeof elements / sizeof *elements; k++)

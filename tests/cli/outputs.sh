@@ -108,7 +108,7 @@ oiiotool --pattern constant:color=1,1,1 4x4 3 -d half -o room.exr
 refused "room.exr: another program's image would be replaced; -o FILE.exr names the output" "$P" room.pbrt -q --spp 1
 t "  …where it was not named" "$P" room.pbrt -q --spp 1 -o room.exr
 t "  …and ours is" "$P" room.pbrt -q --spp 1
-refused "leave out -o, --preview, --report and --stop-map" "$P" room.pbrt -q --sequence s --preview p.png
+refused "leave out -o, --preview, --report, --html and --stop-map" "$P" room.pbrt -q --sequence s --preview p.png
 echo 'a;20;40;' >blocks.csv
 refused "./blocks.csv: this is an input" "$ggn" compare blocks.csv blocks.csv -o .
 echo '{}' >figures.json

@@ -405,6 +405,11 @@ struct lull_host_report {
      * [blocks], NULL: not known. */
     double noisy_weight;
     const double *noisy_error;
+
+    /* Since 1.1: where it was made; NULL: not known. */
+    const char *software, *processor; /* the renderer with its version */
+    const char *const *command;       /* [command_count] words of the command line */
+    uint64_t command_count;
 };
 
 /* The report as JSON (lull-render(1) says what is in it): to a file, replaced as a whole or not at all, or to a writer. */
@@ -412,6 +417,20 @@ LULL_EXPORT int32_t lull_host_report_write(const struct lull_host_frame *frame, 
                                            const char *path, struct lull_error *err);
 LULL_EXPORT int32_t lull_host_report_text(const struct lull_host_frame *frame, const struct lull_host_report *report,
                                           const struct lull_writer *writer, struct lull_error *err);
+
+/* One picture of a page. rgb: [height][width][3] sRGB codes, row by row from the top. */
+struct lull_host_layer {
+    const char *name; /* "picture" is what is kept; "noisy", "denoised" and others are compared with it */
+    const uint8_t *rgb;
+};
+
+/* The report as a page for people, since 1.1: one HTML file, replaced as a whole or not at all, that needs no other and no
+ * network. report: the JSON of above, of any age. quote: what lull-render --quote --json printed before, compared with what
+ * became of it; NULL: nothing. layers may be none; all have the size of the report's crop, or of its picture where it has
+ * none. Nothing is believed of either text. LULL_E_INVALID when one is no such JSON or a size differs. */
+LULL_EXPORT int32_t lull_host_page(const char *report, const char *quote, const struct lull_host_layer *layers,
+                                   uint32_t layer_count, uint32_t width, uint32_t height, const char *path,
+                                   struct lull_error *err);
 
 /* --- stop map ------------------------------------------------------------------------------------------------------- */
 

@@ -64,7 +64,7 @@ HostView = _struct("HostView", "u32 struct_size plane_count; i32 x0 y0 x1 y1; pt
 HostForecast = _struct("HostForecast", "f64 done_s left_s sampling_s check_s; u64 low high; u32 active known")
 HostReport = _struct("HostReport", "u32 struct_size flags; text scene mask kernel; ptr effects; u32 effect_count threads "
                      "processes zero; u64 messages message_bytes; f64 message_wait_s; u64 film_bytes film_pixels; f64 "
-                     "scene_bytes noisy_weight; ptr noisy_error")
+                     "scene_bytes noisy_weight; ptr noisy_error; text software processor; ptr command; u64 command_count")
 HostQuoteRow = _struct("HostQuoteRow", "ptr blocks; f64 spp_min spp_mean spp_max spp_mean_low spp_mean_high thread_s "
                        "thread_low_s thread_high_s wall_s wall_low_s wall_high_s against_uniform; u32 unknown unmet capped; "
                        "i32 asked")

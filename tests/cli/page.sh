@@ -1,0 +1,51 @@
+#!/bin/sh
+# lull-render --html: one file with all in it, whatever names and texts say; and what is refused. In a browser: study/page.sh.
+. "$(dirname "$0")/lull_render_setup"
+R="$P -q --size 48x32 --block 16 --spp-max 64 -t 2"
+evil='x<!--<script>alert(1)&"'"'"'.pbrt'
+cp "$scene" "$evil"
+"$P" "$scene" -q --size 48x32 --block 16 --spp-max 64 --quote --json >q.json
+
+t "--html writes a page" $R "$evil" --html p.html --report r.json --quoted q.json --preview p.png
+# look EXPRESSION: of `page`, its JSON `data`, `report`, the pictures by name
+look() {
+    python3 - "$1" <<'EOF'
+import base64, json, re, sys
+page = open("p.html", encoding="utf-8").read()
+block = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.S)[1]
+data = json.loads(block)
+report = json.load(open("r.json"))
+pictures = {n: base64.b64decode(b, validate=True) for n, b in re.findall(r'<img alt="" data-layer="(\w+)" src="data:image/png;base64,([^"]*)">', page)}
+assert eval(sys.argv[1]), sys.argv[1]
+EOF
+}
+t "  …with the report, word for word" look "data['report'] == report and data['quote'] == json.load(open('q.json'))"
+t "  …which knows where it was made" look "report['command'][1:3] == ['-q', '--size'] and report['software'].startswith('lull-render ') and 'processor' in report"
+t "  …and what was said at each check" look "len(report['history']) == 6 and all(h[-1][:2] == [b['spp'], b['error']] and len(h) == b['checks'] for h, b in zip(report['history'], report['blocks']))"
+t "  …and the picture of the preview" look "list(pictures) == ['picture'] and pictures['picture'][:8] == open('p.png', 'rb').read()[:8]"
+t "  …the same pixels" sh -c "python3 - <<'EOF'
+import base64, re
+open('q.png', 'wb').write(base64.b64decode(re.search('data-layer=\"picture\" src=\"data:image/png;base64,([^\"]*)', open('p.html').read())[1]))
+EOF
+    idiff -q -fail 0 q.png p.png"
+t "a scene's name ends no element" look "'<' not in block and page.count('<script') == 2 and 'alert(1)' in block and report['scene'].startswith('x<!--<script>alert(1)&')"
+t "nothing comes from elsewhere" look "not re.findall(r'(?:src|href)=\"(?!data:)', page) and 'url(' not in page and '@import' not in page and set(re.findall(r'https?://[^\" ]*', page)) <= {'http://www.w3.org/2000/svg'}"
+t "the page without its pictures is small" look "len(page) - sum(4 * len(p) / 3 for p in pictures.values()) < 2e6"
+t "a crop has its pictures' size" sh -c "$R $scene --crop 20,3,41,30 --html c.html && grep -q '\"crop\":\[20,3,41,30\]' c.html"
+t "many blocks: the page stays within 2 MB" sh -c "$P $scene -q --size 400x300 --block 4 -c halfbuf -p first-spp=2 -p threshold=1e-9 --spp-min 2 --spp-max 16 --html m.html --preview m.png &&
+    [ \$((\$(wc -c <m.html) - \$(wc -c <m.png) * 4 / 3)) -lt 2000000 ]"
+export LULL_OIDN="$(dirname "$P")/../tests/oidn-stub"
+t "a denoised picture has its layers" sh -c "$R $scene --denoise --html d.html && [ \$(grep -c '<img alt=\"\" data-layer=' d.html) -eq 3 ]"
+
+echo '{"rows": 1}' >bad.json
+S="$scene -q --size 8x8 --spp 1"
+refused "--quoted bad.json: no quote" $S --html x.html --quoted bad.json
+refused "nowhere.json" $S --html x.html --quoted nowhere.json
+refused "--quoted belongs to --html" $S -o x.exr --quoted q.json
+refused "ends in .html or .htm" $S --html x.txt
+ln -s q.json q.html
+refused "this is an input" $S --html q.html --quoted q.json
+refused "cannot write there" $S --html nowhere/x.html
+refused "--quote writes no image" $S --quote --html x.html
+echo "1..$n"
+exit $bad
