@@ -69,6 +69,9 @@ struct lull_host_quote_asked {
     struct lull_host_said *said;           /* owns; [blocks] */
     struct lull_host_said *first;          /* owns; [blocks] what it said when it was asked first */
     struct lull_host_quote_block *blocks;  /* owns; the answer */
+    int other;                             /* not the frame's criterion: its checks take their own time */
+    double asked_s;                        /* wall seconds that it was asked */
+    uint64_t asked;                        /* blocks */
 };
 
 struct lull_host_quote {
@@ -77,7 +80,7 @@ struct lull_host_quote {
     uint32_t count;
     struct lull_host_quote_asked *asked; /* owns; [count], as the rows */
     struct lull_host_quote_row *rows;    /* owns; the answer */
-    double check_s;                      /* wall seconds that the criterion takes for one block */
+    double check_s;                      /* wall seconds that the frame's criterion takes for one block */
 };
 
 /* --- services.c ----------------------------------------------------------------------------------------------------- */

@@ -5,6 +5,7 @@
 
 #include <lull/criterion_kit.h>
 
+#include "base/clock.h"
 #include "host/frame.h"
 #include "sequence/tail.h"
 
@@ -86,6 +87,7 @@ int32_t lull_host_quote_add_other(struct lull_host_quote *q, struct lull_host_cr
         return code;
     }
     q->asked[q->count - 1].criterion = criterion;
+    q->asked[q->count - 1].other = 1;
     return lull_host_join(q->frame, criterion, err);
 }
 
@@ -107,8 +109,8 @@ static void note_answer(struct lull_host_said *said, const struct lull_host_bloc
     }
 }
 
-static int32_t ask_row(const struct lull_host_quote *q, const struct lull_host_quote_asked *a,
-                       const struct lull_host_view *view, const uint32_t *due, uint32_t count, struct lull_error *err)
+static int32_t ask_row(const struct lull_host_quote *q, struct lull_host_quote_asked *a, const struct lull_host_view *view,
+                       const uint32_t *due, uint32_t count, struct lull_error *err)
 {
     const struct lull_host_blocks *blocks = &q->frame->blocks;
     if (!a->criterion || count == 0 || (blocks->flags & LULL_HOST_UNIFORM))
@@ -116,7 +118,10 @@ static int32_t ask_row(const struct lull_host_quote *q, const struct lull_host_q
     struct lull_decision *decisions = calloc(count, sizeof *decisions);
     if (!decisions)
         return no_memory(err);
+    double start_s = base_clock_wall_s();
     int32_t code = lull_host_evaluate(a->criterion, q->frame, view, due, NULL, count, decisions, err);
+    a->asked_s += base_clock_wall_s() - start_s;
+    a->asked += count;
     for (uint32_t k = 0; k < count && code == LULL_OK; k++) {
         note_answer(&a->said[due[k]], &blocks->list[due[k]], &decisions[k], blocks->spp_min);
         if (a->first[due[k]].spp == 0)
@@ -224,9 +229,10 @@ static void cost_blocks(const struct lull_host_blocks *blocks, struct lull_host_
     }
 }
 
-static double wall_s(const struct lull_host_quote *q, const struct lull_host_quote_row *row, int which,
-                     struct lull_host_work *work)
+static double wall_s(const struct lull_host_quote *q, const struct lull_host_quote_asked *a,
+                     const struct lull_host_quote_row *row, int which, struct lull_host_work *work)
 {
+    const double check_s = a->other && a->asked > 0 ? a->asked_s / (double)a->asked : q->check_s;
     const struct lull_host_blocks *blocks = &q->frame->blocks;
     double checks = 0.0;
     for (uint32_t i = 0; i < blocks->count; i++) {
@@ -236,7 +242,7 @@ static double wall_s(const struct lull_host_quote *q, const struct lull_host_quo
         work[i] = (struct lull_host_work){spp[which], spp[which] * row->blocks[i].sample_s, b->y1 - b->y0};
         checks += blocks->flags & LULL_HOST_UNIFORM ? 0.0 : (double)b->checks + lull_host_expect_checks(b, spp[which]);
     }
-    return lull_host_wall_s(work, blocks->count, q->threads) + checks * q->check_s;
+    return lull_host_wall_s(work, blocks->count, q->threads) + checks * check_s;
 }
 
 /* The render's own blocks are where they are; another row's may have stopped before, or would go on. */
@@ -284,9 +290,9 @@ static void add_up(const struct lull_host_quote *q, const struct lull_host_quote
     row->spp_mean_low /= pixels;
     row->spp_mean_high /= pixels;
     row->against_uniform = row->spp_mean / row->spp_max;
-    row->wall_s = wall_s(q, row, 0, work);
-    row->wall_low_s = wall_s(q, row, 1, work);
-    row->wall_high_s = wall_s(q, row, 2, work);
+    row->wall_s = wall_s(q, a, row, 0, work);
+    row->wall_low_s = wall_s(q, a, row, 1, work);
+    row->wall_high_s = wall_s(q, a, row, 2, work);
 }
 
 int32_t lull_host_quote_finish(struct lull_host_quote *q, const struct lull_host_view *view,

@@ -184,6 +184,26 @@ static void uniform_needs_no_criterion(void **state)
     end(&run);
 }
 
+/* The noisy picture's checks are not those of a criterion that denoises: here a quarter of a second for each block. */
+static void another_criterion_takes_its_own_time(void **state)
+{
+    (void)state;
+    struct base_err err = {0};
+    struct run run;
+    start(&run, "0.25", 64);
+    pt_quote_destroy(run.quote);
+    assert_int_equal(pt_quote_create(run.render, &run.pair, 1, lull_criterion_entry_v1(0), NULL, &run.quote, &err), 0);
+    go(&run);
+    run.render->totals->criterion_s = 0.25 * (double)run.render->totals->checks;
+    assert_int_equal(pt_quote_finish(run.quote, run.render, &err), 0);
+    const struct lull_host_quote_row *rows = run.quote->rows;
+    assert_true(run.quote->row_count == 2 && rows[0].asked && !rows[1].asked);
+    for (uint32_t i = 0; i < run.render->blocks->count; i++) /* the same law */
+        assert_true(rows[0].blocks[i].stop.spp == rows[1].blocks[i].stop.spp);
+    assert_true(rows[0].wall_s - rows[1].wall_s > 0.9 * 0.25 * (double)run.render->totals->checks);
+    end(&run);
+}
+
 /* The film after a pilot and going on is the one without, bit for bit. */
 static void a_pilot_loses_nothing(void **state)
 {
@@ -386,6 +406,7 @@ int main(void)
         cmocka_unit_test(rows_follow_the_law),
         cmocka_unit_test(sums_are_those_of_the_blocks),
         cmocka_unit_test(what_was_asked_has_a_row),
+        cmocka_unit_test(another_criterion_takes_its_own_time),
         cmocka_unit_test(uniform_needs_no_criterion),
         cmocka_unit_test(a_pilot_loses_nothing),
         cmocka_unit_test(stops_that_nobody_predicts),
