@@ -815,12 +815,14 @@ def test_denoise():
 
 
 def test_denoised_stops():
-    """the criterion denoised stops blocks by what is seen of the blend; its own error is the one that is told, and its quote asks once"""
+    """the criterion denoised stops blocks by what is seen of the blend; its own error is the one that is told, its quote has both prices"""
     with tap.denoiser("box", BUILD):
         f, d = painted("denoised", spp_max=2048)
         assert d.run().outcome == "done" and "criterion" in {b.reason for b in f.blocks}, [b.reason for b in f.blocks]
         assert (lull.denoise(f).error == [b.error for b in f.blocks]).all()
-        assert [r.name for r in quote.rows(d)] == ["chosen"] and quote.line(d) == ""
+        rows = quote.rows(d)
+        assert [(r.name, r.value, r.chosen) for r in rows] == [("denoised", .35, True), ("noisy", .35, False)], rows
+        assert rows[0].spp[1] < rows[1].spp[1] and quote.line(d) == ""
         f.close()
         assert lull.denoise(f).weight.shape == (32, 32)  # of a frame that is over, too
 

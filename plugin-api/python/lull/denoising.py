@@ -20,9 +20,9 @@ class Denoised(NamedTuple):
     """Arrays over the pixels of the frame's `view`, rows from the top, float32, and one value per block.
 
     picture: [height, width, 3], what is kept, linear radiance as frame.mean(): the blend, or the denoised picture alone.
-    denoised: [height, width, 3], likewise. weight: [height, width] in [0, 1], the share of the noisy picture in `picture`.
-    error, noisy_error: [blocks] float64, what is seen of the error of `picture` and of the noisy one, in the order of
-    frame.blocks; 1 is just seen, NaN not known.
+    denoised: [height, width, 3], likewise; beside a blend the mean of the denoised halves. weight: [height, width] in [0, 1],
+    the share of the noisy picture in `picture`. error, noisy_error: [blocks] float64, what is seen of the error of `picture`
+    and of the noisy one, in the order of frame.blocks; 1 is just seen, NaN not known.
     """
     picture: np.ndarray
     denoised: np.ndarray

@@ -215,15 +215,21 @@ class HostFrame:
                  answers)
         return list(answers[:count])
 
-    def quote(self, threads: int, name: str, values: Sequence[float], own: float) -> list[abi.HostQuoteRow]:
+    def quote(self, threads: int, name: str, values: Sequence[float], own: float,
+              other: Optional[Criterion] = None) -> list[abi.HostQuoteRow]:
         """What the frame costs with other values of a parameter, `own` being the criterion's: struct lull_host_quote_row for
-        each, without its blocks; also after close(). threads: of the renderer."""
+        each, without its blocks; also after close(). threads: of the renderer. other: has a row, too, the last one, and is
+        used up."""
         view, rows, count = self.view_of(None), C.POINTER(abi.HostQuoteRow)(), C.c_uint32()
         with self._asking() if self._is_open() else contextlib.nullcontext():
             quote = Handle("lull_host_quote_end", self.handle)
             call("host_quote_begin", self.handle.pointer, threads, C.byref(quote.pointer))
             for value in values:
                 call("host_quote_add", quote.pointer, C.byref(abi.Pair(name.encode(), repr(value).encode())), value == own)
+            if other:
+                with other.alone() as pointer:
+                    other.handle.pointer, quote.kept = C.c_void_p(), (self.handle, other.handle)
+                    call("host_quote_add_other", quote.pointer, pointer)
             call("host_quote_finish", quote.pointer, C.byref(view), C.byref(rows), C.byref(count))
             return [abi.HostQuoteRow.from_buffer_copy(row) for row in rows[:count.value]]
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from typing import Callable, NamedTuple, Optional
 
+from .criterion import load
 from .driver import Driver, Result, Watcher
 from .host import HostFrame
 from .library import LullError, Parameter
@@ -56,16 +57,21 @@ def _is_dear(driver: Driver) -> bool:
 
 
 def rows(driver: Driver) -> list[Row]:
-    """Coarse to fine; [] if the criterion has no quality parameter or cannot be asked. Every active block has been
-    checked once at least."""
+    """Coarse to fine, or what the denoised and the noisy picture take; [] if the criterion has no quality parameter or cannot
+    be asked. Every active block has been checked once at least."""
+    frame, noisy = driver.frame, None
     try:
-        parameter, chosen = _dial_of(driver.frame)
-        settings = [(chosen, "chosen")] if _is_dear(driver) else _settings(parameter, chosen)
-        costs = driver.frame.quote(driver.threads, parameter.name, [value for value, _ in settings], chosen)
+        parameter, chosen = _dial_of(frame)
+        settings = _settings(parameter, chosen)
+        if _is_dear(driver):
+            noisy = load("observer", threads=frame.criterion.threads, log=frame.criterion.log)
+            settings = [(chosen, "denoised"), (float(noisy.info.parameter("visible").default), "noisy")]
+        values = [value for value, _ in settings[:1 if noisy else None]]
+        costs = frame.quote(driver.threads, parameter.name, values, chosen, noisy)
     except (LullError, KeyError):
         return []
     return [Row(parameter.name, value, name, (cost.spp_min, cost.spp_mean, cost.spp_max), cost.wall_s, cost.unknown > 0,
-                value == chosen) for (value, name), cost in zip(settings, costs)]
+                bool(cost.asked)) for (value, name), cost in zip(settings, costs)]
 
 
 def telling(tell: Callable[[str], None]) -> Watcher:

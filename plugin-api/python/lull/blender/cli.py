@@ -34,9 +34,9 @@ def parser() -> argparse.ArgumentParser:
                    "--denoise denoised)")
     p.add_argument("-p", "--param", action="append", default=[], metavar="KEY=VALUE", help="parameter of the criterion")
     p.add_argument("--visible", metavar="SHARE", help="stop when at most this share of viewers would still see noise")
-    p.add_argument("--denoise", default="", choices=denoising.KINDS, metavar="blend|full", help="keep the denoised picture, "
-                   "and stop blocks by what is seen of it: =blend (default) keeps as much of the noisy one as the denoiser "
-                   "is wrong, =full none; needs Open Image Denoise 2")
+    p.add_argument("--denoise", default="", choices=denoising.KINDS, metavar="[=blend|full]", help="keep the denoised "
+                   "picture, and stop blocks by what is seen of it: blend (default) keeps as much of the noisy one as the "
+                   "denoiser is wrong, full none; needs Open Image Denoise 2")
     p.add_argument("--spp-min", type=int, default=16, metavar="N", help="samples before the first check (default 16)")
     p.add_argument("--spp-max", type=int, metavar="N", help="most samples of a block (default: the scene's Max Samples)")
     p.add_argument("--time-budget", type=float, metavar="SECONDS", help="per frame; 0 = no limit (default: the scene's Time "
