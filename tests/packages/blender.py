@@ -39,7 +39,7 @@ def use(folder: str) -> None:
     scene.render.engine, scene.cycles.device, scene.cycles.samples = "CYCLES", "CPU", 64
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 48, 36, 100
     scene.lull.block = 24
-    for criterion in ("observer", "ggn"):
+    for criterion in ("observer", "ggn", *(("denoised",) if EXTENSION else ())):  # by the denoiser of these Blenders
         scene.lull.folder = os.path.join(folder, criterion)
         os.mkdir(scene.lull.folder)
         scene.lull.criterion = criterion

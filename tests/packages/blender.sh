@@ -29,6 +29,7 @@ if command -v blender >/dev/null; then
 else skip "Blender" "no blender"; fi
 if version=$("$bpy" -c 'import bpy; print(bpy.app.version_string)' 2>/dev/null | tail -n 1) && [ "$version" ]; then
     try "bpy $version" "$bpy" "$PWD/tests/packages/blender.py" --
+    t "  …rendered by denoised, with Blender's own denoiser" held "rendered by denoised"
     cli=$(find build/hosts/bpy/lib -path '*bl_pkg/cli/blender_ext.py' | head -n 1)
     if [ "$cli" ]; then t "Blender's validation of extensions" "$bpy" "$cli" validate --valid-tags= "$zip"; else skip "Blender's validation of extensions" "no bl_pkg"; fi
 else skip "bpy" "not in build/hosts/bpy"; fi

@@ -87,17 +87,20 @@ def library() -> C.CDLL:
 
 
 def _prepare_denoiser() -> None:
-    """For the criterion `denoised`, which runs a program: unpacked by Blender it is not executable yet; and the Open Image
-    Denoise of the package pyoidn (the extra lull[denoise]) is found."""
+    """For the criterion `denoised`, which runs a program: unpacked by Blender it is not executable yet. LULL_OIDN is set to
+    the Open Image Denoise of the package pyoidn (the extra lull[denoise]) or else of the Blender that this runs in."""
     program = CARRIED / "lull" / "modules" / "lull-denoiser"
     if program.exists() and not os.access(program, os.X_OK):
         with contextlib.suppress(OSError):
             program.chmod(0o755)
-    package = importlib.util.find_spec("pyoidn")
-    if package and package.origin and "LULL_OIDN" not in os.environ:
-        folder = Path(package.origin).parent / "oidn"
-        if (folder / "lib" / "libOpenImageDenoise.so.2").exists():
-            os.environ["LULL_OIDN"] = str(folder)
+    package, folders = importlib.util.find_spec("pyoidn"), []
+    if package and package.origin:
+        folders.append(Path(package.origin).parent / "oidn")
+    if "bpy" in sys.modules:
+        folders.append(Path(sys.modules["bpy"].utils.resource_path("LOCAL")).parent)
+    found = [folder for folder in folders if (folder / "lib" / "libOpenImageDenoise.so.2").exists()]
+    if found:
+        os.environ.setdefault("LULL_OIDN", str(found[0]))
 
 
 def call(name: str, *arguments: Any) -> None:
