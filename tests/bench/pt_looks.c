@@ -5,8 +5,8 @@
  *
  * The scene is rendered once, SIZE x SIZE pixels without stopping any of its blocks of BLOCK pixels; FOLDER keeps the film of
  * each number of samples (SPP.film), from which the next run goes on without rendering. Each is shown to the criterion, with
- * the parameter KEY, if one is given: one line of JSON a block. The pictures are written beside the films: SPP-noisy.exr,
- * SPP-denoised.exr, SPP-blend.exr. All times are processor seconds, those of the denoiser's process among them.
+ * the parameter KEY, if one is given: one line of JSON a block. The pictures are written beside the films: SPP-noisy.png,
+ * SPP-denoised.png, SPP-blend.png. All times are processor seconds, those of the denoiser's process among them.
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -97,27 +97,35 @@ static void ask(struct pt_render *r, const char *name, struct lull_decision *d)
     lull_host_close(c);
 }
 
-/* Three pictures of one number of samples, sRGB. */
+static void name_picture(char path[1024], uint64_t spp, const char *kind)
+{
+    snprintf(path, 1024, "%s/%llu-%s.png", o.folder, (unsigned long long)spp, kind);
+}
+
+/* Three pictures of one number of samples, sRGB; the last is there when all are. */
 static void write_pictures(const struct pt_render *r, uint64_t spp)
 {
     static const char *const kinds[] = {"noisy", "denoised", "blend"};
+    char path[1024];
     struct pt_denoised d;
     struct base_err err = {0};
+    name_picture(path, spp, kinds[2]);
+    if (access(path, F_OK) == 0)
+        return;
     if (pt_denoised_make(r, PT_PICTURE_BLEND, NULL, NULL, &d, &err))
         die(&err);
     for (int k = 0; k < 3; k++) {
-        char path[1024];
         struct pt_denoised shown = d;
         const struct pt_output_info info = {.denoised = &shown};
         shown.rgb = k == 1 ? d.denoised : d.rgb;
-        snprintf(path, sizeof path, "%s/%llu-%s.png", o.folder, (unsigned long long)spp, kinds[k]);
-        if (access(path, F_OK) && pt_output_preview(path, r, k ? &info : NULL, &err))
+        name_picture(path, spp, kinds[k]);
+        if (pt_output_preview(path, r, k ? &info : NULL, &err))
             die(&err);
     }
     pt_denoised_release(&d);
 }
 
-static void look(struct pt_render *r, uint64_t spp, double render_s)
+static void look(struct pt_render *r, uint64_t spp)
 {
     struct lull_decision noisy[BLOCKS_MAX], d[BLOCKS_MAX];
     double before_s = spent_s(), spent;
@@ -126,9 +134,8 @@ static void look(struct pt_render *r, uint64_t spp, double render_s)
     ask(r, "observer", noisy);
     for (uint32_t i = 0; i < r->blocks->count; i++)
         printf("{\"spp\": %llu, \"block\": %u, \"error\": %.6f, \"halves\": %.6f, \"crossed\": %.6f, \"noisy\": %.6f, "
-               "\"look_s\": %.4f, \"render_s\": %.4f}\n",
-               (unsigned long long)spp, i, d[i].error, halves[i], crossed[i], noisy[i].error, spent / r->blocks->count,
-               render_s / r->blocks->count);
+               "\"look_s\": %.4f}\n",
+               (unsigned long long)spp, i, d[i].error, halves[i], crossed[i], noisy[i].error, spent / r->blocks->count);
     fflush(stdout);
 }
 
@@ -136,34 +143,27 @@ static void look(struct pt_render *r, uint64_t spp, double render_s)
 static void run(const struct pt_render_config *config, struct pt_scene *scene, struct base_threads *threads)
 {
     const struct pt_render_hooks hooks = {0};
+    pt_kernel *kernel = pt_kernel_select(scene->effects, NULL, NULL);
     struct base_err err = {0};
     struct pt_render *r = NULL;
-    double render_s = 0;
     int stopped = 0;
     for (int k = 0; k < o.levels; k++) {
         char path[1024], settings[64];
         snprintf(settings, sizeof settings, "size=%d block=%d seed=%d\n", o.size, o.block, o.seed);
         snprintf(path, sizeof path, "%s/%llu.film", o.folder, (unsigned long long)o.spp[k]);
-        if (!r && pt_render_create(config, scene, scene ? pt_kernel_select(scene->effects, NULL, NULL) : NULL, threads, NULL,
-                                   &r, &err))
+        if (!r && pt_render_create(config, scene, kernel, threads, NULL, &r, &err))
             die(&err);
         if (access(path, F_OK) == 0) {
             pt_render_destroy(r); /* a checkpoint wants a fresh one */
             r = NULL;
-            if (pt_render_create(config, scene, scene ? pt_kernel_select(scene->effects, NULL, NULL) : NULL, threads, NULL,
-                                 &r, &err) ||
+            if (pt_render_create(config, scene, kernel, threads, NULL, &r, &err) ||
                 pt_checkpoint_load(path, r, settings, &err))
                 die(&err);
-        } else {
-            double before_s = spent_s();
-            if (pt_render_advance(r, o.spp[k], &hooks, &stopped, &err))
-                die(&err);
-            render_s += spent_s() - before_s;
-            if (pt_checkpoint_save(path, r, settings, &err))
-                die(&err);
+        } else if (pt_render_advance(r, o.spp[k], &hooks, &stopped, &err) || pt_checkpoint_save(path, r, settings, &err)) {
+            die(&err);
         }
         write_pictures(r, o.spp[k]);
-        look(r, o.spp[k], render_s);
+        look(r, o.spp[k]);
     }
     pt_render_destroy(r);
 }

@@ -1,0 +1,209 @@
+"""Holds what the criterion `denoised` believes against two references: a table for docs/denoised.md.
+
+Of every scene of the plan two independent references are rendered, and one render is looked at again and again as its samples grow
+(tests/bench/pt_looks.c): what is believed of each block, and the noisy, the denoised and the blended picture. Their visible errors
+against the two references, whose noise is taken out (`ggn visible --second`), are the truth. Stops are read from the looks: a block
+stops when a look at n and the next one at 1.25 n are both low enough. Times are processor seconds, of the denoiser's process too."""
+import json
+import math
+import os
+import statistics
+import sys
+
+from lablib import tables, tool
+
+SCENES = ["scenes/%s.pbrt" % name for name in "demo rock-garden kitchen cornell-box garage defocus harbour bathroom office".split()] + [
+    os.path.join("..", "shared", "scenes", name) for name in ("coffee-v3/scene.pbrt", "veach-mis-v4/veach-mis.pbrt",
+                                                              "cornell-bunny-v4/cornell_bunny_conductor.pbrt")]
+SIZE, BLOCK, SEED, REFERENCES, PRICE_SPP = 256, 128, 1, (101, 102), 32
+LOOKS, AGAIN = (32, 64, 128, 256, 512), 1.25
+LEVELS = sorted(LOOKS + tuple(int(AGAIN * n) for n in LOOKS))
+KINDS = ("noisy", "denoised", "blend")
+VISIBLE = 1.05  # beyond this an error counts as visible: the references' own noise scatters the truth by some per cent
+HEAD = ("scene", "blocks", "samples until nothing is seen: noisy / denoised / blend", "blend / noisy", "stopped, of these visibly off",
+        "worst", "samples at the stop", "processor s: noisy / denoised", "FLIP at 128: noisy / denoised / blend")
+
+
+def options(parser):
+    parser.add_argument("--scenes", nargs="+", default=SCENES, metavar="SCENE.pbrt", help="(twelve, three of them by other hands)")
+    parser.add_argument("--reference-spp", type=int, default=640, metavar="N", help="of each reference; those that are there stay (640)")
+    parser.add_argument("--work", type=tool.path, default=os.path.join(tool.BUILD, "denoised"), metavar="DIR",
+                        help="references, films, pictures; what is there is not made again (build/denoised)")
+    parser.add_argument("--quality", choices=("fast", "balanced", "high"), default="high", help="of the denoiser in the looks (high)")
+    tool.writes(parser)
+
+
+def name_of(scene):
+    return "%s-%s" % (os.path.basename(os.path.dirname(scene)), os.path.basename(scene)[:-5])
+
+
+def references(o, scene):
+    paths = [os.path.join(o.work, "%s.%d.exr" % (name_of(scene), seed)) for seed in REFERENCES]
+    for path, seed in zip(paths, REFERENCES):
+        if not os.path.exists(path):
+            ck = path + ".ck"
+            tool.run(tool.RENDER, scene, "--size", "%dx%d" % (SIZE, SIZE), "--block", BLOCK, "--seed", seed, "--spp", o.reference_spp, "-q",
+                     "--checkpoint", ck, *(["--resume"] if os.path.exists(ck) else []), "-o", path + ".tmp.exr")
+            os.replace(path + ".tmp.exr", path)
+    mean = os.path.join(o.work, name_of(scene) + ".exr")
+    if not os.path.exists(mean):
+        tool.run("oiiotool", *(word for path in paths for word in (path, "--ch", "R,G,B")), "--add", "--mulc", "0.5", "-o", mean)
+    return paths, mean
+
+
+def measure(o, scene):
+    """Of every look at every block what was believed, and of every picture what is true."""
+    paths, mean = references(o, scene)
+    folder = os.path.join(o.work, name_of(scene))
+    told = tool.run(os.path.join(tool.BUILD, "bench", "pt_looks"), scene, SIZE, BLOCK, SEED, folder, ",".join(map(str, LEVELS)),
+                    "quality=" + o.quality)
+    looks = [json.loads(line) for line in told.splitlines()]
+    report = os.path.join(o.work, "price.json")
+    tool.run(tool.RENDER, scene, "--size", "%dx%d" % (SIZE, SIZE), "--block", BLOCK, "--spp", PRICE_SPP, "-q", "--report", report)
+    price = [b["thread_s"] / PRICE_SPP for b in tool.load(report)["blocks"]]
+    for look in looks:
+        look["sample_s"] = price[look["block"]]
+    for n in LEVELS:
+        for kind in KINDS:
+            picture = os.path.join(folder, "%d-%s.png" % (n, kind))
+            seen = json.loads(tool.ggn("visible", paths[0], picture, "--second", paths[1], "--block", BLOCK, "--json"))
+            flip = json.loads(tool.ggn("flip", mean, picture, "--json"))["mean"]
+            for look in looks:
+                if look["spp"] == n:
+                    look["true_" + kind], look["flip_" + kind] = seen["blocks"][look["block"]]["error"], flip
+    return looks
+
+
+def low_enough():
+    """The error at which the default of --visible stops."""
+    observer = tool.load(tool.ROOT, "ggn", "observer", "observer.json")
+    return 2 ** (observer["spread"] * statistics.NormalDist().inv_cdf(tool.default("denoised", "visible")) / 2)
+
+
+def until_invisible(looks, kind):
+    """Samples from which on the truth stays at 1 or below. Beyond the last look the error is taken to fall as that of noise."""
+    errors = [(look["spp"], max(look["true_" + kind], 1e-3)) for look in looks]
+    if errors[-1][1] > 1:
+        return errors[-1][0] * errors[-1][1] ** 2
+    last = max([i for i, (_, e) in enumerate(errors) if e > 1], default=None)
+    if last is None:
+        return errors[0][0]
+    (n0, e0), (n1, e1) = errors[last:last + 2]
+    return n0 * (n1 / n0) ** (math.log(e0) / math.log(e0 / e1))
+
+
+def stop(looks, limit, what):
+    """The look at which a block stops by looks[what]; None: it goes on."""
+    at = {look["spp"]: look for look in looks}
+    for n in LOOKS:
+        if at[n][what] <= limit and at[int(AGAIN * n)][what] <= limit:
+            return at[int(AGAIN * n)]
+    return None
+
+
+def ranks(values):
+    order, out = sorted(range(len(values)), key=values.__getitem__), [0] * len(values)
+    for rank, i in enumerate(order):
+        out[i] = rank
+    return out
+
+
+def block(looks, limit):
+    """Figures of one block, from its looks."""
+    ended, wrongly = stop(looks, limit, "error"), stop(looks, limit, "halves")
+    until = {kind: until_invisible(looks, kind) for kind in KINDS}
+    sample_s = looks[-1]["sample_s"]
+    b = {"until": until, "ratio": until["blend"] / until["noisy"], "noisy_s": until["noisy"] * sample_s,
+         "halves": wrongly and wrongly["true_blend"]}
+    if ended:
+        asked = [n for n in LOOKS if AGAIN * n <= ended["spp"]]
+        looks_s = (len(asked) + 1) * ended["look_s"]
+        b.update(looks_s=looks_s, spp=ended["spp"], true=ended["true_blend"], believed=ended["error"], noisy=ended["true_noisy"],
+                 denoised_s=ended["spp"] * sample_s + looks_s)
+    return b
+
+
+def summary(rows, looks, limit):
+    blocks = [b for r in rows for b in r["blocks"]]
+    stopped = [b for b in blocks if "spp" in b]
+    halves = [b["halves"] for b in blocks if b["halves"]]
+    off = lambda values: sum(v > VISIBLE for v in values)
+    believed, true = ranks([x["error"] for x in looks]), ranks([x["true_blend"] for x in looks])
+    late = [x for x in looks if x["spp"] >= 64]
+    mean = statistics.mean(b["spp"] for b in stopped)
+    near = min(LEVELS, key=lambda n: abs(math.log(n / mean)))
+    uniform = lambda kind: off(x["true_" + kind] for x in looks if x["spp"] == near) / len(blocks)
+    return {"limit": limit, "blocks": len(blocks), "scenes": len(rows), "stopped": len(stopped), "off": off(b["true"] for b in stopped),
+            "worst": max(b["true"] for b in stopped), "ratio": statistics.median(b["ratio"] for b in blocks),
+            "ratio_max": max(b["ratio"] for b in blocks), "dearer": sum(b["ratio"] > 1.05 for b in blocks),
+            "denoised_ratio": statistics.median(b["until"]["denoised"] / b["until"]["noisy"] for b in blocks),
+            "denoised_dearer": sum(b["until"]["denoised"] > 1.05 * b["until"]["noisy"] for b in blocks),
+            "stop_ratio": statistics.median(b["spp"] / b["until"]["noisy"] for b in stopped),
+            "halves": len(halves), "halves_off": off(halves), "halves_worst": max(halves),
+            "spearman": statistics.correlation(believed, true), "over": statistics.median(x["error"] / max(x["true_blend"], 1e-3) for x in late),
+            "below": sum(x["error"] < x["true_blend"] / VISIBLE for x in late) / len(late),
+            "mean_spp": mean, "uniform_spp": near, "uniform_denoised": uniform("denoised"), "uniform_blend": uniform("blend"),
+            "uniform_noisy": uniform("noisy"), "time": statistics.median(b["denoised_s"] / b["noisy_s"] for b in stopped),
+            "looks_share": statistics.median(b["looks_s"] / b["denoised_s"] for b in stopped)}
+
+
+def scene_row(scene, looks, limit):
+    count = 1 + max(look["block"] for look in looks)
+    blocks = [block([x for x in looks if x["block"] == i], limit) for i in range(count)]
+    flip = {kind: next(x["flip_" + kind] for x in looks if x["spp"] == 128) for kind in KINDS}
+    return {"scene": name_of(scene), "blocks": blocks, "flip": flip}
+
+
+def cells(r):
+    stopped = [b for b in r["blocks"] if "spp" in b]
+    median = lambda values, form="%.0f": tables.figure(statistics.median(values), form) if values else "–"
+    off = sum(b["true"] > VISIBLE for b in stopped)
+    return [r["scene"].replace("scenes-", ""), str(len(r["blocks"])),
+            " / ".join(median([b["until"][kind] for b in r["blocks"]]) for kind in KINDS), median([b["ratio"] for b in r["blocks"]], "%.2f"),
+            "%d, %s" % (len(stopped), "**%d**" % off if off else "0"), tables.figure(max((b["true"] for b in stopped), default=math.nan)),
+            median([b["spp"] for b in stopped]), "%s / %s" % (median([b["noisy_s"] for b in stopped], "%.1f"),
+                                                            median([b["denoised_s"] for b in stopped], "%.1f")),
+            " / ".join("%.3f" % r["flip"][kind] for kind in KINDS)]
+
+
+def text(rows, s):
+    lines = [
+        "%d of %d blocks stop within %d samples; of these **%d** (%.0f %%) are visibly off (above %.2f of just seen), the worst %.2f" % (
+            s["stopped"], s["blocks"], LEVELS[-1], s["off"], 100 * s["off"] / s["stopped"], VISIBLE, s["worst"]),
+        "the halves alone would have stopped %d blocks, %d (%.0f %%) of them visibly off, the worst %.2f" % (
+            s["halves"], s["halves_off"], 100 * s["halves_off"] / max(1, s["halves"]), s["halves_worst"]),
+        "samples until nothing is seen, against those of the noisy picture, median over all blocks: blend **%.2f** (%d blocks dearer than "
+        "1.05, the worst %.2f), denoised alone %.2f (%d dearer); where it stopped, %.2f" % (
+            s["ratio"], s["dearer"], s["ratio_max"], s["denoised_ratio"], s["denoised_dearer"], s["stop_ratio"]),
+        "believed against true over all looks: Spearman **%.2f**; from 64 samples on, believed / true has the median %.2f and is below "
+        "1/%.2f in %.0f %% of the looks" % (s["spearman"], s["over"], VISIBLE, 100 * s["below"]),
+        "the same number of samples everywhere (%d, where stopped blocks have %.0f in the mean): visibly off are %.0f %% of the blocks of the "
+        "blend, %.0f %% of the denoised picture, %.0f %% of the noisy one" % (
+            s["uniform_spp"], s["mean_spp"], 100 * s["uniform_blend"], 100 * s["uniform_denoised"], 100 * s["uniform_noisy"]),
+        "processor time of a stopped block with its looks, against the noisy picture until nothing is seen: median %.2f; "
+        "the looks are %.0f %% of it" % (s["time"], 100 * s["looks_share"])]
+    return "%s\n%s" % (tables.table(HEAD, [cells(r) for r in rows]), "".join("- %s\n" % line for line in lines))
+
+
+def page(results):
+    return "%s.\n\n%s" % (tables.told(results["measured"]), text(results["rows"], results["summary"]))
+
+
+def main(o):
+    os.makedirs(o.work, exist_ok=True)
+    limit, rows, all_looks = low_enough(), [], []
+    for scene in o.scenes:
+        kept = os.path.join(o.work, "%s.%s.json" % (name_of(scene), o.quality))
+        if not os.path.exists(kept):
+            if not os.path.exists(os.path.join(tool.ROOT, scene)):
+                print("lab denoised: %s is not here, left out" % scene, file=sys.stderr)
+                continue
+            tool.save(measure(o, scene), kept, indent=None)
+        looks = tool.load(kept)
+        all_looks += looks
+        rows.append(scene_row(scene, looks, limit))
+        print("| %s |" % " | ".join(cells(rows[-1])), flush=True)
+    s = summary(rows, all_looks, limit)
+    print(text(rows, s))
+    if o.write:
+        tool.store(o.write, "denoised", {"measured": tool.measured(), "rows": rows, "summary": s})
