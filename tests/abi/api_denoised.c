@@ -176,7 +176,7 @@ static void two_looks_stop(void **unused)
     make(0.5, 0, 0.004);
     start(&s, "constant", "denoised");
     struct lull_decision d = answer(&s, 0, 16);
-    assert_true(d.action == LULL_CONTINUE && (d.flags & LULL_DECISION_TOO_EARLY) && d.next_spp == 32);
+    assert_true(d.action == LULL_CONTINUE && (d.flags & LULL_DECISION_TOO_EARLY) && d.next_spp == 64);
     d = answer(&s, 0, 64);
     assert_true(d.action == LULL_CONTINUE && d.next_spp == 80 && d.error < 0.7 && d.p_noisy < 0.35);
     assert_true(answer(&s, 0, 64).action == LULL_CONTINUE); /* the same question is no second look */

@@ -24,7 +24,7 @@ enum {
 static const struct lull_param params[P_COUNT] = {
     [P_VISIBLE] = LULL_KIT_FLOAT("visible", "0.35", 1e-4, 0.9999,
                                  "stop when at most this share of viewers would still see an error of the denoised picture"),
-    [P_FIRST_SPP] = LULL_KIT_INT("first-spp", "32", 2, 1e15, "samples per pixel before the first judgement"),
+    [P_FIRST_SPP] = LULL_KIT_INT("first-spp", "64", 2, 1e15, "samples per pixel before the first judgement"),
     [P_GROWTH] = LULL_KIT_FLOAT("growth", "2", 1.5, 100, "largest ratio of samples between two checks of a block"),
     [P_PICTURE] = LULL_KIT_CHOICE("picture", "blend", "blend|denoised",
                                   "what is kept: the blend of noisy and denoised picture, or the denoised one alone"),
