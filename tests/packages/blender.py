@@ -46,6 +46,7 @@ def use(folder: str) -> None:
         assert bpy.ops.lull.render() == {"FINISHED"} and "blocks converged" in scene.lull.state, scene.lull.state
         assert os.path.getsize(os.path.join(scene.lull.folder, "lull.exr")) > 1000
         print("HELD rendered by", criterion, flush=True)
+    bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, "cube.blend"))
 
 
 {"install": install, "use": use}[ARGUMENTS[0]](*ARGUMENTS[1:])

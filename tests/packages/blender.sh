@@ -26,6 +26,9 @@ try() { # try NAME COMMAND...: in a home of its own
 skip() { n=$((n + 1)); echo "ok $n - $1 # SKIP $2: make test-hosts"; }
 if command -v blender >/dev/null; then
     try "Blender $(blender --version 2>/dev/null | sed -n '1s/Blender //p')" blender -b -noaudio --python-exit-code 3 --python "$PWD/tests/packages/blender.py" --
+    t "  …rendered by the command line" env -i HOME="$home" PATH=/usr/bin:/bin blender -b "$home/cube.blend" -noaudio --python-exit-code 3 --python-expr \
+        "import sys; from lull.blender import cli; sys.exit(cli.main())" -- -c fixed --spp-max 2 --spp-min 2 -q -o "$home/out.exr"
+    t "  …to a picture" test -s "$home/out.exr"
 else skip "Blender" "no blender"; fi
 if version=$("$bpy" -c 'import bpy; print(bpy.app.version_string)' 2>/dev/null | tail -n 1) && [ "$version" ]; then
     try "bpy $version" "$bpy" "$PWD/tests/packages/blender.py" --

@@ -76,6 +76,14 @@ END
 } >"$tmp/host.py"
 t "the host of the package's README" run "$tmp/host.py"
 t "  …leaves its files" sh -c "cd $tmp && [ -s picture.exr ] && [ -s report.json ] && [ -s stop-map.png ]"
+# Blender has a Python of its own: what lies beside lull here must not come before it.
+if command -v blender >/dev/null; then
+    echo 'raise ImportError("of another Python")' >"$site/json.py"
+    blender -b --factory-startup -noaudio --python-expr "import bpy; s = bpy.context.scene; s.render.engine = 'CYCLES'; s.render.resolution_x = 48; \
+s.render.resolution_y = 36; bpy.ops.wm.save_as_mainfile(filepath='$tmp/cube.blend')" >"$tmp/log" 2>&1
+    t "python -m lull.blender, by the Blender on PATH" sh -c "cd $tmp && $python -m lull.blender cube.blend -c halfbuf --spp-max 32 -q -o cube.exr && [ -s cube.exr ]"
+    rm "$site/json.py"
+else n=$((n + 1)); echo "ok $n - python -m lull.blender # SKIP no blender: make test-hosts"; fi
 extras() { for e in denoise:pyoidn mitsuba:mitsuba blender:bpy; do
     unzip -p "$wheel" '*/METADATA' | grep -q "^Requires-Dist: ${e#*:}.*extra == \"${e%:*}\"" || return; done; }
 t "the extras denoise, mitsuba and blender" extras

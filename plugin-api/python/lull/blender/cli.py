@@ -80,8 +80,8 @@ def launch(argv: Optional[Sequence[str]] = None) -> int:
         if not program:
             print(f"lull: no program '{options.blender}': install Blender or name it with --blender", file=sys.stderr)
             return 2
-        package = str(Path(__file__).resolve().parents[2])
-        code = f"import sys; sys.path.insert(0, {package!r}); from lull.blender import cli; sys.exit(cli.main())"
+        folder = str(Path(__file__).resolve().parents[2])  # last: what else lies there is of another Python
+        code = f"import sys; sys.path.append({folder!r}); from lull.blender import cli; sys.exit(cli.main())"
         sys.stdout.flush()
         os.execv(program, [program, "-b", "--factory-startup", "-noaudio", "--python-exit-code", "2", "--python-expr", code,
                            "--", *argv])
