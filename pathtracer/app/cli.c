@@ -293,6 +293,7 @@ static const struct base_option options[] = {
     {"display-server", 0, "HOST[:PORT]", TO(display),
      .help = "Show the image while rendering in an image viewer that listens there (tev, HDRView); port 14158 if none is "
              "named"},
+    {"no-progress", 0, NULL, TO(no_progress), .help = "Plain lines now and then, also on a terminal (as with NO_COLOR set)"},
     {"quiet", 'q', NULL, TO(quiet), .help = "No progress, no notes"},
     {.help = "Interrupting and going on:"},
     {"checkpoint", 0, "FILE", TO(checkpoint.path), .output = BASE_FILE, .kind = &pt_checkpoint_kind,

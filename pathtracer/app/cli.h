@@ -74,7 +74,7 @@ struct pt_cli {
     int debug[3];      /* x, y, sample of --debug-path */
     char *const *argv; /* borrows; [argc], options first */
     int argc;
-    int all_effects, quiet;
+    int all_effects, quiet, no_progress;
     uint64_t spp; /* the same everywhere, 0 = not given; render.spp_min and spp_max are it, then */
 };
 

@@ -1,4 +1,6 @@
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "actions.h"
 #include "agree.h"
@@ -61,6 +63,13 @@ static int run(struct pt_cli *cli, struct job *job, struct base_log *log, int *s
     return rc;
 }
 
+/* no-color.org: set and not empty; a terminal without a cursor that moves. */
+static int wants_plain_lines(void)
+{
+    const char *no_color = getenv("NO_COLOR"), *term = getenv("TERM");
+    return (no_color && *no_color) || (term && strcmp(term, "dumb") == 0);
+}
+
 int main(int argc, char **argv)
 {
     static struct pt_cli cli;
@@ -72,6 +81,8 @@ int main(int argc, char **argv)
         rc = err.code;
     struct base_log log;
     base_log_init(&log, job_rank(job) == 0 ? stderr : NULL, "lull-render", cli.quiet);
+    if (cli.no_progress || wants_plain_lines())
+        log.terminal = 0;
     job_watch(job, pt_cli_is_shot(&cli) ? 0.0 : cli.rank_timeout_s, &base_interrupted); /* whole frames take long */
     if (!rc)
         rc = pt_cli_is_shot(&cli) ? pt_shot_run(&cli, job, run, &log, &status, &err) : run(&cli, job, &log, &status, &err);

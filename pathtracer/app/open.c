@@ -204,6 +204,7 @@ int pt_open_render(struct pt_cli *cli, struct job *job, struct base_log *log, st
     if (c->crop[2] > c->width || c->crop[3] > c->height)
         return base_fail(err, BASE_EINVAL, "--crop %d,%d,%d,%d: the image has %dx%d pixels", c->crop[0], c->crop[1],
                          c->crop[2], c->crop[3], c->width, c->height);
+    o->params = &cli->params;
     rc = open_denoiser(cli, o, err);
     if (!rc && (cli->criterion || !(records || c->uniform)))
         rc = open_criterion(cli, log, o, err);

@@ -28,6 +28,7 @@ struct pt_open {
     enum pt_picture picture;               /* that is kept */
     const char *denoiser;                  /* library that makes it, as for lull_host_denoising */
     struct lull_plane mask;                /* data NULL: none */
+    const struct pt_cli_params *params;    /* borrows; of the criterion, as given */
     struct lull_host_criterion *criterion; /* NULL: uniform, or a recording that asks none */
     char settings[4096];      /* what decides the image, for checkpoints and other processes; "" when there are none */
     struct pt_render *render; /* of an image or its quote */

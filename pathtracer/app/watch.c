@@ -1,13 +1,40 @@
 #include "watch.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "base/clock.h"
 #include "base/files.h"
 #include "base/interrupt.h"
+#include "base/options.h"
 #include "render/checkpoint.h"
 #include "render/host_planes.h"
 #include "render/output.h"
+
+/* By the first of these that is set, as the C library does. */
+static int speaks_utf8(void)
+{
+    static const char *const names[] = {"LC_ALL", "LC_CTYPE", "LANG"};
+    const char *locale = NULL;
+    for (size_t i = 0; i < sizeof names / sizeof names[0] && (!locale || !*locale); i++)
+        locale = getenv(names[i]);
+    return locale &&
+           (strstr(locale, "UTF-8") || strstr(locale, "utf8") || strstr(locale, "UTF8") || strstr(locale, "utf-8"));
+}
+
+static void tell_quality(const struct pt_open *o, char *text, size_t room)
+{
+    static const char *const names[] = {"visible", "threshold"};
+    const char *value = NULL;
+    double number;
+    for (size_t i = 0; i < sizeof names / sizeof names[0] && !value && o->criterion; i++) {
+        value = lull_host_parameter(lull_host_table(o->criterion), names[i], o->params->list, o->params->count, NULL);
+        if (value && base_parse_real(value, -1e300, 1e300, &number))
+            snprintf(text, room, "criterion %s, %s %g", lull_host_table(o->criterion)->id, names[i], number);
+    }
+}
 
 void pt_watch_init(struct pt_watch *w, const struct pt_open *open, const struct pt_checkpoint_plan *checkpoint,
                    const char *preview, struct base_log *log)
@@ -18,6 +45,8 @@ void pt_watch_init(struct pt_watch *w, const struct pt_open *open, const struct 
                            .preview = preview,
                            .checkpoint_at_s = base_clock_wall_s() + checkpoint->every_s};
     pt_progress_init(&w->progress, log);
+    w->progress.map = log->terminal && speaks_utf8();
+    tell_quality(open, w->progress.quality, sizeof w->progress.quality);
 }
 
 int pt_watch_display(struct pt_watch *w, const char *address, const char *scene, struct base_err *err)

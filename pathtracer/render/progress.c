@@ -2,8 +2,10 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "base/clock.h"
+#include "render/progress_map.h"
 
 static const double LIVE_S = 0.2, FIRST_PLAIN_S = 2.0, PLAIN_S = 10.0;
 
@@ -33,6 +35,23 @@ void pt_progress_text(const struct pt_render *r, double *percent_shown, char *te
                        room);
 }
 
+/* Half of the terminal, of which something else was said before. A longer line would be broken by the terminal. */
+static void show_map(struct pt_progress *p, const struct pt_render *r, const char *line)
+{
+    enum { MOST_COLUMNS = 160, MOST_LINES = 40 };
+    int columns, lines;
+    char text[PT_PROGRESS_MAP_ROOM(MOST_COLUMNS, MOST_LINES) + 512];
+    base_log_size(p->log, &columns, &lines);
+    columns = columns < MOST_COLUMNS ? columns : MOST_COLUMNS;
+    lines = lines < 2 * MOST_LINES ? lines : 2 * MOST_LINES;
+    int shown = pt_progress_map(r->blocks, columns - 1, lines / 2, text, PT_PROGRESS_MAP_ROOM(MOST_COLUMNS, MOST_LINES));
+    size_t used = strlen(text);
+    if (shown > 0 && p->quality[0] && columns > 24)
+        used += (size_t)snprintf(text + used, sizeof text - used, "%.*s\n", columns - 1, p->quality);
+    snprintf(text + used, sizeof text - used, "%.*s", columns - 1, line + strspn(line, " "));
+    base_log_live(p->log, text);
+}
+
 void pt_progress_update(struct pt_progress *p, const struct pt_render *r)
 {
     double now_s = base_clock_wall_s();
@@ -43,6 +62,9 @@ void pt_progress_update(struct pt_progress *p, const struct pt_render *r)
         p->percent = 0.0; /* another render */
     p->samples = r->totals->samples;
     pt_progress_text(r, &p->percent, text, sizeof text);
-    base_log_live(p->log, text);
+    if (p->map)
+        show_map(p, r, text);
+    else
+        base_log_live(p->log, text);
     p->next_s = now_s + (p->log->terminal ? LIVE_S : PLAIN_S);
 }

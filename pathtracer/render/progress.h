@@ -15,6 +15,8 @@ struct pt_progress {
     double next_s;        /* wall time of the next line */
     double percent;       /* of the work, as the last line said … */
     uint64_t samples;     /* … when the render had so many */
+    int map;              /* above the line stand the blocks (render/progress_map.h), as large as a terminal has room */
+    char quality[48];     /* the criterion's quality parameter, told beside the map; "": it has none */
 };
 
 void pt_progress_init(struct pt_progress *progress, struct base_log *log);

@@ -14,7 +14,8 @@ struct base_log {
     const char *name; /* of the program, before each line; NULL: lines as they are */
     int quiet;        /* neither notes nor progress */
     int terminal;     /* out is one */
-    int live;         /* a live line stands there */
+    int live;         /* live lines that stand there */
+    int live_columns; /* characters of the longest of them */
 };
 
 void base_log_init(struct base_log *log, FILE *out, const char *name, int quiet);
@@ -23,9 +24,13 @@ void base_log_init(struct base_log *log, FILE *out, const char *name, int quiet)
 void base_log_say(struct base_log *log, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void base_log_note(struct base_log *log, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-/* Progress: in the place of the live line on a terminal, elsewhere a line like others, without the name. */
+/* Columns and lines of the terminal; 80 and 24 where it does not say. */
+void base_log_size(const struct base_log *log, int *columns, int *lines);
+
+/* Progress: in the place of what is live on a terminal, elsewhere a line like others, without the name. On a terminal text
+ * may have several lines, none longer than the terminal is wide, and colours that end with each. */
 void base_log_live(struct base_log *log, const char *text);
-/* Takes the live line away, before the stream is used by others. */
+/* Takes what is live away, before the stream is used by others. */
 void base_log_clear(struct base_log *log);
 
 #endif

@@ -561,9 +561,11 @@ static void progress_is_honest(void **state)
     pt_progress_text(&r, &percent, text, sizeof text);
     assert_string_equal(text, ">=  9%  1 of 2 blocks active  spp 97..97  12.50 Mpaths/s  ETA at most 5:10:44");
     blocks.flags = LULL_HOST_UNIFORM; /* nobody is asked */
+    list[0].next_spp = 1000;
     pt_progress_text(&r, &percent, text, sizeof text);
     assert_string_equal(text, "  9%  1 of 2 blocks active  spp 97..97  12.50 Mpaths/s  ETA 5:10:19");
     blocks.flags = 0;
+    list[0].next_spp = 120;
     list[1].reason = LULL_REASON_NONE;
     list[0].predicted_spp = list[1].predicted_spp = 150.0;
     list[1].asked = 1;
