@@ -13,7 +13,7 @@
 #include "sample/rng.h"
 #include "shot_table.h"
 
-enum { FRAMES_MAX = 1000000, PATH_BYTES_MAX = 1 << 26, NAME_ROOM = 4096, LINE_ROOM = 512 };
+enum { FRAMES_MAX = 1000000, PATH_BYTES_MAX = 1 << 26, NAME_ROOM = 4096, LINE_ROOM = 512, ONE_NAMES = 7 };
 
 /* --- which frames --------------------------------------------------------------------------------------------------- */
 
@@ -252,10 +252,11 @@ static int rename_all(struct pt_frame_cli *f, const struct pt_cli *from, int fra
 {
     struct pt_cli *c = &f->cli;
     char *names = f->names;
-    const char **paths[] = {&c->scene,        &c->files.output, &c->files.preview,
-                            &c->files.report, &c->files.page,   &c->checkpoint.path};
+    struct pt_image_files *files = &c->files;
+    const char **paths[ONE_NAMES] = {&c->scene,    &files->output, &files->preview,    &files->report,
+                                     &files->page, &files->quoted, &c->checkpoint.path};
     int rc = 0;
-    for (size_t i = 0; i < sizeof paths / sizeof *paths && !rc; i++)
+    for (int i = 0; i < ONE_NAMES && !rc; i++)
         rc = rename_one(&names, paths[i], frame, err);
     for (int i = 0; i < c->files.stop_map_count && !rc; i++)
         rc = rename_one(&names, &c->files.stop_maps[i], frame, err);
@@ -273,7 +274,7 @@ int pt_frame_cli_init(struct pt_frame_cli *f, const struct pt_cli *cli, const st
                       struct base_err *err)
 {
     f->cli = *cli;
-    f->names = calloc((size_t)(6 + cli->files.stop_map_count + cli->outputs.count), NAME_ROOM);
+    f->names = calloc((size_t)(ONE_NAMES + cli->files.stop_map_count + cli->outputs.count), NAME_ROOM);
     if (!f->names)
         return base_fail_nomem(err, "names");
     if (!cli->shot.same_seed)

@@ -9,8 +9,8 @@ made() { [ "$(ls "$@" 2>/dev/null | wc -l)" -eq $# ]; }
 cp "$scene" s_0001.pbrt
 sed 's/"float fov" 45/"float fov" 50/' "$scene" >s_0002.pbrt
 sed 's/"float fov" 45/"float fov" 55/' "$scene" >s_0003.pbrt
-t "frames of numbered scenes" "$P" s_%04d.pbrt --frames 1-3 $small --spp 4 -o f_%03d.exr --stop-map m_%d.csv --preview p%02d.png
-t "  …each with its files" made f_001.exr f_002.exr f_003.exr m_1.csv m_2.csv m_3.csv p01.png p02.png p03.png
+t "frames of numbered scenes" "$P" s_%04d.pbrt --frames 1-3 $small --spp 4 -o f_%03d.exr --stop-map m_%d.csv --preview p%02d.png --html h%d.html --report r%d.json
+t "  …each with its files" made f_001.exr f_002.exr f_003.exr m_1.csv m_2.csv m_3.csv p01.png p02.png p03.png h1.html h2.html h3.html r1.json r2.json r3.json
 "$P" s_0002.pbrt $small --spp 4 -o alone.exr --frames 2
 t "  …and the bytes of that frame alone" cmp alone.exr f_002.exr
 touch -d 2001-01-01 f_001.exr f_003.exr
