@@ -9,6 +9,7 @@ import math
 import os
 import statistics
 import sys
+import textwrap
 
 from lablib import tables, tool
 
@@ -58,7 +59,7 @@ def measure(o, scene):
     told = tool.run(os.path.join(tool.BUILD, "bench", "pt_looks"), scene, SIZE, BLOCK, SEED, folder, ",".join(map(str, LEVELS)),
                     "quality=" + o.quality)
     looks = [json.loads(line) for line in told.splitlines()]
-    report = os.path.join(o.work, "price.json")
+    report = os.path.join(o.work, name_of(scene) + ".price.json")
     tool.run(tool.RENDER, scene, "--size", "%dx%d" % (SIZE, SIZE), "--block", BLOCK, "--spp", PRICE_SPP, "-q", "--report", report)
     price = [b["thread_s"] / PRICE_SPP for b in tool.load(report)["blocks"]]
     for look in looks:
@@ -181,10 +182,10 @@ def text(rows, s):
         "processor time, looks included, which are %.0f %% of it" % (s["stop_ratio"], s["time"], 100 * s["looks_share"]),
         "believed against true over all looks: Spearman **%.2f**; from 64 samples on, believed / true has the median %.2f and is below "
         "1/%.2f in %.0f %% of the looks" % (s["spearman"], s["over"], VISIBLE, 100 * s["below"]),
-        "the same number of samples everywhere (%d, where stopped blocks have %.0f in the mean): visibly off are %.0f %% of the blocks of the "
+        "the same number of samples everywhere (%d, where stopped blocks have %.0f in the mean): visibly off are %.0f %% of all blocks of the "
         "blend, %.0f %% of the denoised picture, %.0f %% of the noisy one" % (
             s["uniform_spp"], s["mean_spp"], 100 * s["uniform_blend"], 100 * s["uniform_denoised"], 100 * s["uniform_noisy"])]
-    return "%s\n%s" % (tables.table(HEAD, [cells(r) for r in rows]), "".join("- %s\n" % line for line in lines))
+    return "%s\n%s" % (tables.table(HEAD, [cells(r) for r in rows]), "".join(textwrap.fill("- " + line, 140, subsequent_indent="  ") + "\n" for line in lines))
 
 
 def page(results):
