@@ -769,7 +769,7 @@ def painted(criterion="fixed", parameters=None, **settings):
             shape = (r.height, r.width, 3)
             albedo = np.broadcast_to(np.arange(r.x0, r.x1)[:, None] / 32, shape).astype(float)
             yield {"color": .5 + .1 * rng.standard_normal(shape), "albedo": albedo, "normal": np.full(shape, .25)}
-    parameters = {"spp": 32} if criterion == "fixed" else parameters or {}
+    parameters = {"spp": 64} if criterion == "fixed" else parameters or {}
     f = lull.Frame(lull.load(criterion, **parameters), 32, 32, block=16, supplies=["albedo", "normal"], denoised=True,
                    **{"spp_max": 64, **settings})
     return f, lull.Driver(f, render)
