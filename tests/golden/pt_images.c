@@ -50,7 +50,7 @@ struct picture {
  * How near is the same says the first line of the record: a value may be off by a share of itself and of the plane's mean (five digits
  * are recorded). Where the processor and the libraries round as they did for the record, no pixel may be off. Elsewhere rounding sends a
  * path here and there another way, which shows in its pixel: of Embree's code for SSE4.2, AVX and AVX2 against AVX-512,
- * 1.1 % of the pixels at most, and 14 % of one scene. The exceptions below have many places that lie just on an edge or a
+ * 1.4 % of the pixels at most, and 23 % of one scene. The exceptions below have many places that lie just on an edge or a
  * portal, bumps that a last digit of uv tips, or random numbers that depend on the last digits of directions: their planes
  * must keep their means.
  */
