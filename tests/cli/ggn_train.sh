@@ -109,6 +109,29 @@ $ggn train --data $data --preset paper --kr 3 --km 3 --kd 4 --batch 8 --steps 6 
     $ggn inspect "$tmp/p.ggn" >"$tmp/out" 2>"$tmp/err" && grep -q paper "$tmp/out"
 check "preset paper" $?
 
+# a residual model needs half buffers at every level
+fails "levels without half buffers" "residual needs half buffers at every recorded level" $ggn train $tiny --residual 0.5
+mkdir -p "$tmp/law/train" "$tmp/law/validation"
+for scene in soft-shadow cornell-box glossy; do
+    "$BUILD/bin/lull-render" -q "scenes/$scene.pbrt" --size 64x64 --block 32 --sampler independent --levels geometric:4:200:1.26 \
+        --sequence "$tmp/law/train/$scene" 2>>"$tmp/err" || break
+done
+mv "$tmp/law/train/glossy" "$tmp/law/validation" && $ggn label "$tmp/law/train" "$tmp/law/validation" >"$tmp/out" 2>"$tmp/err"
+check "recordings with them" $?
+law="--data $tmp/law --kr 3 --km 3 --kd 4 --crop 16 --batch 8 --steps-denoiser 5 --steps 8 --epoch-steps 2 --residual 0.5 --picture 1"
+$ggn train $law --out "$tmp/law.ggn" -q 2>"$tmp/err" && $ggn inspect "$tmp/law.ggn" 2>"$tmp/err" | grep -q "residual .* 0.5 octaves .* 7 scalars"
+check "a residual model" $?
+interrupted 4 "$tmp/resumed.ggn" $law -q &&
+    $ggn train $law --out "$tmp/resumed.ggn" --resume --threads 1 -q 2>"$tmp/err" && cmp "$tmp/law.ggn" "$tmp/resumed.ggn" 2>"$tmp/err"
+check "   ...the same bytes when interrupted and resumed with one thread" $?
+$ggn train $law --scalars 0 --painted 0 --out "$tmp/plain.ggn" -q 2>"$tmp/err" && ! cmp -s "$tmp/law.ggn" "$tmp/plain.ggn"
+check "   ...another without scalars" $?
+fails "networks with other inputs to start from" "another size, preset or input" $ggn train $law --scalars 0 --init "$tmp/law.ggn"
+$ggn evaluate -d "$tmp/law" -m "$tmp/law.ggn" -m "$tmp/plain.ggn" --no-quality >"$tmp/figures" 2>"$tmp/err" && grep -q "^law.ggn" "$tmp/figures"
+check "   ...evaluate judges it" $?
+LULL_MODEL=$tmp/law.ggn $BUILD/bin/lull-check -q "$BUILD/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
+check "   ...lull-check passes the criterion with it" $?
+
 # the noise picture, dropped at random, averaged weights, no flips: the same bytes after an interruption, and other bytes than without
 more="$tiny --picture 0.7 --average 8 --flips 0"
 $ggn train $more --out "$tmp/picture.ggn" -q 2>"$tmp/err" && $ggn inspect "$tmp/picture.ggn" 2>"$tmp/err" | grep -q "noise picture.*taken"

@@ -15,6 +15,7 @@
 #include "sequence/manifest.h"
 #include "sequence/simulate.h"
 #include "data/windows.h"
+#include "observer/curve.h"
 
 static void splits_and_levels(void **state)
 {
@@ -282,6 +283,105 @@ static void pictures_of_made_levels(void **state)
     (void)state;
 }
 
+/* Blocks without a reference, every level measured. */
+static void load_measured(struct ggn_series_set *set, char *own)
+{
+    struct seqgen g = seqgen_default();
+    struct base_err err = {0};
+
+    g.side = 40;
+    g.scenes = 3;
+    g.validation = 1;
+    g.reference_spp = 0;
+    assert_non_null(mkdtemp(own));
+    if (seqgen_write(own, &g, &err))
+        fail_msg("%s", err.text);
+    struct ggn_series_set_options o = {.dir = own, .noise_maps = 1, .measures = 1, .keep_recorded = 1};
+    if (ggn_series_set_load(set, &o, &err))
+        fail_msg("%s", err.text);
+}
+
+static void remove_all(const char *own)
+{
+    char command[96];
+
+    snprintf(command, sizeof command, "rm -r %s", own);
+    assert_int_equal(system(command), 0);
+}
+
+/* A level's measure is what the criterion `observer` sees there, a simulated level's what its label was read from. */
+static void measures_are_the_law(void **state)
+{
+    char own[] = "/tmp/ggn_measures.XXXXXX";
+    struct ggn_series_set set;
+    struct base_err err = {0};
+    int levels = 0, simulated = 0;
+
+    load_measured(&set, own);
+    const int recorded = set.n;
+    for (int i = 0; i < recorded; i++)
+        set.series[i].label.threshold = 400;
+    assert_int_equal(ggn_series_set_extend(&set, 3, &err), 0);
+    assert_int_equal(set.n, 2 * recorded);
+    for (int i = 0; i < set.n; i++) {
+        const struct ggn_level_series *c = &set.series[i];
+        const struct ggn_dataset_view *v = &set.data.views[c->view];
+        struct ggn_curve curve;
+        struct seq_block b;
+        assert_int_equal(seq_manifest_read_block(v->dir, &v->manifest, seq_manifest_find(&v->manifest, c->block), &b, &err),
+                         0);
+        assert_int_equal(ggn_curve_make(&b, GGN_FROM_HALVES, 1, &curve, &err), 0);
+        assert_int_equal(c->synthetic, i >= recorded);
+        for (int k = 0; k < c->n_levels; k++) {
+            double seen;
+            if (!c->synthetic && !seq_has_halves(&b.levels[k])) {
+                assert_true(isnan(c->measure[k].visible));
+            } else if (!c->synthetic) {
+                assert_int_equal(ggn_curve_level(&b, &b.levels[k], &seen, &err), 0);
+                assert_true(fabs(c->measure[k].visible / seen - 1) < 1e-6);
+                levels++;
+            } else if (c->spp[k] >= b.levels[b.n_levels - 1].spp) { /* between levels a curve is interpolated */
+                assert_true(fabs(c->measure[k].visible / ggn_curve_at(&curve, c->spp[k]) - 1) < 0.01);
+                simulated++;
+            }
+        }
+        ggn_curve_release(&curve);
+        seq_block_release(&b);
+    }
+    assert_true(levels == recorded && simulated > 5 * recorded);
+    ggn_series_set_release(&set);
+    remove_all(own);
+    (void)state;
+}
+
+/* Painted series are labelled where their own noise falls below the level, and none looks like another. */
+static void painted_series_are_labelled_by_the_law(void **state)
+{
+    const double level = 0.26;
+    char own[] = "/tmp/ggn_painted.XXXXXX";
+    struct ggn_series_set set;
+    struct base_err err = {0};
+    double low = INFINITY, high = 0;
+
+    load_measured(&set, own);
+    const int recorded = set.n, trained = ggn_series_set_count(&set, GGN_SPLIT_TRAIN, 1);
+    assert_int_equal(ggn_series_set_paint(&set, 2, level, 5, &err), 0);
+    assert_int_equal(set.n, recorded + 2 * trained);
+    for (int i = recorded; i < set.n; i++) {
+        const struct ggn_level_series *c = &set.series[i];
+        assert_true(c->synthetic && c->split == GGN_SPLIT_TRAIN && c->has_label && !c->reference);
+        for (int k = 0; k < c->n_levels; k++)
+            if (!c->label.censored && fabs(log2(c->spp[k] / c->label.threshold)) > 1e-6)
+                assert_int_equal(c->measure[k].visible > level, c->spp[k] < c->label.threshold);
+        low = fmin(low, c->measure[4].texture);
+        high = fmax(high, c->measure[4].texture);
+    }
+    assert_true(high - low > 1); /* of contrasts that the recordings do not have */
+    ggn_series_set_release(&set);
+    remove_all(own);
+    (void)state;
+}
+
 /* Flips and gains as of the images, and nothing for the share of samples that goes without. */
 static void pictures_are_augmented_with_their_window(void **state)
 {
@@ -357,6 +457,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(splits_and_levels),
         cmocka_unit_test(synthetic_noise_has_the_variance_of_rendered_noise),
         cmocka_unit_test(extended_levels_continue_the_recording),
+        cmocka_unit_test(measures_are_the_law),
+        cmocka_unit_test(painted_series_are_labelled_by_the_law),
         cmocka_unit_test(simulated_levels_lie_as_far_apart_as_asked),
         cmocka_unit_test(windows_are_labelled_by_their_last_image),
         cmocka_unit_test(augmentation_moves_whole_windows),
