@@ -103,6 +103,16 @@ static int judge_block(void *data, int index, int worker, struct base_err *err)
     return 0;
 }
 
+static int check_halves(const struct ggn_eval_set *s, const char *name, struct base_err *err)
+{
+    for (int b = 0; b < s->n_blocks; b++)
+        for (size_t i = s->blocks[b].first; i < s->blocks[b].end; i++)
+            if (isnan(s->visible[i]))
+                return base_fail(err, BASE_EINVAL, "%s: %s has levels without half buffers, which residual models need",
+                                 name, s->images.data.views[s->blocks[b].view].dir);
+    return 0;
+}
+
 static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const struct ggn_policy *p,
                        struct base_err *err)
 {
@@ -144,6 +154,8 @@ int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const s
         rc = base_fail_nomem(err, name);
     for (; made < workers && !rc; made += !rc)
         rc = ggn_viewer_init(&r.viewers[made], model, precision, &s->images, err);
+    if (!rc && r.rule.reach > 0)
+        rc = check_halves(s, name, err);
     const struct ggn_eval_values made_by_block[] = {{m->score, sizeof *m->score, NULL},
                                                     {m->verdict, sizeof *m->verdict, NULL},
                                                     {m->own_guard, sizeof *m->own_guard, NULL},

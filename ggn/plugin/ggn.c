@@ -28,7 +28,7 @@ enum { P_MODEL, P_VISIBLE, P_PASSES, P_GATE, P_TAIL, P_GINI, P_FIRST_SPP, P_PREC
 
 static const struct lull_param params[P_COUNT] = {
     [P_MODEL] = LULL_KIT_FILE("model", NULL,
-                              "model file; without it lull-2.ggn beside the criterion, in ../share/lull or in the source "
+                              "model file; without it lull-3.ggn beside the criterion, in ../share/lull or in the source "
                               "tree"),
     [P_VISIBLE] = LULL_KIT_FLOAT("visible", NULL, 0, 1,
                                  "stop when less than this share of viewers would still see noise; without it the model's "
@@ -320,7 +320,7 @@ static int32_t load(struct lull_instance *in, int kind, const char *path, struct
     return LULL_OK;
 }
 
-static const struct gp_block_view_ops ops = {.model = "lull-2",
+static const struct gp_block_view_ops ops = {.model = "lull-3",
                                              .variable = "LULL_MODEL",
                                              .load = load,
                                              .slot = slot_of,

@@ -3,7 +3,10 @@
 A line of the plan is `NAME  OPTIONS of ggn train`; `common` holds those that all share, `#` begins a comment. Every run is a
 `ggn train --resume` at nice 10 on one thread: interrupted, the same command goes on with it. What was trained with other options or
 another seed is refused, not mixed in. Figures are of the validation scenes at the threshold that ggn train chooses there: good for
-comparing variants, not for claims. Times are processor time of one thread."""
+comparing variants, not for claims. Times are processor time of one thread.
+
+--sets DIR --judge MODEL ... trains nothing: every folder of DIR is a labelled data set that no model was trained or tuned on, and the
+models and the observer are judged on each; on the set `test` on its recorded levels alone."""
 import json
 import os
 import resource
@@ -20,6 +23,8 @@ def options(parser):
     parser.add_argument("plan", nargs="?", default=os.path.join(tool.ROOT, "scripts", "ablate.plan"), help="scripts/ablate.plan")
     parser.add_argument("--data", type=tool.path, default=os.path.join(tool.ROOT, "data"))
     parser.add_argument("--out", type=tool.path, default=os.path.join(tool.BUILD, "ablate"), help="build/ablate")
+    parser.add_argument("--sets", type=tool.path, metavar="DIR", help="data sets to judge models on instead")
+    parser.add_argument("--judge", type=tool.path, metavar="MODEL", action="append", default=[], help="may be repeated")
     parser.add_argument("--table", action="store_true", help="train nothing: the table of what is there already")
     tool.writes(parser)
 
@@ -85,7 +90,45 @@ def page(results):
     return "%s; all with\n`%s`.\n\n%s" % (tables.told(results["measured"]), results["common"], table(results["rows"], "%.3f", "%.0f %%", "%.0f"))
 
 
+SETS = {"people": "people's four views, made from halves, each left out of the observer's fit", "test": "test scenes of the plan",
+        "rare": "rare light, labelled by true references", "foreign": "textures that no training scene has"}
+JUDGED = ("early_stop_rate", "samples_ratio", "median_abs_log2", "median_log2", "spearman")
+
+
+def judge(root, models):
+    """{set: {method: figures}}"""
+    found = {}
+    for name in SETS:
+        if not os.path.isdir(os.path.join(root, name)):
+            continue
+        rows = found[name] = {}
+        for model in models:
+            told = json.loads(ggn("evaluate", "-d", os.path.join(root, name), "-O", os.path.join(tool.ROOT, "ggn/observer/observer.json"),
+                                  *(["--recorded"] if name == "test" else []), "--no-quality", "--json", "-t", 1, "-m", model))
+            split = next(s for s in told["splits"].values())
+            for method in ("observer", os.path.basename(model)):
+                rows[method] = {"blocks": split[method]["blocks"], **{k: split[method].get(k) for k in JUDGED}}
+    return found
+
+
+def sets(results):
+    forms = ("%.0f %%", "%.3f", "%.3f", "%+.3f", "%.2f")
+    rows = []
+    for name, methods in results["sets"].items():
+        for method, r in methods.items():
+            shown = [None if r[k] is None else (100 if k == "early_stop_rate" else 1) * r[k] for k in JUDGED]
+            rows.append([SETS[name], str(r["blocks"]), method, *[tables.figure(v, f) for v, f in zip(shown, forms)]])
+    return "%s.\n\n%s" % (tables.told(results["sets_measured"]), tables.table(
+        ("set", "blocks", "judged by", "early", "samples", "median \\|log2\\|", "bias", "ρ"), rows))
+
+
 def main(o):
+    if o.sets:
+        results = {**(tool.results(o.write, "ablation") if o.write else {}), "sets_measured": tool.measured(), "sets": judge(o.sets, o.judge)}
+        print(sets(results), end="")
+        if o.write:
+            tool.store(o.write, "ablation", results)
+        return
     if not os.path.isfile(o.plan):
         raise Refused("%s: no such plan" % o.plan)
     common, lines = read_plan(o.plan)
@@ -100,6 +143,6 @@ def main(o):
     print("all with `%s`\n" % " ".join(common))
     print(table(rows), end="")
     if o.write:
-        tool.store(o.write, "ablation", {"measured": tool.measured(), "common": " ".join(common), "rows": rows})
+        tool.store(o.write, "ablation", {**tool.results(o.write, "ablation"), "measured": tool.measured(), "common": " ".join(common), "rows": rows})
     if failed:
         raise Refused("not trained: " + ", ".join(failed))

@@ -35,7 +35,7 @@ def options(parser):
             ("--out", os.path.join(tool.BUILD, "agreement"), "labelled copies and agreement.json (build/agreement)")):
         parser.add_argument(name, type=tool.path, default=default, metavar="PATH", help=text)
     parser.add_argument("--threads", type=int, default=tool.THREADS)
-    parser.add_argument("-m", dest="model", type=tool.path, action="append", help="may be repeated (ggn/models/lull-2.ggn)")
+    parser.add_argument("-m", dest="model", type=tool.path, action="append", help="may be repeated (ggn/models/lull-3.ggn)")
     tool.writes(parser)
 
 
@@ -125,7 +125,7 @@ def page_table(results, name):
 
 
 def main(o):
-    o.model = o.model or [os.path.join(tool.ROOT, "ggn/models/lull-2.ggn")]
+    o.model = o.model or [os.path.join(tool.ROOT, "ggn/models/lull-3.ggn")]
     work, views = os.path.join(o.out, "data"), os.path.join(o.human, "views")
     if not os.access(os.path.join(o.human, "human-thresholds.csv"), os.R_OK):
         raise tool.Refused(f"{o.human}/human-thresholds.csv: no thresholds of people there (see --human)")

@@ -293,8 +293,8 @@ def bench_start(rounds):
 
 def bench_networks(rounds, isa=None):
     """`lab networks` compares with PyTorch; its lines become rows. isa: what both sides are held to."""
-    model = os.path.join(ROOT, "ggn", "models", "lull-2.ggn")
-    for widths, options in (("published widths", []), ("widths of lull-2", ["--model", model])):
+    model = os.path.join(ROOT, "ggn", "models", "lull-3.ggn")
+    for widths, options in (("published widths", []), ("narrow widths", ["--model", model])):
         text = answer([os.path.join(ROOT, "scripts", "lab"), "networks", "--json", "--rounds", str(rounds), "--threads", "2",
                        *(["--isa", isa] if isa else []), *options])
         if not text.startswith("{"):

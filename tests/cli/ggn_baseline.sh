@@ -35,7 +35,7 @@ criterion() { # criterion ID MODEL: as create answers
 criterion attributes "$tmp/noise-mask.ggn"
 [ $rc = 1 ] && grep -q 'noise-mask.ggn: not a baseline for attributes' "$tmp/out"
 check "a criterion refuses another's model" $?
-criterion attributes ggn/models/lull-2.ggn
+criterion attributes ggn/models/lull-3.ggn
 [ $rc = 1 ] && grep -q 'not a baseline' "$tmp/out"
 check "a criterion refuses a network" $?
 head -c 3000 "$tmp/attributes.ggn" >"$tmp/short.ggn"

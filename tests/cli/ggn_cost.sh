@@ -42,27 +42,28 @@ assert {(p["dial"], p["value"]) for p in d["points"] if p["criterion"] == "obser
 assert len([p for p in d["points"] if p["criterion"] == "attributes"]) == 1
 P
 check "another cadence simulates all levels, and asks the defaults alone" $?
-run -d $data --split train --scores --recorded --no-quality -m ggn/models/lull-2.ggn --baseline "$tmp/attributes.ggn" -o "$tmp/scores.json" && python3 - "$tmp/scores.json" >"$tmp/err" 2>&1 <<'P'
+"$ggn" train -d $data -o "$tmp/old.ggn" --kr 3 --km 3 --kd 4 --crop 32 --ratio 0 --batch 8 --steps-denoiser 5 --steps 5 --epoch-steps 5 --picture 1 -q 2>"$tmp/err"
+run -d $data --split train --scores --recorded --no-quality -m "$tmp/old.ggn" --baseline "$tmp/attributes.ggn" -o "$tmp/scores.json" && python3 - "$tmp/scores.json" >"$tmp/err" 2>&1 <<'P'
 import json, sys
 d = json.load(open(sys.argv[1]))
-assert [p["criterion"] for p in d["points"]] == ["lull-2.ggn"]
+assert [p["criterion"] for p in d["points"]] == ["old.ggn"]
 p = d["points"][0]
 windows = sum(len(s["blocks"]) for s in d["scenes"].values()) * (14 - 5)
 assert len(p["scores"]) == windows and 0 < p["cut"] < 1 and all(x is None or 0 <= x <= 1 for x in p["scores"])
 assert any(x is not None for x in p["scores"])
 P
 check "scores of a network's windows, nothing else" $?
-run -d $data --split train --no-pictures --recorded --no-quality -m ggn/models/lull-2.ggn -o "$tmp/blind.json"
-run -d $data --split train --recorded --no-quality -m ggn/models/lull-2.ggn -o "$tmp/seeing.json" && python3 - "$tmp/blind.json" "$tmp/seeing.json" >"$tmp/err" 2>&1 <<'P'
+run -d $data --split train --no-pictures --recorded --no-quality -m "$tmp/old.ggn" -o "$tmp/blind.json"
+run -d $data --split train --recorded --no-quality -m "$tmp/old.ggn" -o "$tmp/seeing.json" && python3 - "$tmp/blind.json" "$tmp/seeing.json" >"$tmp/err" 2>&1 <<'P'
 import json, sys
 def spent(file, name):
     points = [p for p in json.load(open(file))["points"] if p["criterion"] == name]
     return {(p["dial"], p["value"]): [s["samples"] for s in p["scenes"].values()] for p in points}
-blind, seeing = spent(sys.argv[1], "lull-2.ggn, no halves"), spent(sys.argv[2], "lull-2.ggn")
+blind, seeing = spent(sys.argv[1], "old.ggn, no halves"), spent(sys.argv[2], "old.ggn")
 assert len(blind) > 10 and blind.keys() == seeing.keys() and blind != seeing
 P
 check "without half buffers a network judges otherwise, and is named so" $?
-run -d $data --split train --scores --precision f64 -m ggn/models/lull-2.ggn
+run -d $data --split train --scores --precision f64 -m ggn/models/lull-3.ggn
 [ $rc = 2 ] && one_line && grep -q "network's size, 200x200" "$tmp/err"
 check "double precision of blocks that are not the network's size: one line and exit 2" $?
 mkdir -p "$tmp/whole/train" && cp -R $data/scene? "$tmp/whole/train" || exit 2
@@ -83,7 +84,7 @@ check "thresholds of other views: one line and exit 2" $?
 run -d $data
 [ $rc = 2 ] && one_line && grep -q "split 'test'" "$tmp/err"
 check "a split without blocks is one line and exit 2" $?
-run -d $data --split train --baseline ggn/models/lull-2.ggn
+run -d $data --split train --baseline ggn/models/lull-3.ggn
 [ $rc = 2 ] && one_line && grep -q "not a baseline" "$tmp/err"
 check "a network is no baseline: one line and exit 2" $?
 run --split train

@@ -56,7 +56,7 @@ printf 'x' >>plugins/mine.so # behind the end: the same criterion, another file
 refused "made with plugin-and-mask-crc" $begin --resume
 cp "$bin/../lib/lull/null.so" plugins/mine.so
 t "  …and goes on when all is as it was" $begin --resume
-model=$here/../../ggn/models/lull-2.ggn
+model=$here/../../ggn/models/lull-3.ggn
 if [ -f "$model" ]; then
     cp "$model" m.ggn
     net="$P whole.pbrt -q -c ggn -p model=m.ggn --spp-min 2 --spp-max 8 --checkpoint m.ckp --checkpoint-every 0 -o whole.exr"

@@ -235,7 +235,7 @@ refused "not a checkpoint" $long --checkpoint none-such.ckp --resume
 refused "none.ckp: " $long --checkpoint none.ckp --resume
 
 # --- the shipped network, when it is there: its history goes through the checkpoint ---
-model=$here/../../ggn/models/lull-2.ggn
+model=$here/../../ggn/models/lull-3.ggn
 if [ -f "$model" ]; then
     net="$scene -q --size 200x200 -c ggn -p model=$model --spp-min 4 --spp-max 60 --reproducible"
     "$P" $net -o net.exr
@@ -245,8 +245,8 @@ if [ -f "$model" ]; then
     t "ggn: same bytes after interrupt and resume" sh -c "$P $net --checkpoint net.ckp --resume -o net2.exr && cmp net.exr net2.exr"
 else
     n=$((n + 2))
-    echo "ok $((n - 1)) - ggn: same bytes for 1 thread and another order # SKIP no ggn/models/lull-2.ggn"
-    echo "ok $n - ggn: same bytes after interrupt and resume # SKIP no ggn/models/lull-2.ggn"
+    echo "ok $((n - 1)) - ggn: same bytes for 1 thread and another order # SKIP no ggn/models/lull-3.ggn"
+    echo "ok $n - ggn: same bytes after interrupt and resume # SKIP no ggn/models/lull-3.ggn"
 fi
 
 # --- progress ---

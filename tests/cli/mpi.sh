@@ -64,7 +64,7 @@ cp "$scene" host1/room.pbrt
 printf x >>host1/mine.so
 each "has plugin-and-mask-crc=" "room.pbrt -q -c ./mine.so --spp-max 20 -o a.exr"
 each "has spp-max=" "room.pbrt -q -c null --spp-max 2\$OMPI_COMM_WORLD_RANK -o a.exr"
-m=$here/../../ggn/models/lull-2.ggn # and the same in half the bytes, which is another
+m=$here/../../ggn/models/lull-3.ggn # and the same in half the bytes, which is another
 if [ -f "$m" ] && [ -f "${P%/bin/*}/lib/lull/ggn.so" ]; then
     "${P%/*}/ggn" convert "$m" host0/m.ggn; cp "$m" host1/m.ggn
     each "has criterion-model-crc=" "room.pbrt -q -c ggn -p model=m.ggn --spp-max 20 -o a.exr"

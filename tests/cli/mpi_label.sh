@@ -20,5 +20,5 @@ says='ggn [a-z]*'
 printf x >shared/b/block-00000.lseq
 mpi_refused "block-00000.lseq" 3 "$G" label shared
 mpi_refused "unknown option" 3 "$G" label --nonsense shared
-mpi_refused "start it without mpirun" 2 "$G" inspect "$here/../../ggn/models/lull-2.ggn"
+mpi_refused "start it without mpirun" 2 "$G" inspect "$here/../../ggn/models/lull-3.ggn"
 exit $bad

@@ -65,7 +65,7 @@ sed 's/^WorldBegin/&\nTexture "t" "spectrum" "imagemap" "string filename" "a.png
     room.pbrt >textured.pbrt
 refused "this is an input" "$P" textured.pbrt -q --spp 1 --preview a.png
 refused "this is an input" "$ggn" flip a.png a.png -o a.png
-cp "$here/../../ggn/models/lull-2.ggn" m.ggn
+cp "$here/../../ggn/models/lull-3.ggn" m.ggn
 refused "this is an input" "$ggn" convert m.ggn m.ggn
 refused "this is an input" "$ggn" convert m.ggn ./folder/../m.ggn
 cp -r "$data" data
