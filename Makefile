@@ -186,7 +186,7 @@ $(OUT)/lib/lull/modules/lull-mpi.so: $(call o,$(MPI_SRC)) $(OBJ)/base.a
 BUNDLE := $(OUT)/bundle/lib
 CARRIED := denoised fixed ggn halfbuf observer variance
 BESIDE := $(BUNDLE)/libcjson.so.1 $(BUNDLE)/libpng16.so.16
-BUNDLED := $(BUNDLE)/liblull-host.so.1 $(BESIDE) $(CARRIED:%=$(BUNDLE)/lull/%.so) $(BUNDLE)/lull/lull-2.ggn \
+BUNDLED := $(BUNDLE)/liblull-host.so.1 $(BESIDE) $(CARRIED:%=$(BUNDLE)/lull/%.so) $(BUNDLE)/lull/lull-3.ggn \
     $(BUNDLE)/lull/modules/lull-denoiser
 $(BUNDLE)/liblull-host.so.1: BASE_LIBS += -s -Wl,-rpath,'$$ORIGIN'
 $(BUNDLE)/lull/ggn.so: GGN_LIBS += -s -Wl,-rpath,'$$ORIGIN/..'

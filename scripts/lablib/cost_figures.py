@@ -4,7 +4,7 @@ import statistics
 
 from lablib.plots import data, plot
 
-DRAWN = ("uniform", "variance", "halfbuf", "observer", "lull-2.ggn", "lull-3.ggn", "paper.ggn", "svd-entropy", "attributes", "noise-mask")
+DRAWN = ("uniform", "variance", "halfbuf", "observer", "lull-2.ggn", "paper.ggn", "svd-entropy", "attributes", "noise-mask")
 COLOURS = dict(zip(DRAWN, ("#999999", "#8c564b", "#e377c2", "#d62728", "#1f77b4", "#9467bd", "#2ca02c", "#bcbd22", "#ff7f0e")))
 BLOCK = 200 * 200
 

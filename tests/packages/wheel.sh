@@ -51,7 +51,7 @@ run -m lull >"$tmp/said" 2>&1
 found() { cat "$tmp/said"; grep -qE "$1" "$tmp/said"; }
 t "python -m lull: its own library" found "^library +$site/lull/lib/liblull-host.so.1$"
 for c in fixed ggn halfbuf observer variance; do t "  …the criterion $c, ready" found "^criterion +$c +[0-9.]+ +ready +.$site/lull/lib/lull/$c.so.$"; done
-t "  …the model" found "^model +$site/lull/lib/lull/lull-2.ggn$"
+t "  …the model" found "^model +$site/lull/lib/lull/lull-3.ggn$"
 t "  …no denoiser, and how to get one" found "^denoiser .*pip install pyoidn"
 oidn=$repo/$BUILD/tests/oidn-stub/libOpenImageDenoise.so.2
 if [ -e "$oidn" ]; then # as pip would install the extra lull[denoise]
