@@ -11,7 +11,7 @@ import sys
 from lablib import agreement, ablation, bench, cost_page, denoised, quote_accuracy, references, sampler, scale, shots, tool
 
 TEMPLATES = os.path.join(tool.ROOT, "scripts", "lablib", "templates")
-OTHERS = ("ggn/README.md", "ggn/observer/README.md")  # pages outside docs/ that show figures
+OTHERS = ("ggn/README.md", "ggn/models/README.md", "ggn/observer/README.md")  # pages outside docs/ that show figures
 PLACE = re.compile(r"(<!-- lab: (?!end -->)(.*?) -->\n).*?(<!-- lab: end -->)", re.S)
 
 
