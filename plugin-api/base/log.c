@@ -39,7 +39,7 @@ void base_log_clear(struct base_log *log)
     }
 }
 
-/* Lines of a text, and characters of its longest one: neither escapes (up to their letter) nor the rest of a UTF-8 sequence. */
+/* Lines of a text, and characters of its longest: neither escapes (up to their letter) nor the rest of a UTF-8 sequence. */
 static int measure(const char *text, int *columns)
 {
     int lines = 1, length = 0;
