@@ -302,7 +302,7 @@ test-hosts: setup ## install Blender, Mitsuba and bpy as far as they can be had,
 	@scripts/hosts/setup
 	@BUILD=build tests/run $(HOST_TEST)
 
-test-packages: all ## make, install, use and remove what people install: make install, Debian packages
+test-packages: all $(OIDN_STUB) ## make, install, use and remove what people install: make install, Debian packages, wheel, Blender add-on
 	@BUILD=build JOBS=1 tests/run $(wildcard tests/packages/*.sh)
 
 asan tsan: ## run the unit and ABI tests under the sanitizer
