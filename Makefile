@@ -382,9 +382,9 @@ uninstall: ## remove what install put under $(DESTDIR)$(PREFIX)
 	@for f in $(OWN_FOLDERS); do [ ! -d $(DESTDIR)$(PREFIX)/$$f ] || rmdir --ignore-fail-on-non-empty $(DESTDIR)$(PREFIX)/$$f; done
 
 wheel: $(BUNDLED) ## make the Python package with host library, criteria and model in build/wheel
-	@scripts/packages/bundle wheel
+	@scripts/packages/bundle wheel $(BUNDLED)
 blender: $(BUNDLED) ## make the add-on for Blender 3.4, which is an extension for 4.2 and later, in build/blender
-	@scripts/packages/bundle blender
+	@scripts/packages/bundle blender $(BUNDLED)
 deb: all ## make the Debian packages lull, liblull-host1 and lull-dev in build/deb (needs debhelper)
 	@scripts/packages/deb
 

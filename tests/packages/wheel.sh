@@ -33,6 +33,7 @@ minor = int(re.search(r"-py3-none-manylinux_2_(\d+)_x86_64[.]whl$", sys.argv[1])
 elf = [path for path in Path(folder).rglob("*") if path.is_file() and path.read_bytes()[:4] == b"\x7fELF"]
 names = {path.name for path in elf}
 assert len(elf) == 10, names
+assert len([name for name in wheel.namelist() if name.endswith(".ggn")]) == 1, "a model of before is no part of it"
 for path in elf:
     text = subprocess.run(["objdump", "-pT", path], text=True, capture_output=True, check=True).stdout
     assert set(re.findall(r"NEEDED +(\S+)", text)) <= names | {"libc.so.6", "libm.so.6", "libz.so.1"}, (path, text)
@@ -81,7 +82,7 @@ if command -v blender >/dev/null; then
     echo 'raise ImportError("of another Python")' >"$site/json.py"
     blender -b --factory-startup -noaudio --python-expr "import bpy; s = bpy.context.scene; s.render.engine = 'CYCLES'; s.render.resolution_x = 48; \
 s.render.resolution_y = 36; bpy.ops.wm.save_as_mainfile(filepath='$tmp/cube.blend')" >"$tmp/log" 2>&1
-    t "python -m lull.blender, by the Blender on PATH" sh -c "cd $tmp && $python -m lull.blender cube.blend -c halfbuf --spp-max 32 -q -o cube.exr && [ -s cube.exr ]"
+    t "python -m lull.blender, by the Blender on PATH" sh -c "cd $tmp && PATH=/usr/bin:/bin $python -m lull.blender cube.blend -c halfbuf --spp-max 32 -q -o cube.exr && [ -s cube.exr ]"
     rm "$site/json.py"
 else n=$((n + 1)); echo "ok $n - python -m lull.blender # SKIP no blender: make test-hosts"; fi
 extras() { for e in denoise:pyoidn mitsuba:mitsuba blender:bpy; do
