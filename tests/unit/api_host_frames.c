@@ -363,7 +363,7 @@ static void a_frame_is_forecast(void **state)
 /* --- state --------------------------------------------------------------------------------------------------------------- */
 
 struct bytes {
-    unsigned char data[2000];
+    unsigned char data[4000];
     size_t size;
 };
 
@@ -528,9 +528,15 @@ static void reports_as_text(void **state)
     assert_non_null(strstr(text, "\"rays\":\tnull"));
     assert_non_null(strstr(text, "\"id\":\t\"told\""));
     assert_null(strstr(text, "messages"));
+    assert_non_null(strstr(text, "\"command\""));
+    report.struct_size = offsetof(struct lull_host_report, software); /* as version 1.0 has it */
+    b.size = 0;
+    assert_int_equal(lull_host_report_text(frame, &report, &writer, &fault), LULL_OK);
+    b.data[b.size] = '\0';
+    assert_null(strstr(text, "\"command\""));
     report.struct_size--;
     assert_int_equal(lull_host_report_text(frame, &report, &writer, &fault), LULL_E_VERSION);
-    report.struct_size++;
+    report.struct_size = sizeof report;
     writer.write = refuse;
     assert_int_equal(lull_host_report_text(frame, &report, &writer, &fault), LULL_E_IO);
     end();
