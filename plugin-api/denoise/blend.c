@@ -1,12 +1,16 @@
 #include "denoise/blend.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { RADIUS = 9 };
 
 /* exp(-k^2 / 18): a Gaussian of 3 px, up to three of its deviations. */
 static const float weight[RADIUS + 1] = {1.0f,         0.945959469f, 0.800737403f, 0.606530660f, 0.411112291f,
                                          0.249352209f, 0.135335283f, 0.065728529f, 0.028565501f, 0.011108997f};
+
+/* A pixel whose own square is more than this many of its neighbourhood's is a speck: two standard deviations. */
+static const float SPECK = 4.0f;
 
 /* One line of `count` values, `step` apart. */
 static void pool_line(const float *from, int count, size_t step, float *to)
@@ -35,12 +39,13 @@ float lull_blend_mse(const struct lull_estimate *pooled, size_t i) { return fmax
 
 void lull_blend_weights(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha)
 {
+    memcpy(alpha, estimate->noisy, (size_t)width * (size_t)height * sizeof *alpha);
     pool(estimate->denoised, width, height, scratch);
     pool(estimate->agreed, width, height, scratch);
     pool(estimate->noisy, width, height, scratch);
     for (size_t i = 0; i < (size_t)width * (size_t)height; i++) {
-        float mse = lull_blend_mse(estimate, i);
-        alpha[i] = mse > 0.0f ? mse / (mse + estimate->noisy[i]) : 0.0f;
+        float mse = lull_blend_mse(estimate, i), noise = fmaxf(estimate->noisy[i], alpha[i] / SPECK);
+        alpha[i] = mse > 0.0f ? mse / (mse + noise) : 0.0f;
     }
 }
 

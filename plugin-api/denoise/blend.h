@@ -1,8 +1,9 @@
 /*
  * A picture between the noisy and the denoised one: at each pixel alpha of the noisy, alpha = mse(D) / (mse(D) + var(M)),
  * both pooled over the neighbourhood. Where the denoiser is right it is the denoised picture, where it is wrong the noisy
- * one; if the two errors were independent and known, no mixture would be better. Pure functions, thread-safe; the same bits
- * on every processor for the same inputs.
+ * one; if the two errors were independent and known, no mixture would be better. A pixel in which the halves are further
+ * apart than two standard deviations of its neighbourhood counts as a speck: a quarter of its own square is its var(M). Pure
+ * functions, thread-safe; the same bits on every processor for the same inputs.
  */
 #ifndef DENOISE_BLEND_H
 #define DENOISE_BLEND_H

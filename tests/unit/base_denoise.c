@@ -185,6 +185,20 @@ static void hot_pixel(void **unused)
     assert_true(alpha[60 * W + 80] < 1e-6f && alpha[60 * W + 83] < 1e-6f);
 }
 
+/* Where the denoiser is wrong and the noisy picture is kept, its specks are not. */
+static void specks_are_left_out(void **unused)
+{
+    (void)unused;
+    const int at = 60 * W + 80;
+    halves(0.4, 0.01, 0.5);
+    for (int i = 0; i < N; i++)
+        fa[i] = fb[i] = 0.43f;
+    a[at] = 1.0f;
+    measure(0.5);
+    lull_blend_weights(&estimate, W, H, scratch, alpha);
+    assert_true(alpha[at + 30] > 0.8f && alpha[at] < 0.4f && alpha[at + 1] > 1.5f * alpha[at]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -195,6 +209,7 @@ int main(void)
         cmocka_unit_test(mixture),
         cmocka_unit_test(extremes),
         cmocka_unit_test(hot_pixel),
+        cmocka_unit_test(specks_are_left_out),
     };
     return cmocka_run_group_tests_name("denoise", tests, NULL, NULL);
 }
