@@ -1,5 +1,5 @@
 #!/bin/sh
-# lull-render --html: one file with all in it, whatever names and texts say; and what is refused. In a browser: study/page.sh.
+# lull-render --html, lull-report: one file with all in it, whatever names and texts say; and what is refused. In a browser: study/page.sh.
 . "$(dirname "$0")/lull_render_setup"
 R="$P -q --size 48x32 --block 16 --spp-max 64 -t 2"
 evil='x<!--<script>alert(1)&"'"'"'.pbrt'
@@ -36,6 +36,29 @@ t "many blocks: the page stays within 2 MB" sh -c "$P $scene -q --size 400x300 -
     [ \$((\$(wc -c <m.html) - \$(wc -c <m.png) * 4 / 3)) -lt 2000000 ]"
 export LULL_OIDN="$(dirname "$P")/../tests/oidn-stub"
 t "a denoised picture has its layers" sh -c "$R $scene --denoise --html d.html && [ \$(grep -c '<img alt=\"\" data-layer=' d.html) -eq 3 ]"
+
+# --- lull-report: the page of a render that is over ---
+cp p.html made.html && cp r.json made.json
+"$P" "$scene" -q --size 48x32 --block 16 --spp-max 64 -o old.exr --report r.json
+report=$(dirname "$P")/lull-report
+t "lull-report writes the page of a report and its picture" "$report" r.json old.exr --quoted q.json -o p.html
+t "  …with both" look "data['report'] == report and data['quote'] and list(pictures) == ['picture']"
+t "  …without a picture" "$report" r.json -o p.html
+t "  …the report alone" look "data['report'] == report and data['quote'] is None and not pictures"
+oiiotool --pattern constant:color=.1,.2,.3,.5,.5,.5,.9,.8,.7 48x32 9 \
+    --chnames R,G,B,noisy.R,noisy.G,noisy.B,denoised.R,denoised.G,denoised.B -d float -o old.exr
+t "  …a denoised picture with its layers" "$report" r.json old.exr -o p.html
+t "  …three" look "list(pictures) == ['picture', 'noisy', 'denoised'] and len(set(pictures.values())) == 3"
+"$P" "$scene" -q --size 16x16 --spp 1 -o other.exr
+render=$P P=$report
+refused "the picture has 16x16 pixels, the report is of 48x32" r.json other.exr -o x.html
+echo '{"blocks": 1, "width": 1, "height": 1}' >no.json
+refused "no.json: no report (expected what lull-render --report writes)" no.json -o x.html
+refused "nowhere.json" nowhere.json -o x.html
+refused "not an image" r.json no.json -o x.html
+ln -s r.json r.html
+refused "this is an input" r.json -o r.html
+P=$render
 
 echo '{"rows": 1}' >bad.json
 S="$scene -q --size 8x8 --spp 1"
