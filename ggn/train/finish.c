@@ -35,8 +35,6 @@ static cJSON *describe_run(const struct ggn_session *s, int *failed)
                    {"flips", p->flips},
                    {"jitter", p->jitter},
                    {"picture", p->noise_map},
-                   {"residual", p->reach},
-                   {"painted_per_block", p->reach > 0 ? p->painted : 0},
                    {"average", p->average},
                    {"synthetic_per_block", p->synthetic},
                    {"extended", p->extend},
@@ -46,6 +44,10 @@ static cJSON *describe_run(const struct ggn_session *s, int *failed)
 
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
         base_json_number(o, numbers[i].name, numbers[i].value, failed);
+    if (p->reach > 0) {
+        base_json_number(o, "residual", p->reach, failed);
+        base_json_number(o, "painted_per_block", p->painted, failed);
+    }
     return o;
 }
 
