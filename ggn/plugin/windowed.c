@@ -147,6 +147,8 @@ int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_fram
     lull_kit_frame_open(in, frame);
     if (in->half_wanted && !(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)))
         gp_log(&in->kit, LULL_LOG_WARNING, in->half_wanted);
+    if (in->means.count)
+        gp_log(&in->kit, LULL_LOG_INFO, "ggn: no plane HALF: noise is told from how the mean changes between checks");
     if (in->slow)
         gp_log(&in->kit, LULL_LOG_WARNING, in->slow);
     in->rule.spp_max = frame->spp_max;
