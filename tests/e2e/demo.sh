@@ -26,7 +26,7 @@ denoised() {
 t "and with a denoiser" denoised
 t "  …it leaves both pictures side by side" sh -c "oiiotool --info $dir/denoised/two.png | tr -d ' ' | grep -q '136x48'"
 t "  …with a time for each" grep -q "noisy after [0-9.]* s, denoised after [0-9.]* s" "$dir/said"
-for f in demo.exr demo.png stop-map.png stop-map.csv report.json; do t "it leaves $f" test -s "$dir/$f"; done
+for f in demo.exr demo.png stop-map.png stop-map.csv report.json demo.html; do t "it leaves $f" test -s "$dir/$f"; done
 t "nothing temporary is left" test -z "$(ls "$dir" | grep tmp)"
 t "the image has 240x240 pixels and all layers" sh -c "oiiotool --info -v $dir/demo.exr | tr -d ' ' | grep -q '240x240,14channel'"
 t "no pixel is negative, NaN or infinite" sh -c "oiiotool $dir/demo.exr --ch R,G,B --printstats | awk '/Min/{if (\$3 < 0 || \$4 < 0 || \$5 < 0) bad=1} /NanCount/{if (\$3+\$4+\$5) bad=1} /InfCount/{if (\$3+\$4+\$5) bad=1} END{exit bad}'"
@@ -79,7 +79,7 @@ files = sorted(os.listdir(sys.argv[1]))
 print(demo.returncode, files, said)
 price, picture = said.index("viewers who still see noise"), said.index("demo: rendering it")
 assert demo.returncode == 130 and price < picture < said.index("demo: interrupted")
-assert files == ["demo.exr", "demo.png", "report.json", "stop-map.csv", "stop-map.png"], files
+assert files == ["demo.exr", "demo.html", "demo.png", "report.json", "stop-map.csv", "stop-map.png"], files
 P
 t "Ctrl-C keeps what is there" python3 "$dir/press.py" "$dir/pressed"
 t "  …a whole image" oiiotool --info "$dir/pressed/demo.exr"
