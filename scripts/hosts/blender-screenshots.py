@@ -11,12 +11,12 @@ from pathlib import Path
 
 import bpy
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "plugin-api" / "python"))
-import lull  # noqa: E402
-
 out, criterion = (sys.argv[sys.argv.index("--") + 1:] + ["observer"])[:2]
 during = str(Path(out).resolve())[:-len(".png")] + "-rendering.png"
-lull.register()
+if "lull" not in bpy.context.preferences.addons:  # else the add-on is tried as it is installed
+    sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "plugin-api" / "python"))
+    import lull
+    lull.register()
 scene = bpy.context.scene
 scene.render.engine = "CYCLES"
 scene.lull.criterion, scene.lull.folder = criterion, tempfile.mkdtemp(prefix="lull-")
