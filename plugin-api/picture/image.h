@@ -15,4 +15,14 @@ struct pic_image {
     size_t clipped;                  /* pixels that were NaN, infinite or negative when pic_encode made codes of them */
 };
 
+/* Where the stored pixels lie in the whole picture: 0 <= x0 < x1 <= width, the same of y. */
+struct pic_window {
+    int32_t width, height, x0, y0, x1, y1;
+};
+
+struct pic_attribute {
+    const char *name; /* borrowed */
+    char text[4096];  /* cut to fit; of numbers their digits; "": the file has no such attribute */
+};
+
 #endif

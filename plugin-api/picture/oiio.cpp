@@ -9,6 +9,7 @@ extern "C" {
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
@@ -238,6 +239,49 @@ int answer(const pic_request *q, pic_image *out, base_err *err)
     }
 }
 
+/* --- headers --- */
+
+int find_window(const ImageSpec &spec, const char *name, pic_window *out, base_err *err)
+{
+    const long long x = static_cast<long long>(spec.x) - spec.full_x, y = static_cast<long long>(spec.y) - spec.full_y;
+    if (int rc = check_size(spec, name, err))
+        return rc;
+    if (x < 0 || y < 0 || x + spec.width > spec.full_width || y + spec.height > spec.full_height)
+        return base_fail(err, BASE_EINVAL, "%s: it has pixels outside of its picture", name);
+    const int32_t x0 = static_cast<int32_t>(x), y0 = static_cast<int32_t>(y);
+    *out = pic_window{spec.full_width, spec.full_height, x0, y0, x0 + spec.width, y0 + spec.height};
+    return 0;
+}
+
+/* Of a double all digits, which the library's own text has not. */
+void find_attribute(const ImageSpec &spec, pic_attribute *a)
+{
+    const OIIO::ParamValue *found = spec.find_attribute(a->name);
+    a->text[0] = '\0';
+    if (found != nullptr && found->type() == TypeDesc::DOUBLE)
+        std::snprintf(a->text, sizeof a->text, "%.17g", found->get<double>());
+    else if (found != nullptr)
+        std::snprintf(a->text, sizeof a->text, "%s", found->get_string().c_str());
+}
+
+int answer_header(const char *path, pic_window *window, pic_attribute *attributes, int count, base_err *err)
+{
+    try {
+        configure_once();
+        if (int rc = base_file_check_input(path, err))
+            return rc;
+        const std::unique_ptr<ImageInput> input = ImageInput::open(path);
+        if (!input)
+            return complain(path, OIIO::geterror(), err);
+        std::for_each(attributes, attributes + count, [&](pic_attribute &a) { find_attribute(input->spec(), &a); });
+        return find_window(input->spec(), path, window, err);
+    } catch (const std::bad_alloc &) {
+        return base_fail_nomem(err, path);
+    } catch (const std::exception &e) {
+        return complain(path, e.what(), err);
+    }
+}
+
 } // namespace
 
-extern "C" const struct pic_library pic_library = {answer};
+extern "C" const struct pic_library pic_library = {answer, answer_header};

@@ -26,6 +26,8 @@ struct pic_request { /* all borrowed */
 /* A program has its address from the shared object; a program linked with its parts has it at once. */
 struct pic_library {
     int (*read)(const struct pic_request *request, struct pic_image *out, struct base_err *err);
+    int (*read_header)(const char *path, struct pic_window *window, struct pic_attribute *attributes, int count,
+                       struct base_err *err);
 };
 extern const struct pic_library pic_library __attribute__((weak, visibility("default")));
 

@@ -7,16 +7,29 @@
 #include "base/module.h"
 #include "picture/oiio.h"
 
-static int answer(const struct pic_request *request, struct pic_image *out, struct base_err *err)
+static const struct pic_library *library(const char *name, struct base_err *err)
 {
     const struct pic_library *linked = &pic_library;
     const struct pic_library *l = linked ? linked : base_module_symbol("lull-images.so", "pic_library", 0);
-    return l ? l->read(request, out, err)
-             : base_fail(err, BASE_EIO,
-                         "%s: images cannot be read: lib/lull/modules/lull-images.so, which belongs beside this program's "
-                         "bin/, or "
-                         "OpenImageIO cannot be loaded",
-                         request->name);
+    if (!l)
+        base_fail(err, BASE_EIO,
+                  "%s: images cannot be read: lib/lull/modules/lull-images.so, which belongs beside this program's bin/, or "
+                  "OpenImageIO cannot be loaded",
+                  name);
+    return l;
+}
+
+static int answer(const struct pic_request *request, struct pic_image *out, struct base_err *err)
+{
+    const struct pic_library *l = library(request->name, err);
+    return l ? l->read(request, out, err) : BASE_EIO;
+}
+
+int pic_read_header(const char *path, struct pic_window *window, struct pic_attribute *attributes, int count,
+                    struct base_err *err)
+{
+    const struct pic_library *l = library(path, err);
+    return l ? l->read_header(path, window, attributes, count, err) : BASE_EIO;
 }
 
 int pic_read(const char *path, struct pic_image *out, struct base_err *err)

@@ -24,6 +24,9 @@ int pic_read_memory(const char *name, const void *data, size_t size, struct pic_
 int pic_read_display(const char *path, struct pic_image *out, struct base_err *err);
 /* The values of one channel, found by name ("lull.spp.V") in any part of the file. BASE_EINVAL if there is none. */
 int pic_read_channel(const char *path, const char *channel, struct pic_image *out, struct base_err *err);
+/* Of the first part, without its pixels: where they lie, and the attributes whose names are set. */
+int pic_read_header(const char *path, struct pic_window *window, struct pic_attribute *attributes, int count,
+                    struct base_err *err);
 
 /* Gives an RGB image of linear light (f32, Rec. 709 primaries) its codes too. `name` names it in errors. */
 int pic_encode(const char *name, struct pic_image *image, struct base_err *err);

@@ -1,7 +1,8 @@
-/* The page of a render that is over: a report, and the picture that was kept with it. */
+/* The page of a render that is over: a report, the picture that was kept with it, or both. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include <lull/host.h>
 
@@ -10,11 +11,12 @@
 #include "base/options.h"
 #include "base/outputs.h"
 #include "picture/read.h"
+#include "report/exr.h"
 
 enum { FAILED = 1, BAD_INPUT = 2, LAYERS = 3 };
 
 struct settings {
-    const char *args[2]; /* report, picture */
+    const char *args[2]; /* report, picture; of a picture alone it is both */
     const char *page, *quoted;
     struct base_outputs outputs;
 };
@@ -31,7 +33,7 @@ static const struct base_option list[] = {
 static const struct base_options command = {
     .doc = "Writes the page of a render that is over, as lull-render --html does.\v"
            "Exit status: 0 done, 1 memory ran out, 2 bad input or the page could not be written.",
-    .args_doc = "REPORT.json [PICTURE.exr]",
+    .args_doc = "REPORT.json [PICTURE.exr]\nPICTURE.exr",
     .list = list,
     .args_min = 1,
     .args_max = 2,
@@ -45,6 +47,16 @@ static int read_text(const char *path, char **text, struct base_err *err)
     const size_t most = (size_t)1 << 30;
     size_t size;
     return path ? base_file_read(path, most, text, &size, err) : 0;
+}
+
+/* A picture alone is report and picture. */
+static int read_report(struct settings *s, char **report, struct base_err *err)
+{
+    const char *ending = strrchr(s->args[0], '.');
+    if (s->args[1] || !ending || strcasecmp(ending, ".exr") != 0)
+        return read_text(s->args[0], report, err);
+    s->args[1] = s->args[0];
+    return report_from_exr(s->args[0], report, err);
 }
 
 /* Channels NAME.R, NAME.G and NAME.B as codes, the caller's; NULL: the file has them not. */
@@ -99,7 +111,7 @@ int main(int argc, char **argv)
     char *report = NULL, *quote = NULL;
     int rc = base_options_parse(&command, argc, argv, &s, &err);
     if (!rc)
-        rc = read_text(s.args[0], &report, &err);
+        rc = read_report(&s, &report, &err);
     if (!rc)
         rc = read_text(s.quoted, &quote, &err);
     if (!rc)

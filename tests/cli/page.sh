@@ -1,5 +1,6 @@
 #!/bin/sh
-# lull-render --html, lull-report: one file with all in it, whatever names and texts say; and what is refused. In a browser: study/page.sh.
+# lull-render --html, lull-report: one file with all in it, whatever names and texts say; what a picture alone tells; and what is
+# refused. In a browser: study/page.sh.
 . "$(dirname "$0")/lull_render_setup"
 R="$P -q --size 48x32 --block 16 --spp-max 64 -t 2"
 evil='x<!--<script>alert(1)&"'"'"'.pbrt'
@@ -15,8 +16,9 @@ page = open("p.html", encoding="utf-8").read()
 block = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.S)[1]
 data = json.loads(block)
 report = json.load(open("r.json"))
+page_blocks = data["report"]["blocks"]
 pictures = {n: base64.b64decode(b, validate=True) for n, b in re.findall(r'<img alt="" data-layer="(\w+)" src="data:image/png;base64,([^"]*)">', page)}
-assert eval(sys.argv[1]), sys.argv[1]
+assert eval(f"({sys.argv[1]})"), sys.argv[1]
 EOF
 }
 t "  …with the report, word for word" look "data['report'] == report and data['quote'] == json.load(open('q.json'))"
@@ -50,7 +52,33 @@ oiiotool --pattern constant:color=.1,.2,.3,.5,.5,.5,.9,.8,.7 48x32 9 \
 t "  …a denoised picture with its layers" "$report" r.json old.exr -o p.html
 t "  …three" look "list(pictures) == ['picture', 'noisy', 'denoised'] and len(set(pictures.values())) == 3"
 "$P" "$scene" -q --size 16x16 --spp 1 -o other.exr
+"$P" "$scene" -q --size 48x32 --block 20x10 --spp-max 64 --crop 5,3,41,30 -c halfbuf -p threshold=0.5 --seed 4294967295 \
+    -o alone.exr --report r.json
+t "lull-report writes the page of a picture alone" "$report" alone.exr -o p.html
+t "  …with the picture" look "list(pictures) == ['picture']"
+t "  …whose blocks are the report's, cut to the crop" look "len(page_blocks) == len(report['blocks']) == 9 and all(
+    [b[k] for k in ('id', 'spp', 'reason')] == [w[k] for k in ('id', 'spp', 'reason')] and abs(b['error'] - w['error']) <= 1e-6 * w['error'] and
+    [b[k] for k in ('x0', 'y0', 'x1', 'y1')] == [max(w['x0'], 5), max(w['y0'], 3), min(w['x1'], 41), min(w['y1'], 30)]
+    for b, w in zip(page_blocks, report['blocks']))"
+t "  …and their samples" look "data['report']['totals']['samples'] == sum(b['spp'] * (b['x1'] - b['x0']) * (b['y1'] - b['y0']) for b in page_blocks)"
+t "  …and what else is the same" look "all(data['report'][k] == report[k] for k in ('scene', 'width', 'height', 'crop', 'seed', 'effects', 'software')) and
+    data['report']['criterion']['id'] == 'halfbuf' and data['report']['criterion']['params'] == {'threshold': '0.5'}"
+t "  …and no times" look "not any('thread_s' in b for b in page_blocks) and abs(data['report']['totals']['elapsed_s'] - report['totals']['render_s'] - report['totals']['criterion_s']) < 1e-9"
+t "a denoised picture alone" sh -c "'$P' $scene -q --size 48x32 --block 16 --spp-max 64 --denoise -o deep.exr --report r.json && '$report' deep.exr -o p.html"
+t "  …has its layers, and the noisy one's error" look "list(pictures) == ['picture', 'noisy', 'denoised'] and
+    all(abs(b['noisy_error'] - w['noisy_error']) <= 1e-6 * w['noisy_error'] for b, w in zip(page_blocks, report['blocks']))"
 render=$P P=$report
+refused "old.exr: has no channel 'lull.spp.V'" old.exr -o x.html
+for block in 0x0 -1x20 20x 99999999999999999999x20 20x10x10 "" blocks; do
+    oiiotool alone.exr --attrib:type=string lull:block "$block" -o bad.exr
+    refused "bad.exr: lull:block is '$block' (expected the size of its blocks" bad.exr -o x.html
+done
+oiiotool alone.exr --attrib lull:block 36x27 -o bad.exr
+refused "is not of blocks of 36x27 pixels" bad.exr -o x.html
+for v in nan inf -1 1e30; do # the samples, times it
+    oiiotool alone.exr --mulc 1,1,1,1,1,1,$v -o bad.exr
+    refused "its layer 'lull.spp.V' is not" bad.exr -o x.html
+done
 refused "the picture has 16x16 pixels, the report is of 48x32" r.json other.exr -o x.html
 echo '{"blocks": 1, "width": 1, "height": 1}' >no.json
 refused "no.json: no report (expected what lull-render --report writes)" no.json -o x.html
