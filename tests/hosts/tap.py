@@ -1,6 +1,9 @@
 """Runs functions named test_* and reports them as TAP lines; a test's docstring says what must hold."""
 import contextlib
+import importlib
+import inspect
 import os
+import pkgutil
 import sys
 import traceback
 
@@ -33,6 +36,24 @@ def raises(kind, text, call, *arguments, **named):
         assert text in str(error) and "\n" not in str(error), f"message: {error}"
         return
     raise AssertionError(f"no {kind.__name__} was raised")
+
+
+def undescribed(package):
+    """Public names in a package's own modules that lack a docstring or a type (parameter, result), and what is missing."""
+    names = [m.name for m in pkgutil.iter_modules(package.__path__, f"{package.__name__}.") if not m.ispkg]
+    for module in (package, *(importlib.import_module(n) for n in names if not n.endswith("__main__"))):
+        public = {n: v for n, v in vars(module).items() if n[0] != "_" and getattr(v, "__module__", None) == module.__name__}
+        for owner in (module, *filter(inspect.isclass, public.values())):
+            if not owner.__doc__:
+                yield f"{module.__name__} {owner.__name__}: docstring"
+            for name, value in (public if owner is module else vars(owner)).items():
+                value = inspect.unwrap(getattr(value, "fget", None) or getattr(value, "__func__", value))
+                if inspect.isfunction(value) and (name[0] != "_" or name == "__init__"):
+                    wanted = {*inspect.signature(value).parameters, *(() if name == "__init__" else ("return",))}
+                    missing = wanted - {*value.__annotations__, "self", "cls"}
+                    missing |= set() if value.__doc__ or name == "__init__" else {"docstring"}
+                    if missing:
+                        yield f"{module.__name__} {value.__qualname__}: {', '.join(sorted(missing))}"
 
 
 def main(namespace):

@@ -21,6 +21,11 @@ from lull.blender.session import Session, Settings  # noqa: E402
 from tap import raises  # noqa: E402
 
 
+def test_described():
+    """every public name has a docstring, every parameter and result a type"""
+    assert not list(tap.undescribed(lull.blender)), list(tap.undescribed(lull.blender))
+
+
 def test_pattern():
     """the user's sampling pattern is kept where waves of it add up to one render; else it is switched, and told"""
     scene, kept = cube(24, 16), 0

@@ -85,6 +85,11 @@ def test_numbers():
         assert getattr(abi, name) == int(value, 0), name
 
 
+def test_described():
+    """every public name has a docstring, every parameter and result a type"""
+    assert not list(tap.undescribed(lull)), list(tap.undescribed(lull))
+
+
 def test_criteria():
     """criteria() lists what is installed, with parameters"""
     found = {c.id: c for c in lull.criteria()}

@@ -33,6 +33,7 @@ minor = int(re.search(r"-py3-none-manylinux_2_(\d+)_x86_64[.]whl$", sys.argv[1])
 elf = [path for path in Path(folder).rglob("*") if path.is_file() and path.read_bytes()[:4] == b"\x7fELF"]
 names = {path.name for path in elf}
 assert len(elf) == 10, names
+assert "lull/py.typed" in wheel.namelist(), "type checkers would not look at its types"
 assert len([name for name in wheel.namelist() if name.endswith(".ggn")]) == 1, "a model of before is no part of it"
 for path in elf:
     text = subprocess.run(["objdump", "-pT", path], text=True, capture_output=True, check=True).stdout

@@ -40,10 +40,12 @@ bl_info = {"name": "Lull", "author": "Lull", "version": (1, 0), "blender": (3, 4
 
 
 def register() -> None:
+    """Blender switches the add-on on."""
     from .blender import ui
     ui.register()
 
 
 def unregister() -> None:
+    """Blender switches the add-on off."""
     from .blender import ui
     ui.unregister()

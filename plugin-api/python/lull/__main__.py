@@ -11,12 +11,12 @@ from .criterion import load
 from .library import LullError, call, library
 
 
-def _trial(spec: str) -> str:
-    """Whether an instance can be made."""
+def _trial(spec: str, denoiser: str) -> str:
+    """Whether an instance can be made; what the line `denoiser` says is not said twice."""
     try:
         load(spec, log=lambda *_: None).close()
     except LullError as error:
-        return f"not ready: {error}"
+        return "not ready: see denoiser" if denoiser in str(error) else f"not ready: {error}"
     return "ready"
 
 
@@ -29,19 +29,21 @@ def _denoiser() -> str:
 
 
 def main() -> int:
+    """Prints the lines; the exit status."""
     print(f"lull        {__version__}, Python {sys.version.split()[0]}")
     try:
         print(f"library     {library()._name}")
     except LullError as error:
         print(f"library     {error}")
         return 2
-    found = criteria()
+    found, denoiser = criteria(), _denoiser()
     for info in found:
-        print(f"criterion   {info.id:<12}{info.version:<5}{_trial(f'{info.path}:{info.id}')}  ({info.path})")
+        ready = _trial(f"{info.path}:{info.id}", denoiser)
+        print(f"criterion   {info.id:<12}{info.version:<5}{ready}  ({info.path})")
     folders = {(Path(info.path).parent / at).resolve() for info in found for at in (".", "../../share/lull", "../../../ggn/models")}
     for path in sorted(path for folder in folders for path in folder.glob("*.ggn")):
         print(f"model       {path}")
-    print(f"denoiser    {_denoiser()}")
+    print(f"denoiser    {denoiser}")
     for module in ("mitsuba", "bpy"):
         print(f"{module:<12}{'found' if importlib.util.find_spec(module) else 'none'}")
     print(f"blender     {shutil.which('blender') or 'none'}")

@@ -77,6 +77,7 @@ class Keeper:
         driver.watchers.append(self._watch)
 
     def save(self, driver: Driver) -> None:
+        """Now; where that fails `unsaved` says why, and nothing is raised."""
         try:
             save(self.path, driver)
             self.unsaved = None

@@ -8,7 +8,8 @@ import math
 import os
 import threading
 import warnings
-from typing import Callable, Iterator, Mapping, NamedTuple, Optional
+import weakref
+from typing import Callable, Iterator, Mapping, NamedTuple, NoReturn, Optional
 
 import numpy as np
 
@@ -32,14 +33,17 @@ class Rect(NamedTuple):
 
     @property
     def width(self) -> int:
+        """Pixels of a row."""
         return self.x1 - self.x0
 
     @property
     def height(self) -> int:
+        """Rows."""
         return self.y1 - self.y0
 
     @property
     def pixels(self) -> int:
+        """width · height."""
         return self.width * self.height
 
 
@@ -127,7 +131,7 @@ class Criterion:
         call("host_create", C.byref(services), C.c_void_p(info.table), pairs, len(self.parameters), C.byref(handle.pointer))
         self.handle: Optional[Handle] = handle
         self.needs = abi.Requirements.from_address(library().lull_host_needs(handle.pointer))
-        self.frame: Optional[object] = None  # the handle of the frame that is open on it
+        self.frame: Optional[weakref.ref[Handle]] = None  # of the frame that is open on it
         self._busy = threading.Lock()
 
     def with_parameters(self, **parameters: object) -> Criterion:
@@ -153,16 +157,17 @@ class Criterion:
             with self.alone():
                 self.handle = self.frame = None
 
-    def __reduce_ex__(self, _protocol):  # what copy and pickle go by
+    def __reduce_ex__(self, _protocol: object) -> NoReturn:  # what copy and pickle go by
         raise TypeError(f"criterion {self.info.id}: an instance cannot be copied, as both would free it: make another one, "
                         "with_parameters()")
 
     def __enter__(self) -> Criterion:
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
 def plane_names(mask: int) -> frozenset[str]:
+    """mask: bits 1 << abi.COLOR …."""
     return frozenset(name for name, bit in PLANES.items() if mask >> bit & 1)

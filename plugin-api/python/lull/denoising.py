@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import ctypes as C
 import os
-from typing import Mapping, NamedTuple, Optional
+from typing import Mapping, NamedTuple, Optional, Union
 
 import numpy as np
 
 from . import abi
-from .criterion import Plane, load
+from .criterion import Criterion, Plane, load
 from .host import HostFrame
 from .library import LullError, call
 
@@ -44,7 +44,7 @@ def criterion_of(kind: str) -> str:
     return "denoised" if kind else "observer"
 
 
-def parameters_of(kind: str, criterion: str, given: Mapping[str, object]) -> dict[str, object]:
+def parameters_of(kind: str, criterion: Union[str, Criterion], given: Mapping[str, object]) -> dict[str, object]:
     """given, and that the criterion judges the picture that is kept."""
     return {**({"picture": "denoised"} if kind == "full" and criterion == "denoised" else {}), **given}
 

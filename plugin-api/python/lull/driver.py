@@ -125,7 +125,8 @@ class Driver:
     def _wave(self) -> bool:
         """One call of the render function, for the blocks that have fewest samples; False when every active block is at its
         check."""
-        frame, pieces = self.frame, {}
+        frame = self.frame
+        pieces: dict[tuple[int, int], list[Block]] = {}  # by first sample and count
         for b in frame.blocks:
             if b.active and b.spp < b.next_spp:
                 end = min(b.next_spp, (b.spp // frame.wave + 1) * frame.wave)
@@ -148,6 +149,7 @@ class Driver:
 
     def render_blocks(self, blocks: list[Block], first: int, count: int) -> None:
         """One call of the render function. A host that accumulates itself overrides this and uses Frame.put."""
+        assert self.render, "a driver without a render function overrides render_blocks"
         half = in_half(first // self.frame.wave)
         start_s, pixels, done = time.monotonic(), sum(b.rect.pixels for b in blocks), 0
         try:

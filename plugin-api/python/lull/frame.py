@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Callable, Mapping, Optional, Sequence, Union
 
 import numpy as np
+import numpy.typing as npt
 
 from . import abi, limits
 from .criterion import CHANNELS, Criterion, Plane, Rect, plane_names
@@ -102,7 +103,7 @@ class Frame(HostFrame):
     def _slices(self, rect: Rect) -> tuple[slice, slice]:
         return (slice(rect.y0 - self.view.y0, rect.y1 - self.view.y0), slice(rect.x0 - self.view.x0, rect.x1 - self.view.x0))
 
-    def per_pixel(self, value: Callable[[Block], float], dtype=np.float64) -> np.ndarray:
+    def per_pixel(self, value: Callable[[Block], float], dtype: npt.DTypeLike = np.float64) -> np.ndarray:
         """[h, w]: value(block) at each of its pixels."""
         out = np.empty((self.view.height, self.view.width), dtype)
         for b in self.blocks:

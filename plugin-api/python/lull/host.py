@@ -26,13 +26,14 @@ def reasons() -> tuple[str, ...]:
     return tuple(library().lull_host_reason(i).decode() for i in range(abi.REASON_COUNT))
 
 
-class Block(abi.HostBlock):  # type: ignore[misc, valid-type]
+class Block(abi.HostBlock):
     """One block, in the library's memory: the fields of struct lull_host_block. A host writes spp, half_spp, thread_s and
     dropped; predicted_spp, p_noisy and error are the last answer's, NaN = not known."""
     frame: Handle  # keeps the memory
 
     @property
     def rect(self) -> Rect:
+        """Its pixels in the picture."""
         return Rect(self.x0, self.y0, self.x1, self.y1)
 
     @property
@@ -42,14 +43,16 @@ class Block(abi.HostBlock):  # type: ignore[misc, valid-type]
 
     @property
     def reason(self) -> str:
+        """One of reasons(): why it gets no more samples."""
         return reasons()[abi.HostBlock.reason.__get__(self)]
 
 
-class Totals(abi.HostTotals):  # type: ignore[misc, valid-type]
+class Totals(abi.HostTotals):
     """Sums over the run (struct lull_host_totals); seconds are wall seconds, but criterion_thread_s: processor seconds."""
 
     @property
     def elapsed_s(self) -> float:
+        """Wall seconds of rendering and of checks."""
         return self.render_s + self.criterion_s
 
 
@@ -228,6 +231,7 @@ class HostFrame:
                 call("host_quote_add", quote.pointer, C.byref(abi.Pair(name.encode(), repr(value).encode())), value == own)
             if other:
                 with other.alone() as pointer:
+                    assert other.handle  # else alone() has raised
                     other.handle.pointer, quote.kept = C.c_void_p(), (self.handle, other.handle)
                     call("host_quote_add_other", quote.pointer, pointer)
             call("host_quote_finish", quote.pointer, C.byref(view), C.byref(rows), C.byref(count))

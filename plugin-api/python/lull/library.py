@@ -51,6 +51,7 @@ class Info(NamedTuple):
     table: int  # its address: static, lives for ever
 
     def parameter(self, name: str) -> Optional[Parameter]:
+        """The row of this name, None if there is none."""
         return next((p for p in self.parameters if p.name == name), None)
 
 
@@ -139,8 +140,11 @@ def criteria(folders: Optional[Iterable[str]] = None) -> list[Info]:
     """Every criterion that can be found. A library name seen in an earlier folder is skipped; a broken one warns."""
     found: list[Info] = []
     search = _search(folders)
-    visit = C.CFUNCTYPE(C.c_int32, C.c_void_p, C.POINTER(abi.Found))(lambda _, f: found.append(_info(f.contents)) or 0)
-    library().lull_list(C.byref(search), visit, None)
+
+    def visit(_context: object, at: Any) -> int:
+        found.append(_info(at.contents))
+        return abi.OK
+    library().lull_list(C.byref(search), C.CFUNCTYPE(C.c_int32, C.c_void_p, C.POINTER(abi.Found))(visit), None)
     return found
 
 
@@ -154,7 +158,7 @@ def find(spec: str) -> Info:
 def _info(found: abi.Found) -> Info:
     table = abi.Criterion.from_address(found.criterion)
     rows = (abi.Param.from_address(table.params + i * table.param_stride) for i in range(table.param_count))
-    return Info(*(text.decode() for text in (table.id, table.name, table.version, table.description)),
+    return Info(table.id.decode(), table.name.decode(), table.version.decode(), table.description.decode(),
                 os.fsdecode(found.path), tuple(
                     Parameter(p.name.decode(), p.help.decode(), _PARAMETER_TYPES[p.type],
                               None if p.default_value is None else p.default_value.decode(),

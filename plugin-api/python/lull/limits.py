@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "sample_clamp": (0.0, _FINITE), "checkpoint_every_s": (0.0, _FINITE)}
 
 
-def checked(name: str, value: object):
+def checked(name: str, value: object) -> Any:
     """value, if it is in the range of this name, as an int or a float; NaN is in none."""
     low, high = _RANGES[name]
     expected = (f"expected a {'whole' if isinstance(low, int) else 'finite'} number " +

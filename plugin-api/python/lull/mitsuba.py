@@ -127,7 +127,7 @@ class Film:
     def __enter__(self) -> Film:
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self._set_crop(self.crop)
 
     def render(self, rects: Sequence[Rect], first: int, count: int, _half: bool) -> Iterator[dict[str, np.ndarray]]:

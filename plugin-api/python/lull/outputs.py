@@ -8,7 +8,7 @@ import math
 import os
 import sys
 import time
-from typing import Mapping, Optional
+from typing import Mapping, Optional, TextIO
 
 import numpy as np
 
@@ -107,12 +107,13 @@ def progress_text(driver: Driver) -> str:
 class Progress:
     """Prints the line: live on a terminal, now and then elsewhere. Give its `show` to the driver as after_call."""
 
-    def __init__(self, out=None):
+    def __init__(self, out: Optional[TextIO] = None):
         self.out = out or sys.stderr
         self.live = self.out.isatty()
         self._next_s = time.monotonic() + (0.0 if self.live else 2.0)
 
     def show(self, driver: Driver) -> None:
+        """Five times a second on a terminal, elsewhere every 10 s; the first after 2 s there."""
         now = time.monotonic()
         if now >= self._next_s:
             self.out.write(f"\r{progress_text(driver)}\033[K" if self.live else progress_text(driver) + "\n")
@@ -120,6 +121,7 @@ class Progress:
             self._next_s = now + (0.2 if self.live else 10.0)
 
     def clear(self) -> None:
+        """Removes the line from a terminal."""
         if self.live:
             self.out.write("\r\033[K")
             self.out.flush()

@@ -6,9 +6,8 @@ from __future__ import annotations
 
 from typing import Callable, NamedTuple, Optional
 
-from .criterion import load
+from .criterion import Criterion, load
 from .driver import Driver, Result, Watcher
-from .host import HostFrame
 from .library import LullError, Parameter
 
 # The quality parameter `visible` by name, with the criterion's own default; others are asked at twice and at four times
@@ -35,10 +34,10 @@ def pilot_done(driver: Driver, spp: int = 128, seconds: float = 30.0) -> bool:
     return not asked or min(asked) >= spp or min(asked) > 0 and driver.totals.elapsed_s >= seconds
 
 
-def _dial_of(frame: HostFrame) -> tuple[Parameter, float]:
+def _dial_of(criterion: Criterion) -> tuple[Parameter, float]:
     """What a mask scales and a quote varies; KeyError when the criterion has no such parameter, or no value for it."""
-    for parameter in filter(None, map(frame.criterion.info.parameter, ("visible", "threshold"))):
-        if (value := frame.criterion.parameters.get(parameter.name, parameter.default)) is not None:
+    for parameter in filter(None, map(criterion.info.parameter, ("visible", "threshold"))):
+        if (value := criterion.parameters.get(parameter.name, parameter.default)) is not None:
             return parameter, float(value)
     raise KeyError
 
@@ -61,11 +60,11 @@ def rows(driver: Driver) -> list[Row]:
     be asked. Every active block has been checked once at least."""
     frame, noisy = driver.frame, None
     try:
-        parameter, chosen = _dial_of(frame)
+        parameter, chosen = _dial_of(frame.criterion)
         settings = _settings(parameter, chosen)
         if _is_dear(driver):
             noisy = load("observer", threads=frame.criterion.threads, log=frame.criterion.log)
-            settings = [(chosen, "denoised"), (float(noisy.info.parameter("visible").default), "noisy")]
+            settings = [(chosen, "denoised"), (_dial_of(noisy)[1], "noisy")]
         values = [value for value, _ in settings[:1 if noisy else None]]
         costs = frame.quote(driver.threads, parameter.name, values, chosen, noisy)
     except (LullError, KeyError):

@@ -8,17 +8,26 @@ import os
 import shutil
 import sys
 from pathlib import Path
-from typing import NoReturn, Optional, Sequence
+from typing import TYPE_CHECKING, NoReturn, Optional, Sequence
 
-from .. import denoising
+from .. import denoising, quote
+from ..criterion import Criterion, load
+from ..driver import Result
+from ..library import LullError
+from ..outputs import Progress
 from ..stopping import EXIT_STATUS, Stopping
+
+if TYPE_CHECKING:  # launch() does without bpy
+    import bpy
+
+    from .session import Session, Settings
 
 # As Blender names them
 DEVICES = ("CPU", "CUDA", "OPTIX", "HIP", "ONEAPI", "METAL")
 
 
 class _Parser(argparse.ArgumentParser):
-    def parse_args(self, args):  # type: ignore[override]
+    def parse_args(self, args: Sequence[str]) -> argparse.Namespace:  # type: ignore[override]
         return super().parse_args(["--denoise=blend" if a == "--denoise" else a for a in args])  # and not the next word
 
     def error(self, message: str) -> NoReturn:
@@ -27,6 +36,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parser() -> argparse.ArgumentParser:
+    """Of the options, with their help."""
     p = _Parser("python3 -m lull.blender", description="Render a Blender scene with Cycles, block by "
                                 "block, each until its noise can no longer be seen.")
     p.add_argument("file", nargs="?", help="the .blend file (inside Blender: default the open one)")
@@ -88,7 +98,7 @@ def launch(argv: Optional[Sequence[str]] = None) -> int:
     return main(argv)
 
 
-def _frames(text: Optional[str], scene) -> list[Optional[int]]:
+def _frames(text: Optional[str], scene: bpy.types.Scene) -> list[Optional[int]]:
     if not text:
         return [None]
     if text == "all":
@@ -106,7 +116,6 @@ def _frames(text: Optional[str], scene) -> list[Optional[int]]:
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Inside Blender (options after `--`) or with bpy. Exit status: 0 done, 1 rendering failed, 2 bad input or an output
     could not be written, 130 interrupted."""
-    from ..library import LullError
     from .cycles import HostError
     if argv is None:
         argv = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
@@ -119,7 +128,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         return 2
 
 
-def _scene(options: argparse.Namespace):
+def _scene(options: argparse.Namespace) -> bpy.types.Scene:
     """The scene that the options name, opened and set as they say."""
     import bpy
 
@@ -135,7 +144,7 @@ def _scene(options: argparse.Namespace):
     return scene
 
 
-def _settings(options: argparse.Namespace, scene, frame: Optional[int]):
+def _settings(options: argparse.Namespace, scene: bpy.types.Scene, frame: Optional[int]) -> Settings:
     """Of one frame."""
     import bpy
 
@@ -156,7 +165,6 @@ def _settings(options: argparse.Namespace, scene, frame: Optional[int]):
 
 
 def _render(options: argparse.Namespace, stopping: Stopping) -> int:
-    from ..criterion import load
     from .session import check_files
     if options.resume and not options.checkpoint:
         raise ValueError("--resume needs --checkpoint FILE")
@@ -176,10 +184,9 @@ def _render(options: argparse.Namespace, stopping: Stopping) -> int:
     return status
 
 
-def _render_frame(options: argparse.Namespace, scene, settings, criterion, stopping: Stopping) -> int:
+def _render_frame(options: argparse.Namespace, scene: bpy.types.Scene, settings: Settings, criterion: Criterion,
+                  stopping: Stopping) -> int:
     """The exit status of one frame."""
-    from .. import quote
-    from ..outputs import Progress
     from .session import Session
     progress = None if options.quiet else Progress()
 
@@ -203,7 +210,7 @@ def _render_frame(options: argparse.Namespace, scene, settings, criterion, stopp
             if session.unsaved and not warned:
                 warned = True
                 note(f"{session.unsaved}; the render goes on")
-        if options.quote:
+        if options.quote or result is None:
             return _tell_quote(session, result, progress)
         written, failed = session.write(result)
     if progress:
@@ -212,8 +219,7 @@ def _render_frame(options: argparse.Namespace, scene, settings, criterion, stopp
     return _end(session, result, failed)
 
 
-def _tell_quote(session, result, progress) -> int:
-    from .. import quote
+def _tell_quote(session: Session, result: Optional[Result], progress: Optional[Progress]) -> int:
     if progress:
         progress.clear()
     if result is not None and result.outcome in ("interrupt", "failed"):
@@ -224,7 +230,7 @@ def _tell_quote(session, result, progress) -> int:
     return _end(session, result, [])
 
 
-def _end(session, result, failed: Sequence[str]) -> int:
+def _end(session: Session, result: Optional[Result], failed: Sequence[str]) -> int:
     """Says what went wrong; the exit status."""
     for text in [*failed, *([str(session.unsaved)] if session.unsaved else [])]:
         print(f"lull: {text}", file=sys.stderr)
@@ -236,7 +242,7 @@ def _end(session, result, failed: Sequence[str]) -> int:
     return EXIT_STATUS if result is not None and result.outcome == "interrupt" else 0
 
 
-def summary(session) -> str:
+def summary(session: Session) -> str:
     """One line about a finished frame."""
     blocks = session.frame.blocks
     converged = sum(b.reason == "criterion" for b in blocks)

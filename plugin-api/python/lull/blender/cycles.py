@@ -79,7 +79,7 @@ def _label(owner: object, name: str, value: str) -> str:
     return items[value].name if value in items else value.replace("_", " ").title()
 
 
-def _gpus():
+def _gpus() -> bpy.types.AddonPreferences:
     """Cycles' preferences: which processors it may use."""
     addon = bpy.context.preferences.addons.get("cycles")
     if addon is None:
@@ -227,7 +227,7 @@ class Cycles:
             return name
         raise HostError("this Cycles has no pattern whose waves add up to one render: use Blender 3.x, or 4.4 or later")
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         for owner, name, value in self._touched:  # in order: what a file format allows depends on the format
             setattr(owner, name, value)
         self._touched.clear()

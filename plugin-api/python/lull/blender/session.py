@@ -28,7 +28,7 @@ _UNSET = ("", "/tmp/", "/tmp\\")
 class Settings:
     """What a user chooses for a frame. Files: "" = not written."""
     criterion: str = ""  # "": observer, or what judges the denoised picture
-    parameters: dict[str, str] = field(default_factory=dict)
+    parameters: dict[str, Any] = field(default_factory=dict)
     spp_min: int = 16
     spp_max: Optional[int] = None  # None: the scene's Max Samples
     time_budget_s: Optional[float] = None  # None: the scene's Time Limit
@@ -50,9 +50,11 @@ class Settings:
         if frame is None:
             return self
         names = ("output", "preview", "stop_map", "report", "checkpoint")
-        return replace(self, **{name: _numbered(getattr(self, name), f"_{frame:04}") for name in names})
+        files: dict[str, Any] = {name: _numbered(getattr(self, name), f"_{frame:04}") for name in names}
+        return replace(self, **files)
 
     def outputs(self) -> list[Output]:
+        """The files, each with the option that names it and its endings."""
         return [Output("--output", self.output, (".exr",)), Output("--preview", self.preview, (".png",)),
                 Output("--stop-map", self.stop_map, (".png", ".csv")), Output("--report", self.report, (".json",)),
                 Output("--checkpoint", self.checkpoint)]
@@ -131,8 +133,7 @@ class Session:
     def __init__(self, scene: bpy.types.Scene, settings: Settings, criterion: Optional[Criterion] = None,
                  after_call: Optional[Callable[[Driver], None]] = None):
         self.scene, self.settings = scene, settings
-        parameters: dict[str, Any] = settings.parameters
-        self._own = None if criterion else load(settings.criterion, **parameters)
+        self._own = None if criterion else load(settings.criterion, **settings.parameters)
         judge = criterion or self._own
         assert judge is not None
         spp_max = scene.cycles.samples if settings.spp_max is None else settings.spp_max
@@ -142,7 +143,7 @@ class Session:
             denoising.check(settings.parameters.get("library", ""))
         self.host = Cycles(scene, spp_max, bool(settings.denoise))
         self.notes = self.host.notes
-        display = {"exposure": 2.0 ** scene.view_settings.exposure if is_plain(scene) else 1.0, "display": display_of(scene)}
+        exposure, display = 2.0 ** scene.view_settings.exposure if is_plain(scene) else 1.0, display_of(scene)
         self.host.__enter__()
         try:
             self.frame = Frame(judge, self.host.width, self.host.height, block=settings.block, crop=self.host.crop,
@@ -150,7 +151,8 @@ class Session:
                                deterministic=time_s <= 0, denoised=bool(settings.denoise),
                                supplies=("albedo", "normal") if settings.denoise else (),
                                spp_min=min(settings.spp_min, spp_max) if settings.spp_max is None else settings.spp_min,
-                               mask=read_grey(settings.mask) if settings.mask else None, seed=scene.cycles.seed, **display)
+                               mask=read_grey(settings.mask) if settings.mask else None, seed=scene.cycles.seed,
+                               exposure=exposure, display=display)
             self.driver = Driver(self.frame, self.host.render, threads=self.host.threads, after_call=after_call,
                                  identity=_identity(scene, self.host) if settings.checkpoint else None)
         except BaseException:
@@ -163,7 +165,7 @@ class Session:
     def __enter__(self) -> Session:
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self.host.__exit__()
         self.frame.close()
         if self._own:

@@ -83,11 +83,13 @@ def icon(name: str) -> int:
 
 
 def register() -> None:
+    """Makes room for the small pictures."""
     global _small
     _small = bpy.utils.previews.new()
 
 
 def unregister() -> None:
+    """Frees the small pictures."""
     global _small
     if _small is not None:
         bpy.utils.previews.remove(_small)

@@ -12,6 +12,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 from .. import outputs
 from ..criterion import load
 from ..denoising import criterion_of
+from ..driver import Result
 from ..library import LullError, criteria, search_path
 from . import shown
 from .cli import summary
@@ -24,7 +25,7 @@ _running = False  # a render is in the making: its settings are not to be shown,
 _visible: dict[str, float] = {}  # criteria whose quality parameter is the share of viewers, with their default, 0 = none
 
 
-def _criteria(_self, _context) -> list[tuple[str, str, str]]:
+def _criteria(_self: object, _context: object) -> list[tuple[str, str, str]]:
     if not _items:
         found = [c for c in criteria() if c.id != "null"]
         found.sort(key=lambda c: (c.id != "observer", c.id))
@@ -35,7 +36,7 @@ def _criteria(_self, _context) -> list[tuple[str, str, str]]:
     return _items
 
 
-def _choose_criterion(settings, _context) -> None:
+def _choose_criterion(settings: bpy.types.PropertyGroup, _context: object) -> None:
     """The one that judges the picture that is kept now, unless another was chosen."""
     if settings.criterion in ("observer", "denoised"):
         settings.criterion = criterion_of("blend" if settings.denoise else "")
@@ -92,14 +93,15 @@ class LULL_OT_render(bpy.types.Operator):
 
     animation: BoolProperty(name="Animation", default=False, description="The scene's frame range, into numbered files")
 
-    _session: Optional[Session] = None
+    _session: Session = None  # type: ignore[assignment] # until the first frame begins
     _timer = None
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a scene, and Cycles."""
         return context.scene is not None and hasattr(context.scene, "cycles")
 
-    def _plan(self, context) -> bool:
+    def _plan(self, context: bpy.types.Context) -> bool:
         """What is asked for, looked at before the first sample."""
         scene = context.scene
         frames = range(scene.frame_start, scene.frame_end + 1, scene.frame_step) if self.animation else [None]
@@ -114,7 +116,7 @@ class LULL_OT_render(bpy.types.Operator):
             return False
         return self._begin(context)
 
-    def _begin(self, context) -> bool:
+    def _begin(self, context: bpy.types.Context) -> bool:
         """The next frame."""
         scene = context.scene
         frame, settings = self._frames.pop(0)
@@ -131,7 +133,7 @@ class LULL_OT_render(bpy.types.Operator):
             self.report({"WARNING"}, note)
         return True
 
-    def _step(self, context):
+    def _step(self, context: bpy.types.Context) -> Optional[Result]:
         """The end, or None; now and then the picture is shown."""
         global _running
         session = self._session
@@ -150,7 +152,7 @@ class LULL_OT_render(bpy.types.Operator):
                                               *session.quote.split("; ")])
         return result
 
-    def _step_or_cancel(self, context):
+    def _step_or_cancel(self, context: bpy.types.Context) -> Optional[Result]:
         """An error of ours must not leave the scene's settings changed, nor the panel waiting."""
         try:
             return self._step(context)
@@ -158,7 +160,7 @@ class LULL_OT_render(bpy.types.Operator):
             self.cancel(context)
             raise
 
-    def _end(self, context, result) -> bool:
+    def _end(self, context: bpy.types.Context, result: Result) -> bool:
         """Writes the frame; whether there is another one to render."""
         session, settings = self._session, context.scene.lull
         session.__exit__()
@@ -176,7 +178,8 @@ class LULL_OT_render(bpy.types.Operator):
             self.report({"INFO"}, summary(session))
         return bool(self._frames) and result.outcome not in ("interrupt", "failed")
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """From a script: every frame, before it returns."""
         more = self._plan(context)
         if not more:
             return {"CANCELLED"}
@@ -186,7 +189,8 @@ class LULL_OT_render(bpy.types.Operator):
             more = self._end(context, result) and self._begin(context)
         return {"FINISHED"}
 
-    def invoke(self, context, _event):
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """From the button: begins the first frame; modal() goes on."""
         if not self._plan(context):
             return {"CANCELLED"}
         manager = context.window_manager
@@ -194,7 +198,8 @@ class LULL_OT_render(bpy.types.Operator):
         manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context, event):
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """A step for each tick of the timer; Esc ends the render and keeps the picture."""
         driver = self._session.driver
         if event.type == "ESC":
             driver.interrupt()
@@ -209,7 +214,7 @@ class LULL_OT_render(bpy.types.Operator):
         context.window_manager.event_timer_remove(self._timer)
         return {"FINISHED"}
 
-    def cancel(self, context):
+    def cancel(self, context: bpy.types.Context) -> None:
         """Blender closes, or opens another file."""
         global _running
         _running = False
@@ -218,6 +223,7 @@ class LULL_OT_render(bpy.types.Operator):
 
 
 class LULL_PT_render(bpy.types.Panel):
+    """Cycles stops each block when its noise can no longer be seen"""
     bl_label = "Lull"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
@@ -225,10 +231,12 @@ class LULL_PT_render(bpy.types.Panel):
     COMPAT_ENGINES = {"CYCLES"}
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """The scene renders with Cycles."""
         return context.engine in cls.COMPAT_ENGINES
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
+        """Settings, buttons, the state of the render and the small pictures."""
         layout, settings, cycles = self.layout, context.scene.lull, context.scene.cycles
         layout.use_property_split, layout.use_property_decorate = True, False
         if _running:
@@ -260,6 +268,7 @@ CLASSES = (LullSettings, LULL_OT_render, LULL_PT_render)
 
 
 def register() -> None:
+    """Blender switches the add-on on: classes, and the settings of each scene."""
     shown.register()
     for c in CLASSES:
         bpy.utils.register_class(c)
@@ -267,6 +276,7 @@ def register() -> None:
 
 
 def unregister() -> None:
+    """Blender switches the add-on off."""
     shown.unregister()
     del bpy.types.Scene.lull
     for c in reversed(CLASSES):
