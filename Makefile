@@ -300,7 +300,7 @@ test-clang: ## build the product with clang, without a warning, into build/clang
 	@BUILD=build/clang tests/run $(CLANG_TEST)
 
 test-hosts: setup ## install Blender, Mitsuba and bpy as far as they can be had, and test Lull in them
-	@$(MAKE) --no-print-directory all $(ABI_PLUGINS)
+	@$(MAKE) --no-print-directory all $(ABI_PLUGINS) $(OIDN_STUB)
 	@scripts/hosts/setup
 	@BUILD=build tests/run $(HOST_TEST)
 
