@@ -137,7 +137,7 @@ static const struct gp_block_view_ops ops = {.load = load,
                                              .worker_destroy = worker_destroy,
                                              .model_destroy = model_destroy,
                                              .read = read_image,
-                                             .evidence = {NULL, no_noise, window_logit, no_tail}};
+                                             .evidence = {NULL, no_noise, window_logit, no_tail, NULL}};
 
 /* X(kind, member of criteria.h, id, name, its features) */
 #define BASELINES(X) \
