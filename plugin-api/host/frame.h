@@ -141,6 +141,14 @@ int32_t lull_host_paint(const struct lull_host_blocks *blocks, const double *val
 int32_t lull_host_load_history(struct lull_host_criterion *criterion, const void *data, uint64_t size,
                                struct lull_error *err);
 
+/* --- report.c ------------------------------------------------------------------------------------------------------- */
+
+struct cJSON;
+/* Appends to `list` what every report says of a block, and returns that object; noisy_error NULL: not known. *failed: no
+ * memory. */
+struct cJSON *lull_host_report_block(struct cJSON *list, const struct lull_host_block *b, const double *noisy_error,
+                                     int *failed);
+
 /* --- failure.c ------------------------------------------------------------------------------------------------------ */
 
 /* "criterion ID: ", `what` and what the criterion said; returns its code. */

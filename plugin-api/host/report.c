@@ -35,23 +35,29 @@ static void add_criterion(cJSON *root, const struct lull_host_criterion *criteri
     }
 }
 
+cJSON *lull_host_report_block(cJSON *list, const struct lull_host_block *b, const double *noisy_error, int *failed)
+{
+    cJSON *o = base_json_object(list, NULL, failed);
+    base_json_number(o, "id", b->id, failed);
+    base_json_number(o, "x0", b->x0, failed);
+    base_json_number(o, "y0", b->y0, failed);
+    base_json_number(o, "x1", b->x1, failed);
+    base_json_number(o, "y1", b->y1, failed);
+    base_json_number(o, "spp", (double)b->spp, failed);
+    base_json_text(o, "reason", lull_host_reason(b->reason), failed);
+    base_json_number(o, "p_noisy", b->p_noisy, failed);
+    base_json_number(o, "error", b->error, failed);
+    if (noisy_error)
+        base_json_number(o, "noisy_error", *noisy_error, failed);
+    return o;
+}
+
 static void add_blocks(cJSON *root, const struct lull_host_frame *f, const double *noisy_error, int *failed)
 {
     cJSON *list = base_json_array(root, "blocks", failed);
     for (uint32_t i = 0; i < f->blocks.count; i++) {
         const struct lull_host_block *b = &f->blocks.list[i];
-        cJSON *o = base_json_object(list, NULL, failed);
-        base_json_number(o, "id", b->id, failed);
-        base_json_number(o, "x0", b->x0, failed);
-        base_json_number(o, "y0", b->y0, failed);
-        base_json_number(o, "x1", b->x1, failed);
-        base_json_number(o, "y1", b->y1, failed);
-        base_json_number(o, "spp", (double)b->spp, failed);
-        base_json_text(o, "reason", lull_host_reason(b->reason), failed);
-        base_json_number(o, "p_noisy", b->p_noisy, failed);
-        base_json_number(o, "error", b->error, failed);
-        if (noisy_error)
-            base_json_number(o, "noisy_error", noisy_error[i], failed);
+        cJSON *o = lull_host_report_block(list, b, noisy_error ? &noisy_error[i] : NULL, failed);
         base_json_number(o, "checks", b->checks, failed);
         base_json_number(o, "thread_s", b->thread_s, failed);
         base_json_number(o, "dial", f->criterion ? lull_host_mask_factor(b->step) : (double)NAN, failed);

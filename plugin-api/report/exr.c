@@ -177,18 +177,7 @@ static double add_blocks(cJSON *root, const struct source *s, int *failed)
     cJSON *list = base_json_array(root, "blocks", failed);
     for (uint32_t i = 0; i < s->blocks.count; i++) {
         const struct lull_host_block *b = &s->blocks.list[i];
-        cJSON *o = base_json_object(list, NULL, failed);
-        base_json_number(o, "id", b->id, failed);
-        base_json_number(o, "x0", b->x0, failed);
-        base_json_number(o, "y0", b->y0, failed);
-        base_json_number(o, "x1", b->x1, failed);
-        base_json_number(o, "y1", b->y1, failed);
-        base_json_number(o, "spp", (double)b->spp, failed);
-        base_json_text(o, "reason", lull_host_reason(b->reason), failed);
-        base_json_number(o, "p_noisy", b->p_noisy, failed);
-        base_json_number(o, "error", b->error, failed);
-        if (s->noisy_error)
-            base_json_number(o, "noisy_error", s->noisy_error[i], failed);
+        lull_host_report_block(list, b, s->noisy_error ? &s->noisy_error[i] : NULL, failed);
         samples += (double)b->spp * (b->x1 - b->x0) * (b->y1 - b->y0);
     }
     return samples;
