@@ -279,7 +279,11 @@ static int32_t begin_thread(struct lull_host_display *d, struct lull_error *err)
     pthread_sigmask(SIG_SETMASK, &all, &before);
     int failed = pthread_create(&d->thread, NULL, serve, d);
     pthread_sigmask(SIG_SETMASK, &before, NULL);
-    return failed ? lull_error_set(err, LULL_E_MEMORY, "no thread for the live view") : LULL_OK;
+    if (!failed)
+        return LULL_OK;
+    pthread_cond_destroy(&d->changed);
+    pthread_mutex_destroy(&d->lock);
+    return lull_error_set(err, LULL_E_MEMORY, "no thread for the live view");
 }
 
 int32_t lull_host_display_open(const struct lull_host_frame *frame, const char *address, const char *name,
