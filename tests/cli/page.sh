@@ -79,6 +79,16 @@ for v in nan inf -1 1e30; do # the samples, times it
     oiiotool alone.exr --mulc 1,1,1,1,1,1,$v -o bad.exr
     refused "its layer 'lull.spp.V' is not" bad.exr -o x.html
 done
+for v in 100 0.5 nan; do # channels: R, G, B, error, p_noisy, reason, spp
+    oiiotool alone.exr --mulc 1,1,1,1,1,$v,1 -o bad.exr
+    refused "its layer 'lull.reason.V' is not" bad.exr -o x.html
+done
+oiiotool alone.exr --resize 1024x512 --attrib lull:block 1x1 -o bad.exr
+refused "more than 262144 blocks of 1x1 pixels" bad.exr -o x.html
+for bytes in 300 600; do # in its header, in its pixels
+    head -c $bytes alone.exr >cut.exr
+    refused "cut.exr" cut.exr -o x.html
+done
 refused "the picture has 16x16 pixels, the report is of 48x32" r.json other.exr -o x.html
 echo '{"blocks": 1, "width": 1, "height": 1}' >no.json
 refused "no.json: no report (expected what lull-render --report writes)" no.json -o x.html
