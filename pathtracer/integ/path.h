@@ -12,6 +12,7 @@
 #define PT_INTEG_PATH_H
 
 #include "integ/integrator.h"
+#include "integ/lanes.h"
 #include "integ/surface.h"
 #include "integ/trace.h"
 #include "sample/sampler.h"
@@ -46,6 +47,7 @@ struct pt_path {
     const struct pt_integrator *settings;
     struct pt_trace *trace;
     struct pt_sampler sampler;
+    const float *u; /* borrows: number of dimension d of this vertex at [d · PT_RUN], of those in PT_VERTEX_DIMS */
     struct pt_ray ray;
     pt_vec3 throughput, radiance;
     struct pt_receiver prev; /* last vertex, and … */
@@ -58,6 +60,18 @@ struct pt_path {
     struct pt_light_plan plan;  /* of the last vertex */
     struct pt_path_result *out; /* borrows */
 };
+
+/* The dimensions of a vertex that most paths read, worked out for all paths of a run at once. */
+#define PT_VERTEX_DIMS(fx) \
+    ((struct pt_lane_dims){1u << PT_DIM_BSDF | 1u << PT_DIM_LIGHT, \
+                           1u << PT_DIM_LIGHT_PICK | ((fx)&PT_FX_BSDF ? 1u << PT_DIM_BSDF_LOBE : 0u), \
+                           1u << PT_DIM_ROULETTE})
+
+PT_KERNEL_INLINE float pt_path_1d(const struct pt_path *path, int dim) { return path->u[dim * PT_RUN]; }
+PT_KERNEL_INLINE struct pt_sample2 pt_path_2d(const struct pt_path *path, int dim)
+{
+    return (struct pt_sample2){path->u[dim * PT_RUN], path->u[(dim + 1) * PT_RUN]};
+}
 
 PT_KERNEL_INLINE int32_t pt_medium_towards(const struct pt_place *at, pt_vec3 w, int32_t current)
 {
@@ -148,7 +162,7 @@ PT_KERNEL_INLINE int pt_path_sample_light(pt_effects fx, const struct pt_path *p
 {
     if (path->scene->emitter_count == 0 || path->settings->strategy != PT_STRATEGY_MIS)
         return 0;
-    return pt_light_sample(fx, path->scene, at, pt_sampler_1d(&path->sampler, PT_DIM_LIGHT_PICK), u.x, u.y, light);
+    return pt_light_sample(fx, path->scene, at, pt_path_1d(path, PT_DIM_LIGHT_PICK), u.x, u.y, light);
 }
 
 /* `f` is BSDF · cos or the phase function towards the light, `pdf` the density with which it would have sampled that. */
@@ -232,7 +246,7 @@ PT_KERNEL_INLINE int pt_path_survives(struct pt_path *path)
         keep = PT_KEEP_LONG;
     if (keep >= 1.0f)
         return 1;
-    if (!(pt_bits_to_float(pt_sampler_bits(&path->sampler, PT_DIM_ROULETTE)) < keep))
+    if (!(pt_path_1d(path, PT_DIM_ROULETTE) < keep))
         return 0;
     path->throughput = v3_scale(path->throughput, 1.0f / keep);
     return 1;
@@ -265,7 +279,7 @@ PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, f
         pt_trace_scatter(path->trace, path->medium, p, path->throughput);
     path->prev = (struct pt_receiver){p, v3_splat(0.0f), PT_RECEIVER_VOLUME};
     struct pt_light_plan *plan = &path->plan;
-    if (pt_path_sample_light(fx, path, &path->prev, pt_sampler_2d(&path->sampler, PT_DIM_LIGHT), &plan->light)) {
+    if (pt_path_sample_light(fx, path, &path->prev, pt_path_2d(path, PT_DIM_LIGHT), &plan->light)) {
         float phase = pt_phase_eval(medium->g, wo, plan->light.wi);
         pt_path_plan_light(fx, path, v3_splat(phase), phase, p, path->medium, plan);
     }
@@ -295,7 +309,7 @@ PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const 
                                      struct pt_sample2 u)
 {
     struct pt_bsdf_sample next;
-    float u_lobe = fx & PT_FX_BSDF ? pt_sampler_1d(&path->sampler, PT_DIM_BSDF_LOBE) : 0.0f;
+    float u_lobe = fx & PT_FX_BSDF ? pt_path_1d(path, PT_DIM_BSDF_LOBE) : 0.0f;
     if (!pt_bsdf_sample(fx, bsdf, wo, u_lobe, u.x, u.y, &next))
         return 0;
     path->throughput = v3_mul(path->throughput, next.weight);
@@ -326,9 +340,7 @@ PT_KERNEL_INLINE struct pt_receiver pt_path_receiver(pt_effects fx, pt_vec3 p, c
 /* Light and the next direction at a surface. 0: the path ends. */
 PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const struct pt_place *at)
 {
-    /* these need nothing of the hit: asked for first, they are worked out while its data arrive */
-    struct pt_sample2 u_bsdf = pt_sampler_2d(&path->sampler, PT_DIM_BSDF),
-                      u_light = pt_sampler_2d(&path->sampler, PT_DIM_LIGHT);
+    struct pt_sample2 u_bsdf = pt_path_2d(path, PT_DIM_BSDF), u_light = pt_path_2d(path, PT_DIM_LIGHT);
     float u_mix = fx & PT_FX_MIX ? pt_sampler_1d(&path->sampler, PT_DIM_MIX) : 0.0f;
     const struct pt_material *material = pt_material_resolve(fx, path->scene, at->shape->material, &at->s, u_mix);
     struct pt_frame frame = pt_material_frame(fx, path->scene, material, &at->s);
@@ -353,12 +365,10 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
     return pt_path_scatter(fx, path, at, &frame, &bsdf, wo, u_bsdf);
 }
 
-/* The camera's ray through pixel (x, y). Scene, settings, trace and out are set, the rest is not. */
-PT_KERNEL_INLINE void pt_path_start(pt_effects fx, struct pt_path *path, uint32_t x, uint32_t y, uint32_t sample)
+/* The camera's ray through the point (x, y) of the image. Scene, settings, sampler, trace and out are set, no more. */
+PT_KERNEL_INLINE void pt_path_start(pt_effects fx, struct pt_path *path, float x, float y)
 {
     const struct pt_camera *camera = &path->scene->camera;
-    const struct pt_integrator *settings = path->settings;
-    path->sampler = pt_sampler_make(settings->sampler == PT_SAMPLER_SOBOL, settings->seed, x, y, sample);
     path->throughput = v3_splat(1.0f);
     path->radiance = v3_splat(0.0f);
     path->eta_scale = 1.0f;
@@ -366,14 +376,13 @@ PT_KERNEL_INLINE void pt_path_start(pt_effects fx, struct pt_path *path, uint32_
     path->depth = 0;
     path->rays = 0;
     *path->out = (struct pt_path_result){.depth = INFINITY};
-    struct pt_sample2 pixel = pt_sampler_2d(&path->sampler, PT_DIM_PIXEL), lens = {0.5f, 0.5f};
-    float dx, dy, time = 0.0f;
-    pt_filter_sample(settings, pixel.x, pixel.y, &dx, &dy);
+    struct pt_sample2 lens = {0.5f, 0.5f};
+    float time = 0.0f;
     if (fx & PT_FX_DEFOCUS)
         lens = pt_sampler_2d(&path->sampler, PT_DIM_LENS);
     if (fx & PT_FX_MOTION)
         time = pt_sampler_1d(&path->sampler, PT_DIM_TIME);
-    pt_camera_ray(fx, camera, (float)x + 0.5f + dx, (float)y + 0.5f + dy, lens.x, lens.y, time, &path->ray);
+    pt_camera_ray(fx, camera, x, y, lens.x, lens.y, time, &path->ray);
     path->medium = fx & PT_FX_MEDIA ? camera->medium : -1;
     if (path->trace)
         pt_trace_camera(path->trace, &path->ray);

@@ -98,28 +98,63 @@ PT_KERNEL_INLINE void pt_run_lights(pt_effects fx, struct pt_path *const *live, 
     }
 }
 
+/* Sets the paths' numbers for a vertex. */
+PT_KERNEL_INLINE void pt_run_numbers(pt_effects fx, struct pt_path *const *live, int count, uint32_t vertex,
+                                     struct pt_lane_keys *keys, float (*u)[PT_RUN])
+{
+    for (int i = 0; i < count; i++) {
+        keys->pixel_key[i] = live[i]->sampler.pixel_key;
+        keys->path_key[i] = live[i]->sampler.path_key;
+        pt_sampler_block(&live[i]->sampler, vertex);
+        live[i]->u = &u[0][i];
+    }
+    pt_lanes_best()->numbers(keys, count, vertex, PT_VERTEX_DIMS(fx), u);
+}
+
+/* The first rays of all paths, which are samples `sample` of pixels (x, y), (x + 1, y), … */
+PT_KERNEL_INLINE void pt_run_start(pt_effects fx, const struct pt_integrator *settings, uint32_t x, uint32_t y,
+                                   uint32_t sample, struct pt_path *paths, int count, struct pt_lane_keys *keys,
+                                   float (*u)[PT_RUN])
+{
+    const int sobol = settings->sampler == PT_SAMPLER_SOBOL;
+    float dx[PT_RUN], dy[PT_RUN];
+    for (int i = 0; i < count; i++) {
+        struct pt_sampler *s = &paths[i].sampler;
+        *s = pt_sampler_make(sobol, settings->seed, x + (uint32_t)i, y, sample);
+        keys->pixel_key[i] = s->pixel_key;
+        keys->path_key[i] = s->path_key;
+    }
+    keys->index_reversed = pt_reverse_bits(sample);
+    keys->sobol = sobol;
+    pt_lanes_best()->numbers(keys, count, 0, (struct pt_lane_dims){.pairs = 1u << PT_DIM_PIXEL}, u);
+    pt_filter_sample(settings, count, u[PT_DIM_PIXEL], u[PT_DIM_PIXEL + 1], dx, dy);
+    for (int i = 0; i < count; i++)
+        pt_path_start(fx, &paths[i], (float)(x + (uint32_t)i) + 0.5f + dx[i], (float)y + 0.5f + dy[i]);
+}
+
 PT_KERNEL_INLINE void pt_run_sample(pt_effects fx, const struct pt_scene *scene, const struct pt_integrator *settings,
                                     uint32_t x, uint32_t y, int count, uint32_t sample, struct pt_trace *trace,
                                     struct pt_path_result *out)
 {
     struct pt_path paths[PT_RUN], *live[PT_RUN]; /* no initialiser: it would clear them all for each run */
+    struct pt_lane_keys keys;
+    _Alignas(64) float u[PT_DIMS_PER_VERTEX][PT_RUN];
     for (int i = 0; i < count; i++) {
         live[i] = &paths[i];
         paths[i].scene = scene;
         paths[i].settings = settings;
         paths[i].trace = trace;
         paths[i].out = &out[i];
-        pt_path_start(fx, &paths[i], x + (uint32_t)i, y, sample);
     }
+    pt_run_start(fx, settings, x, y, sample, paths, count, &keys, u);
     int n = count;
     for (uint32_t vertex = 1; n > 0; vertex++) {
         uint8_t alive[PT_RUN];
         pt_run_intersect(live, n, vertex == 1);
         pt_run_fetch(fx, live, n);
-        for (int i = 0; i < n; i++) {
-            pt_sampler_block(&live[i]->sampler, vertex);
+        pt_run_numbers(fx, live, n, vertex, &keys, u);
+        for (int i = 0; i < n; i++)
             alive[i] = (uint8_t)pt_path_vertex(fx, live[i]);
-        }
         pt_run_lights(fx, live, n);
         int left = 0;
         for (int i = 0; i < n; i++)

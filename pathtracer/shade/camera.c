@@ -132,24 +132,32 @@ static float erf_inverse(float x)
     return p * x;
 }
 
-/* Inverse of the Gaussian cut at radius r. */
-static float truncated_gaussian(float u, float r, float sigma)
+/* Inverse of the Gaussian cut at radius r; `scale` = sigma √2, `e` = erf(r / scale). */
+static float truncated_gaussian(float u, float r, float scale, float e)
 {
-    float e = erff(r / (sigma * 1.41421356f)), x = (2.0f * u - 1.0f) * e;
-    return fmaxf(-r, fminf(r, sigma * 1.41421356f * erf_inverse(fmaxf(-0.9999999f, fminf(0.9999999f, x)))));
+    float x = (2.0f * u - 1.0f) * e;
+    return fmaxf(-r, fminf(r, scale * erf_inverse(fmaxf(-0.9999999f, fminf(0.9999999f, x)))));
 }
 
-void pt_filter_sample(const struct pt_integrator *settings, float u0, float u1, float *dx, float *dy)
+static void sample_axis(const struct pt_integrator *settings, float r, int count, const float *u, float *d)
 {
-    switch (settings->filter) {
-    case PT_FILTER_TRIANGLE:
-        *dx = tent(u0, settings->filter_x);
-        *dy = tent(u1, settings->filter_y);
-        break;
-    case PT_FILTER_GAUSSIAN:
-        *dx = truncated_gaussian(u0, settings->filter_x, settings->filter_sigma);
-        *dy = truncated_gaussian(u1, settings->filter_y, settings->filter_sigma);
-        break;
-    default: *dx = (2.0f * u0 - 1.0f) * settings->filter_x; *dy = (2.0f * u1 - 1.0f) * settings->filter_y;
+    const float scale = settings->filter_sigma * 1.41421356f;
+    if (settings->filter == PT_FILTER_TRIANGLE) {
+        for (int i = 0; i < count; i++)
+            d[i] = tent(u[i], r);
+    } else if (settings->filter == PT_FILTER_GAUSSIAN) {
+        const float e = erff(r / scale);
+        for (int i = 0; i < count; i++)
+            d[i] = truncated_gaussian(u[i], r, scale, e);
+    } else {
+        for (int i = 0; i < count; i++)
+            d[i] = (2.0f * u[i] - 1.0f) * r;
     }
+}
+
+void pt_filter_sample(const struct pt_integrator *settings, int count, const float *u0, const float *u1, float *dx,
+                      float *dy)
+{
+    sample_axis(settings, settings->filter_x, count, u0, dx);
+    sample_axis(settings, settings->filter_y, count, u1, dy);
 }

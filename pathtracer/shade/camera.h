@@ -15,8 +15,9 @@ void pt_camera_init(struct pt_camera *camera);
 /* Camera → render transform at `time` of an animated camera. */
 void pt_camera_transform_at(const struct pt_camera *camera, float time, struct pt_mat34 *out);
 
-/* Offset from the pixel's centre for (u0, u1) in [0, 1), distributed as the filter. */
-void pt_filter_sample(const struct pt_integrator *settings, float u0, float u1, float *dx, float *dy);
+/* Offsets (dx[i], dy[i]) from the centre of a pixel for (u0[i], u1[i]) in [0, 1), distributed as the filter; i < count. */
+void pt_filter_sample(const struct pt_integrator *settings, int count, const float *u0, const float *u1, float *dx,
+                      float *dy);
 
 /* Point of the unit disk, concentric map (Shirley & Chiu 1997). */
 void pt_camera_lens_sample(float u0, float u1, float *x, float *y);

@@ -103,8 +103,8 @@ static void filters(void **state)
         double sum = 0.0, sum2 = 0.0, quad = 0.0, quad2 = 0.0;
         enum { N = 100000 };
         for (int i = 0; i < N; i++) {
-            float dx, dy, u = ((float)i + 0.5f) / N;
-            pt_filter_sample(&s, u, 0.25f, &dx, &dy);
+            float dx, dy, u = ((float)i + 0.5f) / N, quarter = 0.25f;
+            pt_filter_sample(&s, 1, &u, &quarter, &dx, &dy);
             assert_true(fabsf(dx) <= radius[kind] && fabsf(dy) <= radius[kind] && dy <= 0.0f);
             sum += (double)dx / N;
             sum2 += (double)dx * (double)dx / N;

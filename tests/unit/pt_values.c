@@ -130,7 +130,7 @@ static void tell_phases(void)
 
 static void tell_filters(void)
 {
-    static const float us[] = {0, 1e-6f, 0.003f, 0.2f, 0.5f, 0.7f, 0.9999f, PT_ONE_BELOW};
+    static const float us[] = {0, 1e-6f, 0.003f, 0.2f, 0.5f, 0.7f, 0.9999f, PT_ONE_BELOW}, half = 0.5f;
     for (int kind = 0; kind < 3; kind++)
         for (size_t k = 0; k < COUNT(us); k++) {
             struct pt_integrator s = test_integrator(1);
@@ -139,12 +139,12 @@ static void tell_filters(void)
             s.filter_x = 1.5f;
             s.filter_y = 0.75f;
             s.filter_sigma = 0.4f;
-            pt_filter_sample(&s, us[k], us[COUNT(us) - 1 - k], &dx, &dy);
+            pt_filter_sample(&s, 1, &us[k], &us[COUNT(us) - 1 - k], &dx, &dy);
             words("filter %d at %g:", kind, (double)us[k]);
             number(dx);
             number(dy);
             s.filter_x = 4.0f; /* the approximation's tail */
-            pt_filter_sample(&s, us[k], 0.5f, &dx, &dy);
+            pt_filter_sample(&s, 1, &us[k], &half, &dx, &dy);
             number(dx);
             words("\n");
         }
