@@ -292,6 +292,24 @@ static void report_changes(const struct evaluation *j, enum ggn_split split, cJS
     }
 }
 
+/* Of every block, where each method stops. */
+static void report_stops(const struct evaluation *j, cJSON *to, int *failed)
+{
+    for (int b = 0; b < j->set.n_blocks; b++) {
+        const struct ggn_eval_block *block = &j->set.blocks[b];
+        const struct ggn_dataset_view *view = &j->set.images.data.views[block->view];
+        cJSON *o = base_json_object(to, NULL, failed);
+        base_json_text(o, "scene", view->manifest.scene, failed);
+        base_json_text(o, "view", view->name, failed);
+        base_json_number(o, "block", view->manifest.blocks[block->index].id, failed);
+        base_json_number(o, "threshold", ggn_eval_compared(block, block->label.threshold), failed);
+        base_json_bool(o, "censored", block->label.censored, failed);
+        cJSON *spp = base_json_object(o, "spp", failed);
+        for (int i = 0; i < j->n; i++)
+            base_json_number(spp, j->methods[i].name, ggn_eval_compared(block, j->methods[i].stop[b]), failed);
+    }
+}
+
 static int pictures(const struct evaluation *j, enum ggn_split split, struct base_err *err)
 {
     char path[4096];
@@ -336,6 +354,7 @@ static int report(struct evaluation *j, int skipped, struct base_err *err)
         if (j->o->out)
             rc = pictures(j, (enum ggn_split)split, err);
     }
+    report_stops(j, base_json_array(root, "stops", &failed), &failed);
     if (!rc && j->o->json)
         rc = base_json_write(NULL, root, failed, err);
     if (!rc && j->o->out && !(rc = base_file_join(path, j->o->out, "figures.json", err)))

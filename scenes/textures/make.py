@@ -298,3 +298,40 @@ revolve('bottle.ply', [(0.0, 0.0), (0.2, 0.0), (0.22, 0.02)] + [(0.22, 0.02 + 0.
 revolve('pawn.ply', [(0.0, 0.0), (0.3, 0.0), (0.31, 0.06), (0.26, 0.12), (0.16, 0.22), (0.11, 0.4), (0.1, 0.5), (0.17, 0.53), (0.17, 0.56), (0.1, 0.58)]
         + [(0.17 * math.sin(math.pi * t / 8), 0.73 - 0.17 * math.cos(math.pi * t / 8)) for t in range(2, 9)], 28)
 revolve('fir.ply', [(0.0, 0.0), (0.05, 0.0), (0.05, 0.2), (0.42, 0.2), (0.2, 0.5), (0.33, 0.48), (0.15, 0.76), (0.23, 0.74), (0.0, 1.1)], 14)
+
+
+# Textures of the test scenes foreign-*; no other scene has them.
+LETTERS = ['01110100011000111111100011000110001', '11110100011111010001100011000111110', '01111100001000010000100001000001111', '11111100001111010000100001000011111',
+           '10001100011111110001100011000110001', '01110001000010000100001000010001110', '10001110011010110011100011000110001', '01110100011000110001100011000101110',
+           '11110100011000111110100001000010000', '01111100000111000001000010000111110', '11111001000010000100001000010000100', '10001100011000110001010100101000100']
+
+
+def printed(x, y):
+    line, row, column, place = y // 10, y % 10 - 1, x % 6, x // 6
+    glyph = random.Random(line * 97 + place).randrange(15)  # beyond the letters: a blank
+    inked = glyph < len(LETTERS) and 0 <= row < 7 and column < 5 and LETTERS[glyph][5 * row + column] == '1' and 6 < x < 118
+    tone = 0.9 + 0.04 * noise(x / 128, y / 128)
+    return (0.09, 0.08, 0.1) if inked else (tone, 0.97 * tone, 0.88 * tone)
+
+
+def twill(x, y):
+    over = (x // 4 + y // 4) % 4 < 2
+    across = (y if over else x) % 4
+    tone = (0.55, 1.0, 0.95, 0.5)[across] * (0.85 + 0.3 * noise(x / 64, y / 64))
+    return (0.22 * tone, 0.27 * tone, 0.42 * tone) if over else (0.62 * tone, 0.58 * tone, 0.5 * tone)
+
+
+def brushed(x, y):
+    return (0.06 + 0.3 * (0.7 * noise(x / 512 % 1, y * 7 / 128 % 1) + 0.3 * random.Random(y).random()),)
+
+
+def mosaic(x, y):
+    piece = random.Random(x // 8 * 17 + y // 8)
+    hue, tone, dx, dy = piece.randrange(4), piece.uniform(0.6, 1.1), piece.random() < 0.3, piece.random() < 0.3
+    if x % 8 <= dx or y % 8 <= dy:
+        return (0.5, 0.49, 0.46)
+    return tuple(tone * c for c in ((0.1, 0.24, 0.5), (0.75, 0.72, 0.62), (0.6, 0.36, 0.1), (0.12, 0.4, 0.35))[hue])
+
+
+for name, channels, pixel in (('printed', 3, printed), ('twill', 3, twill), ('brushed', 1, brushed), ('mosaic', 3, mosaic)):
+    png(name + '.png', 128, 128, channels, pixel)

@@ -9,10 +9,12 @@ that are not here (../shared) are left out.
 A line of the plan, fields apart by blanks, # begins a comment:
   SPLIT SCENE[/VIEW] FILE MINUTES LEVELS REFERENCE-SPP BLOCKS [EX EY EZ AX AY AZ UX UY UZ FOV]
 MINUTES are those of two idle cores; the last ten numbers replace the file's camera (lull-render --look-at, --fov).
+A line `film WIDTHxHEIGHT BLOCK` is for the lines after it; before it views are 800x800 pixels in blocks of 200.
 docs/results/data-set.csv is the --csv of scripts/dataset.plan, ggn/models/*.data.csv of what a model was trained on; the data
 themselves are not kept. Exit status: 0 all done, 2 bad plan or a scene that cannot be rendered, 130 interrupted."""
 import csv
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -22,7 +24,7 @@ import time
 from lablib import tool
 from lablib.tool import Refused
 
-SIZE = "800x800"
+FILM = ("800x800", "200")
 SPLITS = ("train", "validation", "test", "people")
 EDGES = [20 * 2 ** k for k in range(9)]  # spp; the last column of the histogram ends at the cap
 
@@ -69,15 +71,24 @@ def parse_entry(where, fields):
     return entry
 
 
+def parse_film(where, fields):
+    if len(fields) != 3 or not re.fullmatch(r"[1-9]\d{0,4}x[1-9]\d{0,4}", fields[1]) or not re.fullmatch(r"[1-9]\d{0,3}", fields[2]):
+        raise Refused(f"{where}: '{' '.join(fields)}' (expected film WIDTHxHEIGHT BLOCK)")
+    return tuple(fields[1:])
+
+
 def read_plan(path):
-    entries, folders, split_of = [], {}, {}
+    entries, folders, split_of, film = [], {}, {}, FILM
     with open(path, encoding="utf-8") as f:
         for number, line in enumerate(f, 1):
             fields = line.split("#", 1)[0].split()
             if not fields:
                 continue
             where = f"{path}:{number}"
-            entry = parse_entry(where, fields)
+            if fields[0] == "film":
+                film = parse_film(where, fields)
+                continue
+            entry = {**parse_entry(where, fields), "film": film}
             scene = entry["name"].split("/")[0]
             if split_of.setdefault(scene, entry["split"]) != entry["split"]:
                 raise Refused(f"{where}: scene '{scene}' is in {split_of[scene]} already (the split is by scene)")
@@ -133,7 +144,7 @@ def missing(root, entry, ids):
 
 
 def command_of(root, entry, ids, threads, launcher):
-    command = launcher + [tool.RENDER, "-q", entry["file"], "--size", SIZE, "--sampler", "independent", "--light-selection", "power", "--name", entry["name"],
+    command = launcher + [tool.RENDER, "-q", entry["file"], "--size", entry["film"][0], "--block", entry["film"][1], "--sampler", "independent", "--light-selection", "power", "--name", entry["name"],
                "--levels", entry["levels"], "--reference-spp", str(entry["reference"]), "--blocks", listed(ids),
                "--sequence", folder_of(root, entry)]
     if entry["camera"]:

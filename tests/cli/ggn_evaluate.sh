@@ -23,6 +23,8 @@ fails "import: thresholds that do not fit" '2 blocks, but 1' sh -c "printf 'p3d_
 $ggn evaluate -d "$tmp/data" --json >"$tmp/out" 2>"$tmp/err" && grep -q '"labels":.*"human"' "$tmp/out" && grep -q '"-spp"' "$tmp/out" &&
     ! grep -q halfbuf "$tmp/out"
 check "evaluate without recorded statistics" $?
+tr -d '\t\n ' <"$tmp/out" | grep -q '"stops":\[{"scene":"p3d_toy","view":"p3d_toy-view0_part6","block":0,"threshold":90,"censored":false,"spp":{"-spp":[0-9]'
+check "  …with the stops of every block" $?
 $ggn evaluate -d "$tmp/data" -o "$tmp/report" >"$tmp/out" 2>"$tmp/err" && [ -s "$tmp/report/figures.json" ] && [ -s "$tmp/report/train-roc.png" ] &&
     [ -s "$tmp/report/train-heatmaps-spp.png" ] && [ "$(find "$tmp/report" -name '.tmp*' | wc -l)" -eq 0 ] && grep -q '^constant' "$tmp/out"
 check "evaluate: table and pictures" $?
