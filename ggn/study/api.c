@@ -339,14 +339,15 @@ static void post_trial(const struct ggn_study_site *site, const struct ggn_study
 
 /* --- routes --- */
 
+/* study.json, and how long one person takes. */
 static void get_study(const struct ggn_study_site *site, struct ggn_study_response *r)
 {
     char *text = ggn_study_print(site->study);
-    if (!text)
-        ggn_study_refuse(r, 500, "out of memory");
-    else
-        *r = (struct ggn_study_response){
-            .status = 200, .type = "application/json", .fd = -1, .body = text, .size = strlen(text)};
+    cJSON *o = text ? cJSON_Parse(text) : NULL;
+    int failed = 0;
+    base_json_number(o, "minutes", ggn_study_plan_minutes(site->study), &failed);
+    send_json(r, o, failed);
+    free(text);
 }
 
 /* KEY of "KEY" or "KEY/REST"; *rest gets what follows the slash, "" without one. NULL: no key. */

@@ -1,4 +1,5 @@
 /* `lull-study VERB DIR`: thresholds and judgements from people, on a page served from this machine. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,7 +41,27 @@ struct init_options {
     uint64_t seed;
     double catch_share, spacing;
     const char *asked_by, *contact;
+    enum ggn_study_kind kinds[GGN_STUDY_KINDS];
+    int n_kinds;
 };
+
+static int set_kinds(void *into, const char *value, struct base_err *err)
+{
+    struct init_options *o = into;
+    unsigned seen = 0;
+    o->n_kinds = 0;
+    for (const char *at = value; at; at = strchr(at, ',') ? strchr(at, ',') + 1 : NULL) {
+        int k = GGN_STUDY_KINDS - 1;
+        while (k > 0 && (strncmp(at, ggn_study_kind_names[k], strlen(ggn_study_kind_names[k])) != 0 ||
+                         !strchr(",", at[strlen(ggn_study_kind_names[k])])))
+            k--;
+        if (k == 0 || (seen & 1u << k))
+            return base_fail(err, BASE_EINVAL, "expected some of noisy,denoised,blend, each once");
+        seen |= 1u << k;
+        o->kinds[o->n_kinds++] = (enum ggn_study_kind)k;
+    }
+    return 0;
+}
 
 static int add_view(void *into, const char *value, struct base_err *err)
 {
@@ -58,7 +79,10 @@ static const char *const method_words[] = {"adjustment", "2ifc", NULL};
 static const struct base_option init_list[] = {
     {"task", 0, NULL, TO(task), .words = task_words, .help = "what people are asked (required)"},
     {"method", 0, NULL, TO(method), .words = method_words, .help = "how thresholds are measured (adjustment)"},
-    {"views", 0, "FOLDER", .set = add_view, .help = "a recorded sequence, or a folder of pictures; more may follow"},
+    {"views", 0, "FOLDER[:BLOCKS]", .set = add_view,
+     .help = "a recorded sequence, or a folder of pictures; more may follow. BLOCKS: only these, e.g. 0,3,8-11"},
+    {"kinds", 0, "LIST", .set = set_kinds,
+     .help = "2ifc: of pictures rendered with --denoise, what is shown: some of noisy,denoised,blend, a view of each"},
     {"asked-by", 0, "NAME", TO(asked_by), .help = "who asks, as the page says it (required)"},
     {"contact", 0, "ADDRESS", TO(contact), .help = "whom to write to or to call, as the page says it (required)"},
     {"trials", 0, "N", TO(trials), GGN_STUDY_MIN_TRIALS, 1000,
@@ -85,6 +109,7 @@ static int options_fit(const struct init_options *o, enum ggn_study_task task, s
         int given, fits;
     } rules[] = {{"trials", o->trials != 0, task == GGN_STUDY_TWO_INTERVAL},
                  {"show", o->show_ms != 0, task == GGN_STUDY_TWO_INTERVAL},
+                 {"kinds", o->n_kinds != 0, task == GGN_STUDY_TWO_INTERVAL},
                  {"gap", o->gap_ms != 0, task != GGN_STUDY_ADJUSTMENT},
                  {"catch", o->catch_share >= 0.0, task != GGN_STUDY_ADJUSTMENT},
                  {"repeats", o->repeats != 0, task != GGN_STUDY_TWO_INTERVAL}};
@@ -138,10 +163,12 @@ static int init(struct init_options *o, struct ggn_study *study, struct base_err
                                         .page_dir = page,
                                         .views = o->views,
                                         .n_views = o->n_views,
+                                        .n_kinds = o->n_kinds,
                                         .block = o->block,
                                         .spacing = o->spacing,
                                         .spp_min = o->spp_min,
                                         .spp_max = o->spp_max};
+    memcpy(q.kinds, o->kinds, sizeof q.kinds);
     struct base_threads *threads = base_threads_create(base_threads_available(), err);
     int rc = threads ? ggn_study_page_find(page, err) : err->code;
     if (!rc)
@@ -180,8 +207,9 @@ static int run_init(int argc, char **argv)
     if (!rc)
         rc = init(o, &study, &err);
     if (!rc)
-        printf("%s: %d view%s, %d trials for each person; `lull-study serve %s` opens it\n", o->args[0], study.n_views,
-               study.n_views == 1 ? "" : "s", ggn_study_plan_count(&study), o->args[0]);
+        printf("%s: %d view%s, %d trials for each person, some %.0f min; `lull-study serve %s` opens it\n", o->args[0],
+               study.n_views, study.n_views == 1 ? "" : "s", ggn_study_plan_count(&study),
+               ceil(ggn_study_plan_minutes(&study)), o->args[0]);
     ggn_study_release(&study);
     free(o);
     return rc ? fail(argv[0], &err) : EXIT_SUCCESS;

@@ -66,6 +66,15 @@ int ggn_study_plan_count(const struct ggn_study *s)
     return n <= GGN_STUDY_MAX_TRIALS ? (int)n : GGN_STUDY_MAX_TRIALS + 1;
 }
 
+double ggn_study_plan_minutes(const struct ggn_study *s)
+{
+    const double judging_s = 15.0, setting_s = 12.0, choosing_s = 1.0; /* guesses; of people nothing is known yet */
+    double trial_s = s->task == GGN_STUDY_VALIDATION     ? judging_s
+                     : s->task == GGN_STUDY_TWO_INTERVAL ? 2.0 * (s->gap_ms + s->show_ms) / 1000.0 + choosing_s
+                                                         : setting_s;
+    return ggn_study_plan_count(s) * trial_s / 60.0;
+}
+
 /* Views one after the other in random order, each once per round of repeats. */
 static void plan_adjustment(const struct ggn_study *s, uint64_t *state, int *order, struct ggn_study_plan *p)
 {

@@ -33,6 +33,9 @@ void ggn_study_plan_release(struct ggn_study_plan *plan);
 /* Number of slots without making them; GGN_STUDY_MAX_TRIALS + 1 when there would be more than that. */
 int ggn_study_plan_count(const struct ggn_study *study);
 
+/* How long a person takes for them, roughly, without instructions and breaks. */
+double ggn_study_plan_minutes(const struct ggn_study *study);
+
 /* Whether a trial of the slot can have been at that level: 0 in catch trials and validations, else one of its block's. */
 int ggn_study_slot_takes(const struct ggn_study *study, const struct ggn_study_slot *slot, uint32_t level);
 

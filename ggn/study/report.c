@@ -139,6 +139,58 @@ static int write_view_json(const char *dir, const struct ggn_study_people *p, co
     return rc;
 }
 
+/* --- kinds --- */
+
+static int has_kinds(const struct ggn_study *s)
+{
+    for (int v = 0; v < s->n_views; v++)
+        if (s->views[v].kind)
+            return 1;
+    return 0;
+}
+
+static void put_difference(FILE *f, const struct ggn_study_difference *d)
+{
+    fprintf(f, "%.4f;%.4f;%.4f;%d\n", d->octaves, d->lo, d->hi, d->people);
+}
+
+static int write_kinds(const char *dir, const struct ggn_study_people *p, const struct ggn_study_threshold *t,
+                       struct base_err *err)
+{
+    struct base_file_out out;
+    int rc = has_kinds(p->study) ? begin(&out, dir, "kinds.csv", err) : 0;
+    if (rc || !has_kinds(p->study))
+        return rc;
+    fputs("view;kind;block;threshold;low;high;octaves_above_noisy;octaves_low;octaves_high;people\n", out.file);
+    for (int c = 0; c < p->n_cells; c++) {
+        int view;
+        const struct ggn_study_block *b = ggn_study_cell_block(p, c, &view);
+        const struct ggn_study_view *v = &p->study->views[view];
+        const struct ggn_study_difference d = ggn_study_against_noisy(p, v->kind, c);
+        fprintf(out.file, "%s;%s;%u;%.2f;%.2f;%.2f;", v->name, ggn_study_kind_names[v->kind], b->id, spp(t[c].t),
+                spp(t[c].lo), spp(t[c].hi));
+        put_difference(out.file, &d);
+    }
+    for (int k = GGN_STUDY_DENOISED; k < GGN_STUDY_KINDS; k++) {
+        const struct ggn_study_difference d = ggn_study_against_noisy(p, (enum ggn_study_kind)k, -1);
+        if (d.people > 0) {
+            fprintf(out.file, "(all);%s;;;;;", ggn_study_kind_names[k]);
+            put_difference(out.file, &d);
+        }
+    }
+    return base_file_commit(&out, err);
+}
+
+static void print_kinds(const struct ggn_study_people *p)
+{
+    for (int k = GGN_STUDY_DENOISED; k < GGN_STUDY_KINDS; k++) {
+        const struct ggn_study_difference d = ggn_study_against_noisy(p, (enum ggn_study_kind)k, -1);
+        if (d.people > 0)
+            printf("%s: %.2f × the samples of the noisy picture [%.2f, %.2f], %d people, up to %d blocks\n",
+                   ggn_study_kind_names[k], exp2(d.octaves), exp2(d.lo), exp2(d.hi), d.people, d.blocks);
+    }
+}
+
 /* --- judgements --- */
 
 static int write_judgements(const char *dir, const struct ggn_study_people *p, struct base_err *err)
@@ -318,6 +370,7 @@ static void print_figures(const struct ggn_study_people *p, const struct ggn_stu
     for (int i = 0; i < p->n_cells; i++)
         known += !isnan(t[i].t);
     printf("%d of %d blocks have a threshold\n", known, p->n_cells);
+    print_kinds(p);
     if (c->people > 1)
         printf("noise ceiling, %d people, up to %d blocks: r %.2f … %.2f, Spearman %.2f … %.2f, median |log2| %.2f octaves "
                "(one person against "
@@ -334,6 +387,8 @@ static int write_threshold_files(const char *dir, const struct ggn_study_people 
         rc = write_blocks(dir, p, t, err);
     if (!rc)
         rc = write_thresholds(dir, p, t, err);
+    if (!rc)
+        rc = write_kinds(dir, p, t, err);
     for (int v = 0; v < p->study->n_views && !rc; v++)
         rc = write_view_json(dir, p, t, v, err);
     return rc;

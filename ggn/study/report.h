@@ -5,6 +5,7 @@
  * - thresholds.csv, one line per view of which all blocks are known, for `ggn label --human` and `ggn compare`;
  * - thresholds-VIEW.json, the same per view with any blocks;
  * - blocks.csv, estimates.csv (per person), people.csv, report.json;
+ * - kinds.csv where kinds are shown: each against the noisy picture;
  * - thresholds.png, people.png, and for two intervals curves.png.
  *
  * Of a validation: people.csv, judgements.csv, scenes.csv, report.json, shares.png. Columns: ggn/study/FORMAT.md.

@@ -119,7 +119,7 @@ static struct ggn_chart curve_of(struct curve *out, const struct ggn_study_peopl
 static int plot_curves(const char *dir, const struct ggn_study_people *p, const struct ggn_study_threshold *t,
                        struct base_err *err)
 {
-    enum { MOST = 12 };
+    enum { MOST = 48 };
     struct ggn_chart charts[MOST];
     struct curve *curves = malloc(MOST * sizeof *curves);
     int n = 0;

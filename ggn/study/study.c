@@ -11,6 +11,7 @@
 enum { MAX_TEXT = 1 << 26 };
 
 const char *const ggn_study_task_names[3] = {"adjustment", "2ifc", "validation"};
+const char *const ggn_study_kind_names[GGN_STUDY_KINDS] = {"", "noisy", "denoised", "blend"};
 const double ggn_study_min_ms[3] = {300.0, 150.0, 500.0};
 
 void ggn_study_release(struct ggn_study *s)
@@ -50,6 +51,20 @@ int ggn_study_level(const struct ggn_study_block *block, uint32_t spp)
         if (block->levels[i] == spp)
             return i;
     return -1;
+}
+
+/* Bytes of a view's name without its kind; 0: it does not end in it. */
+static size_t scene_length(const struct ggn_study_view *v)
+{
+    const char *kind = ggn_study_kind_names[v->kind];
+    size_t n = strlen(v->name), k = v->kind ? strlen(kind) + 1 : 0;
+    return n > k && (k == 0 || (v->name[n - k] == '.' && strcmp(v->name + n - k + 1, kind) == 0)) ? n - k : 0;
+}
+
+int ggn_study_same_scene(const struct ggn_study_view *a, const struct ggn_study_view *b)
+{
+    size_t n = scene_length(a);
+    return n == scene_length(b) && strncmp(a->name, b->name, n) == 0;
 }
 
 int ggn_study_find_view(const struct ggn_study *study, const char *name)
@@ -141,6 +156,22 @@ static int read_block(const struct reader *r, const cJSON *o, const struct ggn_s
     return 0;
 }
 
+/* What a view that shows a denoised render has besides. */
+static int read_kind(const struct reader *r, const cJSON *o, enum ggn_study_task task, struct ggn_study_view *view)
+{
+    const cJSON *kind = cJSON_GetObjectItemCaseSensitive(o, "kind");
+    int k = GGN_STUDY_KINDS - 1;
+    if (!kind)
+        return 0;
+    while (k > 0 && !(cJSON_IsString(kind) && strcmp(kind->valuestring, ggn_study_kind_names[k]) == 0))
+        k--;
+    view->kind = (enum ggn_study_kind)k;
+    if (k > 0 && task == GGN_STUDY_TWO_INTERVAL && scene_length(view) > 0)
+        return 0;
+    return base_fail(r->err, BASE_EINVAL, "%s: 'kind' must be noisy, denoised or blend, %s end in it, and the task be 2ifc",
+                     r->path, view->name);
+}
+
 static int read_view(const struct reader *r, const cJSON *o, enum ggn_study_task task, struct ggn_study_view *view)
 {
     int rc = plain_name(r, cJSON_GetObjectItemCaseSensitive(o, "name"), view->name);
@@ -148,6 +179,8 @@ static int read_view(const struct reader *r, const cJSON *o, enum ggn_study_task
         rc = pixels(r, o, "width", 1, &view->width);
     if (!rc)
         rc = pixels(r, o, "height", 1, &view->height);
+    if (!rc)
+        rc = read_kind(r, o, task, view);
     if (rc || task == GGN_STUDY_VALIDATION)
         return rc;
     const cJSON *blocks = list(r, o, "blocks", GGN_STUDY_MAX_BLOCKS), *block;
@@ -315,6 +348,8 @@ static void add_view(cJSON *views, const struct ggn_study *s, const struct ggn_s
     base_json_text(o, "name", v->name, failed);
     base_json_number(o, "width", v->width, failed);
     base_json_number(o, "height", v->height, failed);
+    if (v->kind)
+        base_json_text(o, "kind", ggn_study_kind_names[v->kind], failed);
     if (s->task != GGN_STUDY_VALIDATION)
         blocks = base_json_array(o, "blocks", failed);
     for (int i = 0; i < v->n_blocks; i++) {

@@ -29,6 +29,14 @@ enum ggn_study_task {
     GGN_STUDY_VALIDATION    /* whole picture against its reference: same or different, and how disturbing */
 };
 
+enum ggn_study_kind { /* what of a render with --denoise a view shows */
+                      GGN_STUDY_AS_IS,
+                      GGN_STUDY_NOISY,
+                      GGN_STUDY_DENOISED,
+                      GGN_STUDY_BLEND,
+                      GGN_STUDY_KINDS
+};
+
 struct ggn_study_block {
     uint32_t id, x0, y0, x1, y1; /* pixels; x1, y1 exclusive */
     int n_levels;
@@ -36,7 +44,8 @@ struct ggn_study_block {
 };
 
 struct ggn_study_view {
-    char name[GGN_STUDY_NAME];
+    char name[GGN_STUDY_NAME];      /* with a kind SCENE.KIND: no reader of thresholds takes one kind for another */
+    enum ggn_study_kind kind;       /* thresholds in two intervals only */
     uint32_t width, height;         /* pixels */
     int n_blocks;                   /* 0 in a validation */
     struct ggn_study_block *blocks; /* owns; ids strictly rising */
@@ -61,8 +70,9 @@ struct ggn_study {
     char (*conditions)[GGN_STUDY_NAME]; /* owns */
 };
 
-extern const char *const ggn_study_task_names[3]; /* "adjustment", "2ifc", "validation" */
-extern const double ggn_study_min_ms[3];          /* of each task, for new studies: the reasons are in docs/study.md */
+extern const char *const ggn_study_task_names[3];               /* "adjustment", "2ifc", "validation" */
+extern const char *const ggn_study_kind_names[GGN_STUDY_KINDS]; /* "", "noisy", "denoised", "blend" */
+extern const double ggn_study_min_ms[3]; /* of each task, for new studies: the reasons are in docs/study.md */
 
 /* Reads and checks DIR/study.json. */
 int ggn_study_read(const char *dir, struct ggn_study *study, struct base_err *err);
@@ -82,6 +92,8 @@ int ggn_study_plain_name(const char *name);
 int ggn_study_plain_line(const char *text);
 /* Index of a level in the block, or -1. */
 int ggn_study_level(const struct ggn_study_block *block, uint32_t spp);
+/* Whether two views show the same pictures, but for their kind. */
+int ggn_study_same_scene(const struct ggn_study_view *a, const struct ggn_study_view *b);
 /* Index of a view by name, or -1. */
 int ggn_study_find_view(const struct ggn_study *study, const char *name);
 

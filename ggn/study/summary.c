@@ -14,6 +14,12 @@ static double estimate(const struct ggn_study_people *p, int person, int cell)
     return counts(r) && r->cells[cell].trials > 0 ? fmin(r->cells[cell].t, ggn_study_cell_cap(p, cell)) : (double)NAN;
 }
 
+/* Half the width of Student's interval of a mean of n > 1 values with these sums. */
+static double half_width(double sum, double squares, int n)
+{
+    return ggn_study_t975(n - 1) * sqrt(fmax(squares - sum * sum / n, 0.0) / (n - 1) / n);
+}
+
 static struct ggn_study_threshold threshold(const struct ggn_study_people *p, int cell)
 {
     double cap = ggn_study_cell_cap(p, cell), sum = 0.0, squares = 0.0, spread = 0.0;
@@ -35,9 +41,7 @@ static struct ggn_study_threshold threshold(const struct ggn_study_people *p, in
         return g;
     g.t = sum / g.people;
     g.spread = exp2(spread / g.people);
-    double half = g.people > 1 ? ggn_study_t975(g.people - 1) *
-                                     sqrt(fmax(squares - sum * sum / g.people, 0.0) / (g.people - 1) / g.people)
-                               : 0.0;
+    double half = g.people > 1 ? half_width(sum, squares, g.people) : 0.0;
     g.lo = g.people > 1 ? g.t - half : last->lo;
     g.hi = g.people > 1 ? g.t + half : last->hi;
     return g;
@@ -47,6 +51,51 @@ void ggn_study_thresholds(const struct ggn_study_people *p, struct ggn_study_thr
 {
     for (int c = 0; c < p->n_cells; c++)
         out[c] = threshold(p, c);
+}
+
+/* --- kinds --- */
+
+/* The cell that shows the noisy picture of the same block; -1: none. */
+static int noisy_cell(const struct ggn_study_people *p, int cell)
+{
+    int view, other;
+    const struct ggn_study_block *b = ggn_study_cell_block(p, cell, &view);
+    for (int c = 0; c < p->n_cells; c++)
+        if (ggn_study_cell_block(p, c, &other)->id == b->id && p->study->views[other].kind == GGN_STUDY_NOISY &&
+            ggn_study_same_scene(&p->study->views[view], &p->study->views[other]))
+            return c;
+    return -1;
+}
+
+struct ggn_study_difference ggn_study_against_noisy(const struct ggn_study_people *p, enum ggn_study_kind kind, int cell)
+{
+    struct ggn_study_difference d = {(double)NAN, (double)NAN, (double)NAN, 0, 0};
+    double sum = 0.0, squares = 0.0;
+    int from = cell < 0 ? 0 : cell, to = cell < 0 ? p->n_cells : cell + 1;
+    for (int i = 0; i < p->n; i++) {
+        double own = 0.0;
+        int blocks = 0;
+        for (int c = from; c < to; c++) {
+            int view, noisy;
+            ggn_study_cell_block(p, c, &view);
+            if (p->study->views[view].kind != kind || (noisy = noisy_cell(p, c)) < 0)
+                continue;
+            double more = estimate(p, i, c) - estimate(p, i, noisy);
+            own += isnan(more) ? 0.0 : more;
+            blocks += !isnan(more);
+        }
+        d.blocks = blocks > d.blocks ? blocks : d.blocks;
+        d.people += blocks > 0;
+        sum += blocks > 0 ? own / blocks : 0.0;
+        squares += blocks > 0 ? own / blocks * own / blocks : 0.0;
+    }
+    if (d.people > 0)
+        d.octaves = sum / d.people;
+    if (d.people > 1) {
+        d.lo = d.octaves - half_width(sum, squares, d.people);
+        d.hi = d.octaves + half_width(sum, squares, d.people);
+    }
+    return d;
 }
 
 /* --- agreement --- */

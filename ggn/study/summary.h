@@ -18,6 +18,16 @@ struct ggn_study_threshold { /* of a cell, octaves; NaN without people */
 /* out: [n_cells] */
 void ggn_study_thresholds(const struct ggn_study_people *people, struct ggn_study_threshold *out);
 
+/* How many octaves of samples more one kind takes than the noisy picture of the same block and scene: each person's mean
+ * over the blocks of which they have both, then the mean over people with Student's interval (NaN below two). cell -1: all
+ * blocks of the kind, else the one that is said. */
+struct ggn_study_difference {
+    double octaves, lo, hi;
+    int people, blocks;
+};
+struct ggn_study_difference ggn_study_against_noisy(const struct ggn_study_people *people, enum ggn_study_kind kind,
+                                                    int cell);
+
 /* Agreement of people over blocks, in log2 of the thresholds. Each person against the mean of the others says how well the
  * best possible prediction could do on one person (lower bound of the noise ceiling); against the mean with them in it is
  * the upper bound (Nili et al. 2014). Means over people; NaN below two people or three blocks. */

@@ -5,7 +5,7 @@ import { element, paragraphs, showNotice, showProgress, textPage } from './dom.j
 import { guardScreen, measureScreen } from './screen.js';
 import { Stimuli } from './stimuli.js';
 import { adjustment } from './task_adjustment.js';
-import { twoInterval } from './task_2ifc.js';
+import { twoInterval, wordsOf } from './task_2ifc.js';
 import { validation } from './task_validation.js';
 import { loadTexts, say, setAlways, text } from './texts.js';
 
@@ -44,9 +44,8 @@ function fail(error) {
     }
 }
 
-// How long it takes, roughly: seconds per trial of each task.
-const minutes = (study, trials) =>
-    Math.max(5, 5 * Math.ceil((trials * { adjustment: 12, '2ifc': 3.2, validation: 15 }[study.task]) / 300));
+// What the consent promises: whole fives, and never less than one.
+const roughly = (minutes) => Math.max(5, 5 * Math.ceil(minutes / 5));
 
 class Session {
     study = null;
@@ -88,11 +87,10 @@ const session = new Session();
 
 async function consent(display) {
     const box = element('input', { type: 'checkbox', name: 'consent' });
-    const trials = estimateTrials(session.study);
     await textPage(display, {
         title: say('consent.title'),
         children: [
-            ...paragraphs('consent.body', { minutes: minutes(session.study, trials) }),
+            ...paragraphs('consent.body', { minutes: roughly(session.study.minutes) }),
             element('label.row', {}, box, say('consent.agree')),
         ],
         button: say('consent.button'),
@@ -102,12 +100,6 @@ async function consent(display) {
     session.key = key;
     window.history.replaceState(null, '', `?p=${key}`);
     await session.reload();
-}
-
-function estimateTrials(study) {
-    const blocks = study.views.reduce((n, v) => n + (v.blocks?.length ?? 0), 0);
-    if (study.task === 'adjustment') return blocks * study.repeats;
-    return study.task === '2ifc' ? blocks * study.trials : study.views.length * study.conditions.length * study.repeats;
 }
 
 async function questions(display) {
@@ -140,11 +132,11 @@ async function questions(display) {
 }
 
 async function instructions(display) {
-    const task = session.study.task;
+    const words = wordsOf(session.study);
     const blocks = session.study.views[0].blocks?.length;
     await textPage(display, {
-        title: say(`${task}.title`),
-        children: paragraphs(`${task}.body`, { blocks }),
+        title: say(`${words}.title`),
+        children: paragraphs(`${words}.body`, { blocks }),
         button: say('start'),
     });
 }

@@ -4,7 +4,11 @@ import { Quest } from './quest.js';
 import { blockUrl, canvas } from './stimuli.js';
 import { say } from './texts.js';
 
+// Which of the texts speak of the task: grain is not all that denoised pictures may have.
+export const wordsOf = (study) => (study.task === '2ifc' && study.views.some((v) => v.kind) ? 'errors' : study.task);
+
 export function twoInterval(session) {
+    const words = wordsOf(session.study);
     const quests = new Map(); // of the view in hand, by block
     let viewInHand = -1;
 
@@ -56,12 +60,12 @@ export function twoInterval(session) {
         const grainy = await session.stimuli.bitmap(blockUrl(slot.view, block, level || 'heavy'));
         const picture = canvas(block.x1 - block.x0, block.y1 - block.y0);
         const note = element('div.interval');
-        const first = element('button', {}, say('2ifc.answer_first')),
-            second = element('button', {}, say('2ifc.answer_second'));
+        const first = element('button', {}, say(`${words}.answer_first`)),
+            second = element('button', {}, say(`${words}.answer_second`));
         const prompt = element(
             'div.prompt',
             {},
-            element('p', {}, say('2ifc.prompt')),
+            element('p', {}, say(`${words}.prompt`)),
             element('div.row', {}, first, second),
         );
         prompt.style.visibility = 'hidden';
@@ -69,8 +73,8 @@ export function twoInterval(session) {
         document.body.dataset.state = 'showing';
         while (paused()) await wait(200);
         await present(picture.getContext('2d'), slot.side === 0 ? [grainy, clean] : [clean, grainy], note, [
-            say('2ifc.first'),
-            say('2ifc.second'),
+            say(`${words}.first`),
+            say(`${words}.second`),
         ]);
 
         prompt.style.visibility = 'visible';

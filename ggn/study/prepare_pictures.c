@@ -1,0 +1,280 @@
+/* A view from a folder of pictures: reference, and one for each level or condition. */
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/files.h"
+#include "picture/png.h"
+#include "picture/read.h"
+#include "study/picture_files.h"
+#include "study/source.h"
+
+struct picture {
+    char name[256];            /* the file's */
+    char stem[GGN_STUDY_NAME]; /* without its extension */
+    double spp;                /* the digits at the end of the stem; 0 without any */
+};
+
+static int by_spp(const void *a, const void *b)
+{
+    const struct picture *x = a, *y = b;
+    int order = (x->spp > y->spp) - (x->spp < y->spp);
+    return order ? order : strcmp(x->name, y->name);
+}
+
+static int list_pictures(const char *folder, struct picture **pictures, int *n, struct base_err *err)
+{
+    enum { MAX = 4096 };
+    struct picture *list = malloc(MAX * sizeof *list);
+    DIR *d = list ? opendir(folder) : NULL;
+    int count = 0;
+    if (!d) {
+        int rc = list ? base_fail(err, BASE_EINVAL, "%s: %s", folder, strerror(errno)) : base_fail_nomem(err, folder);
+        free(list);
+        return rc;
+    }
+    for (struct dirent *e; (e = readdir(d)) != NULL && count < MAX;) {
+        const char *dot = strrchr(e->d_name, '.');
+        struct picture *p = &list[count];
+        if (!dot || e->d_name[0] == '.' || (size_t)(dot - e->d_name) >= sizeof p->stem)
+            continue;
+        snprintf(p->name, sizeof p->name, "%s", e->d_name);
+        snprintf(p->stem, sizeof p->stem, "%.*s", (int)(dot - e->d_name), e->d_name);
+        const char *digits = p->stem + strlen(p->stem);
+        while (digits > p->stem && digits[-1] >= '0' && digits[-1] <= '9')
+            digits--;
+        p->spp = strtod(*digits ? digits : "0", NULL);
+        count++;
+    }
+    closedir(d);
+    qsort(list, (size_t)count, sizeof *list, by_spp);
+    *pictures = list;
+    *n = count;
+    return 0;
+}
+
+/* The three channels of a layer as a display shows them. */
+static int read_layer(const char *path, const char *layer, struct pic_image *image, struct base_err *err)
+{
+    struct pic_image rgb = {0};
+    int rc = 0;
+    for (int c = 0; c < 3 && !rc; c++) {
+        char channel[32];
+        struct pic_image one;
+        snprintf(channel, sizeof channel, "%s.%c", layer, "RGB"[c]);
+        rc = pic_read_channel(path, channel, &one, err);
+        if (rc)
+            break;
+        size_t n = (size_t)one.width * (size_t)one.height;
+        if (c == 0) {
+            rgb = (struct pic_image){.width = one.width, .height = one.height, .channels = 3, .f32 = malloc(3 * n * 4)};
+            rc = rgb.f32 ? 0 : base_fail_nomem(err, path);
+        }
+        for (size_t i = 0; i < n && !rc; i++)
+            rgb.f32[3 * i + (size_t)c] = one.f32[i];
+        pic_release(&one);
+    }
+    if (!rc)
+        rc = pic_encode(path, &rgb, err);
+    if (rc)
+        pic_release(&rgb);
+    else
+        *image = rgb;
+    return rc;
+}
+
+/* What a render with --denoise shows as this kind. */
+static int read_kind(const char *path, enum ggn_study_kind kind, struct pic_image *image, struct base_err *err)
+{
+    struct base_err why = {0};
+    struct pic_image weight;
+    int rc;
+    if (kind == GGN_STUDY_BLEND) { /* the picture itself, if it is one */
+        rc = pic_read_channel(path, "lull.weight.V", &weight, &why);
+        if (!rc) {
+            pic_release(&weight);
+            return pic_read_display(path, image, err);
+        }
+    } else {
+        rc = read_layer(path, ggn_study_kind_names[kind], image, &why);
+    }
+    return rc ? base_fail(err, rc, "%s (--kinds shows renders with --denoise)", why.text) : 0;
+}
+
+static int read_picture(const char *folder, const char *name, enum ggn_study_kind kind, const struct ggn_study_view *view,
+                        struct pic_image *image, struct base_err *err)
+{
+    char path[4096];
+    int rc = base_file_join(path, folder, name, err);
+    if (!rc)
+        rc = kind ? read_kind(path, kind, image, err) : pic_read_display(path, image, err);
+    if (!rc && view->width && ((uint32_t)image->width != view->width || (uint32_t)image->height != view->height)) {
+        rc = base_fail(err, BASE_EINVAL, "%s: %dx%d pixels, the reference has %ux%u", path, image->width, image->height,
+                       view->width, view->height);
+        pic_release(image);
+    }
+    return rc;
+}
+
+/* The picture called reference; its size becomes the view's. */
+static int read_reference(const char *folder, const struct picture *list, int n, struct ggn_study_view *view,
+                          struct pic_image *image, struct base_err *err)
+{
+    for (int i = 0; i < n; i++)
+        if (strcmp(list[i].stem, "reference") == 0) {
+            int rc = read_picture(folder, list[i].name, GGN_STUDY_AS_IS, view, image, err);
+            view->width = !rc ? (uint32_t)image->width : 0;
+            view->height = !rc ? (uint32_t)image->height : 0;
+            return rc;
+        }
+    return base_fail(err, BASE_EINVAL, "%s: neither manifest.json nor a picture called reference in it", folder);
+}
+
+/* The picture cut into blocks; what NULL: it is the reference. */
+static int write_crops(const struct ggn_study_request_views *q, int index, const struct ggn_study_view *view,
+                       const char *what, const struct pic_image *image, struct base_err *err)
+{
+    int rc = 0;
+    for (int i = 0; i < view->n_blocks && !rc; i++) {
+        const struct ggn_study_block *b = &view->blocks[i];
+        size_t w = b->x1 - b->x0, h = b->y1 - b->y0;
+        uint8_t *rgb = malloc(3 * w * h);
+        if (!rgb)
+            return base_fail_nomem(err, view->name);
+        for (size_t y = 0; y < h; y++)
+            memcpy(rgb + 3 * w * y, image->u8 + 3 * ((b->y0 + y) * view->width + b->x0), 3 * w);
+        rc = what ? ggn_study_write_block(q->dir, index, b, what, rgb, err)
+                  : ggn_study_write_reference(q->dir, index, b, rgb, err);
+        free(rgb);
+    }
+    return rc;
+}
+
+static int cut_blocks(const struct ggn_study_request_views *q, const struct ggn_study_source *source,
+                      struct ggn_study_view *view, int levels, struct base_err *err)
+{
+    uint32_t size = (uint32_t)q->block, columns = (view->width + size - 1) / size, rows = (view->height + size - 1) / size;
+    if ((uint64_t)columns * rows > GGN_STUDY_MAX_BLOCKS)
+        return base_fail(err, BASE_EINVAL, "%s: %u blocks of %u pixels; --block makes them larger", view->name,
+                         columns * rows, size);
+    view->blocks = calloc((size_t)columns * rows, sizeof *view->blocks);
+    if (!view->blocks)
+        return base_fail_nomem(err, view->name);
+    for (uint32_t i = 0; i < columns * rows; i++) {
+        uint32_t x0 = i % columns * size, y0 = i / columns * size;
+        if (!ggn_study_source_has(source, i))
+            continue;
+        struct ggn_study_block *b = &view->blocks[view->n_blocks++];
+        *b = (struct ggn_study_block){.id = i,
+                                      .x0 = x0,
+                                      .y0 = y0,
+                                      .x1 = x0 + size < view->width ? x0 + size : view->width,
+                                      .y1 = y0 + size < view->height ? y0 + size : view->height,
+                                      .levels = malloc(((size_t)levels + 1) * sizeof *b->levels)};
+        if (!b->levels)
+            return base_fail_nomem(err, view->name);
+    }
+    return ggn_study_source_check(source, view, err);
+}
+
+static int prepare_levels(const struct ggn_study_request_views *q, const struct ggn_study_source *source, int index,
+                          const struct picture *list, int n, const struct pic_image *reference, struct ggn_study_view *view,
+                          struct base_err *err)
+{
+    char what[32];
+    const char *folder = source->folder;
+    int rc = cut_blocks(q, source, view, n, err);
+    if (!rc)
+        rc = write_crops(q, index, view, NULL, reference, err);
+    for (int i = 0; i < n && !rc; i++) {
+        struct pic_image image;
+        if (list[i].spp < 1.0 || !ggn_study_takes_level(q, &view->blocks[0], list[i].spp))
+            continue;
+        rc = read_picture(folder, list[i].name, view->kind, view, &image, err);
+        if (rc)
+            break;
+        snprintf(what, sizeof what, "%.0f", list[i].spp);
+        rc = write_crops(q, index, view, what, &image, err);
+        pic_release(&image);
+        for (int b = 0; b < view->n_blocks; b++)
+            view->blocks[b].levels[view->blocks[b].n_levels++] = (uint32_t)list[i].spp;
+    }
+    return !rc ? ggn_study_enough_levels(folder, &view->blocks[0], err) : rc;
+}
+
+/* The first view says which conditions there are, the others must have the same. */
+static int know_condition(struct ggn_study *s, int index, const char *name, const char *folder, struct base_err *err)
+{
+    if (!ggn_study_plain_name(name))
+        return base_fail(err, BASE_EINVAL, "%s/%s: name pictures with letters, digits, '.', '_' and '-'", folder, name);
+    for (int i = 0; i < s->n_conditions; i++)
+        if (strcmp(s->conditions[i], name) == 0)
+            return 0;
+    if (index > 0 || s->n_conditions == GGN_STUDY_MAX_CONDITIONS)
+        return base_fail(err, BASE_EINVAL, "%s: '%s' is not a picture that every view has, or there are too many", folder,
+                         name);
+    char(*more)[GGN_STUDY_NAME] = realloc(s->conditions, ((size_t)s->n_conditions + 1) * sizeof *more);
+    if (!more)
+        return base_fail_nomem(err, folder);
+    s->conditions = more;
+    strcpy(more[s->n_conditions++], name);
+    return 0;
+}
+
+static int prepare_conditions(const struct ggn_study_request_views *q, const char *folder, int index,
+                              const struct picture *list, int n, const struct pic_image *reference, struct ggn_study *s,
+                              struct base_err *err)
+{
+    char path[4096];
+    uint8_t *noisy = NULL;
+    int found = 0, rc = ggn_study_picture_path(path, q->dir, index, "reference", err);
+    if (!rc)
+        rc = pic_write_png(path, reference->width, reference->height, 3, reference->u8, err);
+    if (!rc)
+        rc = ggn_study_picture_path(path, q->dir, index, "heavy", err);
+    if (!rc)
+        rc = ggn_study_make_heavy(reference->u8, 3 * (size_t)reference->width * (size_t)reference->height, &noisy, err);
+    if (!rc)
+        rc = pic_write_png(path, reference->width, reference->height, 3, noisy, err);
+    free(noisy);
+    for (int i = 0; i < n && !rc; i++) {
+        struct pic_image image;
+        if (strcmp(list[i].stem, "reference") == 0 || strcmp(list[i].stem, "heavy") == 0)
+            continue;
+        rc = know_condition(s, index, list[i].stem, folder, err);
+        if (!rc)
+            rc = ggn_study_picture_path(path, q->dir, index, list[i].stem, err);
+        if (!rc)
+            rc = read_picture(folder, list[i].name, GGN_STUDY_AS_IS, &s->views[index], &image, err);
+        if (rc)
+            break;
+        rc = pic_write_png(path, image.width, image.height, 3, image.u8, err);
+        pic_release(&image);
+        found++;
+    }
+    if (!rc && (found == 0 || found != s->n_conditions))
+        rc = base_fail(err, BASE_EINVAL, "%s: %d pictures beside the reference, wanted the same in every view", folder,
+                       found);
+    return rc;
+}
+
+int ggn_study_prepare_pictures(const struct ggn_study_request_views *q, const struct ggn_study_source *source, int index,
+                               struct ggn_study *s, struct base_err *err)
+{
+    struct picture *list = NULL;
+    struct pic_image reference;
+    struct ggn_study_view *view = &s->views[index];
+    int n = 0, rc = list_pictures(source->folder, &list, &n, err);
+    if (rc)
+        return rc;
+    rc = read_reference(source->folder, list, n, view, &reference, err);
+    if (!rc) {
+        rc = s->task == GGN_STUDY_VALIDATION ? prepare_conditions(q, source->folder, index, list, n, &reference, s, err)
+                                             : prepare_levels(q, source, index, list, n, &reference, view, err);
+        pic_release(&reference);
+    }
+    free(list);
+    return rc;
+}
