@@ -4,17 +4,18 @@
  * are the means of the two halves of the samples, and an answer follows from the block's pixels alone. Without it they are
  * the mean plus and minus the noise that an earlier value of the same mean shows (plugin/means.h). `error` is the visible
  * noise over the level at which people stop seeing it, `p_noisy` the share of viewers who still do; a block stops when that
- * is at most `visible`. No model.
+ * is at most `visible`. With `fps` the noise is that of one frame of many. No model.
  */
 #include "observer/observer.h"
 #include "model/visibility.h"
 #include "plugin/criteria.h"
 #include "plugin/means.h"
+#include "plugin/moving.h"
 #include "plugin/pair.h"
 #include "plugin/translate.h"
 #include "sequence/simulate.h"
 
-enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_COUNT };
+enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_FPS, P_PPD, P_COUNT };
 enum { COLOR = LULL_PLANE_BIT(LULL_PLANE_COLOR), PLANES = COLOR | LULL_PLANE_BIT(LULL_PLANE_HALF) };
 
 static const struct lull_param params[P_COUNT] = {
@@ -22,6 +23,8 @@ static const struct lull_param params[P_COUNT] = {
         LULL_KIT_FLOAT("visible", "0.35", 1e-4, 0.9999, "stop when at most this share of viewers would still see noise"),
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", "16", 2, 1e15, "samples per pixel before the first judgement"),
     [P_GROWTH] = LULL_KIT_FLOAT("growth", "1.5", 1.01, 100, "largest ratio of samples between two checks of a block"),
+    [P_FPS] = GP_PARAM_FPS,
+    [P_PPD] = GP_PARAM_PPD,
 };
 
 struct worker { /* [3][P] linear light of each half, its L*; [patches] */
@@ -37,6 +40,7 @@ struct largest { /* of the blocks of a frame */
 struct lull_instance {
     struct lull_kit kit;
     struct ggn_observer observer;
+    struct ggn_temporal temporal;
     double stop_error;
     atomic_flag warned;    /* of planes that say nothing about noise: once per frame */
     struct gp_means means; /* of a frame without HALF */
@@ -60,7 +64,11 @@ static double error_of(const struct lull_instance *in, const struct lull_block *
     ggn_visible_texture(w->lightness[0], w->lightness[1], width, height, w->scratch, w->texture);
     for (size_t i = 0; i < pixels; i++)
         w->lightness[0][i] = (float)split * (w->lightness[0][i] - w->lightness[1][i]);
-    double noise = ggn_visible_noise(w->lightness[0], width, height, w->texture, w->scratch, NULL);
+    const int moving = gp_is_moving(&in->kit, P_FPS);
+    double noise =
+        ggn_visible_noise(w->lightness[0], width, height, w->texture, w->scratch, moving ? w->lightness[1] : NULL);
+    if (moving)
+        noise *= ggn_temporal_gain(&in->temporal, w->lightness[1], width, height);
     return ggn_observer_error(&in->observer, noise, pixels);
 }
 
@@ -212,6 +220,7 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     atomic_flag_clear(&in->warned);
     in->observer = ggn_observer_default;
     in->stop_error = ggn_observer_error_at(&in->observer, in->kit.value[P_VISIBLE]);
+    gp_temporal_init(&in->temporal, &in->kit, P_FPS, P_PPD);
     *instance = in;
     return LULL_OK;
 }

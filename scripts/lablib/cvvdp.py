@@ -118,5 +118,25 @@ def serve(ppd, peak):
         print(json.dumps(said), flush=True)
 
 
+def transient():
+    """The table of ggn/observer/temporal.c, for a middle grey of 37 cd/m2."""
+    import numpy
+    import pycvvdp
+    name = os.path.join(os.path.dirname(pycvvdp.__file__), "vvdp_data", "csf_lut_weber_fixed_size.json")
+    with open(name, encoding="utf-8") as file:
+        table = json.load(file)
+    log_rho, log_grey = numpy.log2(table["rho"]), numpy.log10(table["L_bkg"])
+
+    def log_sensitivity(name):  # [luminance][rho], log10
+        at_grey = [numpy.interp(numpy.log10(37), log_grey, of_rho) for of_rho in numpy.transpose(table[name])]
+        return numpy.interp(numpy.arange(-3, 7), log_rho, at_grey)
+
+    more = (log_sensitivity("o5_c1") - log_sensitivity("o0_c1")) * numpy.log2(10)
+    print(", ".join("%.4f" % octaves for octaves in more))
+
+
 if __name__ == "__main__":
-    serve(float(sys.argv[1]), float(sys.argv[2]))
+    if sys.argv[1] == "--transient":
+        transient()
+    else:
+        serve(float(sys.argv[1]), float(sys.argv[2]))

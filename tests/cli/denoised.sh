@@ -10,6 +10,10 @@ t "same bytes for 1 thread and another order" sh -c "$P $den -t 1 --order-seed 4
 "$P" $den --time-budget 0.3 --checkpoint den.ckp -o part.exr
 [ -s den.ckp ] || "$P" $den --checkpoint den.ckp --checkpoint-every 0 -o part.exr
 t "same bytes after interrupt and resume" sh -c "$P $den --checkpoint den.ckp --resume -o den2.exr && cmp den.exr den2.exr"
+"$P" $den -p fps=0 -o still.exr --stop-map still.csv
+"$P" $den -p fps=24 -o moving.exr --stop-map moving.csv
+t "0 frames per second: a still" cmp still.csv den.csv
+t "24: other decisions" sh -c '! cmp -s moving.csv den.csv'
 t "a denoiser that fails stops nothing" sh -c "OIDN_STUB=commit $P $scene -q --size 50x50 -c denoised -p library=$LULL_OIDN --spp-max 40 --report fail.json -o fail.exr; grep -q 'spp-max' fail.json && ! grep -q '\"criterion\",' fail.json"
 LULL_OIDN=/no/such refused "/no/such: no Open Image Denoise 2 there" "$scene" -q -c denoised -o none.exr
 OIDN_STUB=version refused "is of version 3.0.1: version 2 is needed" "$scene" -q -c denoised -o none.exr

@@ -36,5 +36,6 @@ t "a clip of that noise is as bad as it or worse" grep -q '^still True$' said
 t "refused: other lengths" grep -q '^refused ColorVideoVDP: 2 pictures against 1' said
 t "refused: no such file" grep -q '^refused ColorVideoVDP: .*none.png' said
 t "refused: another size" grep -q '^refused ColorVideoVDP: .*small.png has another size' said
+t "the table of the model observer for moving pictures is what its functions say" grep -qF "{$("${P%/bin/*}/judge/bin/python" "$here/../../scripts/lablib/cvvdp.py" --transient)}" "$here/../../ggn/observer/temporal.c"
 echo "1..$n"
 exit $bad

@@ -26,6 +26,16 @@ t "each frame has noise of its own" fails oiiotool --fail 0 --warn 0 fresh_1.exr
 t "--frame-seed fixed: the seed of the command line" cmp fixed_1.exr fixed_2.exr
 t "  …as without frames" cmp fixed_1.exr one.exr
 
+"$P" "$scene" --frames 1-16 $small --spp 16 -o n_%d.exr
+"$P" "$scene" $small --spp 6400 --seed 9 -o truth.exr
+off() { # off IMAGE...: mean square of what each is off the truth
+    for f in "$@"; do oiiotool --fail 0 --warn 0 truth.exr --ch R,G,B "$f" --ch R,G,B --diff; done | awk '/RMS error/ { sum += $4 * $4; n++ } END { print sum / n }'
+}
+for k in 1 5 9 13; do oiiotool $(seq -f n_%g.exr $k $((k + 3))) --add --add --add --mulc 0.25 -o mean_$k.exr; done
+t "  …so that the mean of four frames of a still scene has a quarter of the variance" awk "BEGIN { r = $(off mean_*.exr) / $(off n_*.exr); exit !(r > 0.19 && r < 0.32) }"
+"$P" "$scene" --frames 2 $small --spp 16 -o again_%d.exr
+t "  …and a frame has the same noise each time" cmp again_2.exr n_2.exr
+
 # --- the camera's path ---
 cat >path.csv <<'CSV'
 frame;eye;at;up;fov
@@ -43,11 +53,30 @@ t "  …or the scene's fov" cmp c_1.exr one.exr
 "$P" "$scene" --camera-path path.csv $small --plan-shot T.csv --plan-every 2 --quote-pilot 32 --spp-max 400 >price
 t "--plan-shot says what all frames will cost" grep -q '^3 frames of 6 blocks, by 2 pilots: ' price
 t "  …and writes a line for each" test "$(grep -c '^[125];' T.csv)" -eq 3
+"$P" "$scene" --camera-path path.csv $small --plan-shot D.csv --plan-every 1 --quote-pilot 16 --spp-max 400 >/dev/null
+t "  …a pilot between two others has no fewer samples than both" awk -F';' 'NR > 2 { for (i = 2; i <= NF; i++) s[NR, i] = $i } END { for (i = 2; i <= NF; i++) if (s[4, i] < s[3, i] && s[4, i] < s[5, i]) exit 1; exit NR != 5 }' D.csv
 awk 'BEGIN { FS = OFS = ";" } NR > 2 { for (i = 2; i <= NF; i++) $i = 5 * i + NR } { print }' T.csv >own.csv
 "$P" "$scene" --camera-path path.csv $small --shot-table own.csv -o a_%d.exr --stop-map a_%d.csv -t 1
 t "--shot-table gives every block its samples" test "$(cut -d';' -f2- a_2.csv)" = "$(sed -n 's/^2;//p' own.csv);"
 "$P" "$scene" --camera-path path.csv $small --shot-table own.csv -o b_%d.exr -t 3 --frames 2,5
 t "  …the same bytes frame by frame and with other threads" cmp a_5.exr b_5.exr
+
+# --- decisions for a moving picture: -p fps ---
+mean() { awk -F';' '{ for (i = 2; i < NF; i++) { sum += $i; n++ } } END { print sum / n }' "$1"; }
+share() { awk -v a="$1" -v b="$2" -v low="$3" -v high="$4" 'BEGIN { exit !(a / b > low && a / b < high) }'; }
+quoted() { "$P" "$scene" $big --quote --json "$@" | python3 -c 'import json, sys; print([r["spp_mean"]["expected"] for r in json.load(sys.stdin)["rows"] if r["as_asked"]][0])'; }
+big="-q --size 96x96 --block 48 --reproducible"
+"$P" "$scene" $big -o still.exr --stop-map still.csv
+"$P" "$scene" $big -o zero.exr --stop-map zero.csv -p fps=0 -p ppd=30
+"$P" "$scene" $big -o moving.exr --stop-map moving.csv -p fps=24
+t "0 frames per second: a still" sh -c 'cut -d";" -f2- still.csv >a; cut -d";" -f2- zero.csv | cmp a - && oiiotool --fail 0 --warn 0 still.exr zero.exr --diff'
+t "24 frames per second: fewer samples" share "$(mean moving.csv)" "$(mean still.csv)" 0.25 0.75
+t "  …the quote expects that, too" share "$(quoted -p fps=24)" "$(quoted)" 0.35 0.55
+"$P" "$scene" --frames 1-2 $big --plan-shot M.csv -p fps=24 >/dev/null
+"$P" "$scene" --frames 1-2 $big --plan-shot S.csv >/dev/null
+t "  …and so does the plan of a shot" share "$(sed 's/$/;/' M.csv | grep '^[12];' >M; mean M)" "$(sed 's/$/;/' S.csv | grep '^[12];' >S; mean S)" 0.35 0.65
+refused "fps: -1 is not in [0, 240]" "$scene" $big -p fps=-1 -o x.exr
+refused "ppd: 'far' is not a number" "$scene" $big -p fps=24 -p ppd=far -o x.exr
 
 # --- interrupted ---
 long="$scene --frames 1-2 $small --spp 1500 -t 1"

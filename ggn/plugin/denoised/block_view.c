@@ -370,8 +370,17 @@ static void cross(struct gd_block_view *l, int width, int height)
     }
 }
 
+/* The halves' difference is noise; what else the crossed error has is bias. Both add in squares. */
+static void set_moving(struct gd_errors *e, double gain)
+{
+    const double bias_squared = fmax(0.0, e->crossed * e->crossed - e->halves * e->halves);
+    e->halves *= gain;
+    e->crossed = sqrt(bias_squared + e->halves * e->halves);
+}
+
 int gd_block_view_errors(struct gd_block_view *l, const struct gd_form *form, const struct lull_kit *kit,
-                         const struct lull_block *b, int blend, struct gd_errors *errors)
+                         const struct lull_block *b, int blend, const struct ggn_temporal *temporal,
+                         struct gd_errors *errors)
 {
     static const int shown[] = {HALF_A, HALF_B, DENOISED_A, DENOISED_B};
     const struct lull_rect box = box_of(form, b);
@@ -405,5 +414,7 @@ int gd_block_view_errors(struct gd_block_view *l, const struct gd_form *form, co
     errors->halves = ggn_visible_noise(l->apart, width, height, l->texture, l->rows, l->scratch);
     memcpy(l->apart, l->scratch, pixels * sizeof *l->apart);
     errors->crossed = crossed_error(l, width, height);
+    if (temporal)
+        set_moving(errors, ggn_temporal_gain(temporal, l->apart, width, height));
     return 0;
 }

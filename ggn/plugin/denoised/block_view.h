@@ -23,6 +23,7 @@
 #include <lull/criterion_kit.h>
 
 #include "denoise/oidn.h"
+#include "observer/temporal.h"
 
 /* Pixels around a block that the denoiser is shown, and the most that lie there because the corner is on its grid. */
 enum { GD_HALO = 32, GD_REACH = GD_HALO + LULL_OIDN_GRID - 1 };
@@ -33,7 +34,7 @@ struct gd_form {               /* of a frame */
     struct lull_oidn_form box; /* what is denoised for a block, of any size */
 };
 
-struct gd_errors { /* visible noise r */
+struct gd_errors { /* visible noise r, or bias as strong */
     double halves, crossed;
 };
 
@@ -61,10 +62,11 @@ void gd_block_view_release(struct gd_block_view *seen);
 /* Reads a block of 0 < half_spp < spp and its surroundings. Returns whether the halves differ anywhere in the block. */
 int gd_block_view_read(struct gd_block_view *seen, const struct gd_form *form, const struct lull_kit *kit,
                        const struct lull_view *view, const struct lull_block *block, struct lull_kit_tally *tally);
-/* Denoises what was read and estimates its error. blend: the picture kept is the blend. 0, or a negative code and
- * seen->err. */
+/* Denoises what was read and estimates its error. blend: the picture kept is the blend. temporal: of a moving picture, in
+ * which noise is new in each frame and bias is taken to stand still; or NULL. 0, or a negative code and seen->err. */
 int gd_block_view_errors(struct gd_block_view *seen, const struct gd_form *form, const struct lull_kit *kit,
-                         const struct lull_block *block, int blend, struct gd_errors *errors);
+                         const struct lull_block *block, int blend, const struct ggn_temporal *temporal,
+                         struct gd_errors *errors);
 /* Whether the block that was read shows more than one colour. */
 int gd_block_view_structure(const struct gd_block_view *seen, const struct gd_form *form, const struct lull_block *block);
 

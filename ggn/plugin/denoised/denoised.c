@@ -11,11 +11,12 @@
 #include "observer/observer.h"
 #include "plugin/criteria.h"
 #include "plugin/denoised/block_view.h"
+#include "plugin/moving.h"
 #include "plugin/translate.h"
 
 static const double LEAST_STEP = 1.4142135623730951, CONFIRM_STEP = 1.25; /* of samples, from check to check */
 
-enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_PICTURE, P_QUALITY, P_LIBRARY, P_COUNT };
+enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_PICTURE, P_QUALITY, P_LIBRARY, P_FPS, P_PPD, P_COUNT };
 enum {
     REQUIRED = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF),
     AUXILIARY = LULL_PLANE_BIT(LULL_PLANE_ALBEDO) | LULL_PLANE_BIT(LULL_PLANE_NORMAL)
@@ -31,6 +32,8 @@ static const struct lull_param params[P_COUNT] = {
     [P_QUALITY] = LULL_KIT_CHOICE("quality", "high", "fast|balanced|high", "of the denoiser"),
     [P_LIBRARY] =
         LULL_KIT_FILE("library", NULL, "Open Image Denoise, or a folder that holds it; else LULL_OIDN and the usual places"),
+    [P_FPS] = GP_PARAM_FPS,
+    [P_PPD] = GP_PARAM_PPD,
 };
 
 struct past {     /* what is remembered of a block; saved as it is, without padding */
@@ -44,6 +47,7 @@ struct past {     /* what is remembered of a block; saved as it is, without padd
 struct lull_instance {
     struct lull_kit kit;
     struct ggn_observer observer;
+    struct ggn_temporal temporal;
     double stop_error;
     char *library;       /* owns; NULL: the usual places */
     atomic_flag warned;  /* of halves that are none: once per frame */
@@ -68,7 +72,8 @@ static double error_of(struct lull_instance *in, struct gd_block_view *seen, con
                                     "denoised: COLOR and HALF are the same in a block that is not of one colour: HALF must "
                                     "hold a fixed half of the samples",
                                     tally);
-    if (gd_block_view_errors(seen, &in->form, &in->kit, b, in->kit.value[P_PICTURE] == 0, &e))
+    if (gd_block_view_errors(seen, &in->form, &in->kit, b, in->kit.value[P_PICTURE] == 0,
+                             gp_is_moving(&in->kit, P_FPS) ? &in->temporal : NULL, &e))
         return (double)NAN; /* evaluate finds it in seen->err */
     now->halves = ggn_observer_error(&in->observer, e.halves, pixels);
     now->crossed = ggn_observer_error(&in->observer, e.crossed, pixels);
@@ -284,6 +289,7 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     atomic_flag_clear(&in->warned);
     in->observer = ggn_observer_default;
     in->stop_error = ggn_observer_error_at(&in->observer, in->kit.value[P_VISIBLE]);
+    gp_temporal_init(&in->temporal, &in->kit, P_FPS, P_PPD);
     in->kit.need.halo = GD_REACH;
     in->kit.need.checks_hint = 5;
     in->kit.need.bytes_per_block = 2 * sizeof(struct past) + sizeof(struct lull_rect);
