@@ -47,8 +47,9 @@ typedef int pt_shot_render(struct pt_cli *cli, struct job *job, struct base_log 
  * --plan-shot, its table. */
 int pt_shot_run(const struct pt_cli *cli, struct job *job, pt_shot_render *render, struct base_log *log, int *status,
                 struct base_err *err);
-/* Samples that a block needs between two pilots, of `count` blocks in rows of `columns`: the larger of its two needs; that
- * of a neighbour, too, when either moves, that is when its need changes by more than the pilots' intervals allow. */
+/* Samples that a block gets between two pilots, of `count` blocks in rows of `columns`: the larger of its two needs; where
+ * something moves in it or beside it, half of the octaves from there to the largest need of what moves. A block moves when
+ * its need changes by more than the pilots' intervals allow. */
 uint32_t pt_shot_need(const struct lull_host_quote_block *a, const struct lull_host_quote_block *b, size_t count,
                       uint32_t columns, size_t block);
 /* --plan-shot: pilots of every n-th frame, the table from them, its price on stdout. */

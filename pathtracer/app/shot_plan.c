@@ -86,15 +86,28 @@ uint32_t pt_shot_need(const struct lull_host_quote_block *a, const struct lull_h
                       uint32_t columns, size_t block)
 {
     const long width = (long)columns, height = (long)count / width, x = (long)block % width, y = (long)block / width;
-    const int moves = has_moved(&a[block].stop, &b[block].stop);
-    double most = fmax(1.0, fmax(a[block].stop.spp, b[block].stop.spp));
+    const double own = fmax(1.0, fmax(a[block].stop.spp, b[block].stop.spp));
+    double most = own;
     for (long v = y > 0 ? y - 1 : 0; v <= y + 1 && v < height; v++)
         for (long u = x > 0 ? x - 1 : 0; u <= x + 1 && u < width; u++) {
             const struct lull_host_stop_at *before = &a[v * width + u].stop, *after = &b[v * width + u].stop;
-            if (moves || has_moved(before, after))
+            if (has_moved(before, after))
                 most = fmax(most, fmax(before->spp, after->spp));
         }
-    return (uint32_t)ceil(most);
+    return (uint32_t)ceil(sqrt(own * most));
+}
+
+/* Of a block in a frame, whose pilots before and after it are k and k + 1; a frame that is a pilot itself lies between two
+ * pairs, and gets the smaller of their answers, so that its samples do not fall below those of the frames around it. */
+static uint32_t spp_of(const struct plan *p, size_t frame, size_t k, size_t block)
+{
+    const struct pilot *a = &p->pilots[k];
+    const size_t n = p->table.block_count, after = k + 1 < p->pilot_count ? k + 1 : k, before = k > 0 ? k - 1 : k;
+    const uint32_t spp = pt_shot_need(a->blocks, p->pilots[after].blocks, n, p->columns, block);
+    if (frame > a->at || before == k)
+        return spp;
+    const uint32_t other = pt_shot_need(p->pilots[before].blocks, a->blocks, n, p->columns, block);
+    return after == k || other < spp ? other : spp;
 }
 
 static int fill_table(struct plan *p, const struct pt_shot *s, struct base_err *err)
@@ -108,10 +121,10 @@ static int fill_table(struct plan *p, const struct pt_shot *s, struct base_err *
     for (size_t f = 0, k = 0; f < s->count; f++) {
         if (k + 1 < p->pilot_count && f >= p->pilots[k + 1].at)
             k++;
-        const struct pilot *a = &p->pilots[k], *b = f == a->at ? a : a + 1; /* the last frame is a pilot */
+        const struct pilot *a = &p->pilots[k], *b = k + 1 < p->pilot_count ? a + 1 : a; /* the last frame is a pilot */
         t->frames[f] = s->frames[f];
         for (size_t i = 0; i < n; i++) {
-            uint32_t spp = pt_shot_need(a->blocks, b->blocks, n, p->columns, i);
+            const uint32_t spp = spp_of(p, f, k, i);
             t->spp[f * n + i] = spp;
             p->samples += spp;
             p->thread_s += spp * 0.5 * (a->blocks[i].sample_s + b->blocks[i].sample_s);
