@@ -43,6 +43,13 @@ static double read_at(const struct lull_plane *p, const struct lull_host_view *v
     return value * p->scale;
 }
 
+/* Samples of a pixel of block k. */
+static uint32_t spp_at(const struct lull_host_view *v, const struct lull_host_block *k, int32_t x, int32_t y)
+{
+    const int own = v->plane_count > LULL_PLANE_SPP && v->planes[LULL_PLANE_SPP].data;
+    return own ? (uint32_t)read_at(&v->planes[LULL_PLANE_SPP], v, x, y, 0) : (uint32_t)k->spp;
+}
+
 static int32_t check_view(const struct lull_host_blocks *b, const struct lull_host_view *v, struct lull_error *err)
 {
     if (v->struct_size < sizeof *v)
@@ -89,7 +96,7 @@ static int32_t show_weights(const struct lull_host_blocks *b, const struct lull_
         const struct lull_host_block *k = &b->list[i];
         for (int32_t y = k->y0; y < k->y1; y++) {
             for (int32_t x = k->x0; x < k->x1; x++) {
-                uint32_t spp = (uint32_t)k->spp, dropped = (uint32_t)read_at(v->dropped, v, x, y, 0);
+                uint32_t spp = spp_at(v, k, x, y), dropped = (uint32_t)read_at(v->dropped, v, x, y, 0);
                 s->weight[at(v, x, y)] = spp > dropped ? spp - dropped : spp;
             }
         }
@@ -101,12 +108,14 @@ static int32_t show_weights(const struct lull_host_blocks *b, const struct lull_
     return LULL_OK;
 }
 
-/* HALF has another count, which no normaliser knows per pixel: a copy, its sums as if all samples had been kept. */
+/* HALF has another count, which no normaliser knows per pixel: a copy, its sums as if all samples had been kept, or, of
+ * LULL_NORM_WEIGHT, as many as of all. */
 static int32_t show_half(const struct lull_host_blocks *b, const struct lull_host_view *v, struct lull_host_shown *s,
                          struct lull_error *err)
 {
     struct lull_plane *plane = &s->planes[LULL_PLANE_HALF];
-    if (!v->dropped_half || !plane->data || plane->normaliser != LULL_NORM_HALF_SPP)
+    const int by_weight = plane->normaliser == LULL_NORM_WEIGHT;
+    if (!v->dropped_half || !plane->data || (!by_weight && plane->normaliser != LULL_NORM_HALF_SPP))
         return LULL_OK;
     s->half = calloc(pixels_of(v), 3 * sizeof *s->half);
     if (!s->half)
@@ -115,14 +124,16 @@ static int32_t show_half(const struct lull_host_blocks *b, const struct lull_hos
         const struct lull_host_block *k = &b->list[i];
         for (int32_t y = k->y0; y < k->y1; y++) {
             for (int32_t x = k->x0; x < k->x1; x++) {
-                uint64_t dropped = k->dropped > 0 ? (uint64_t)read_at(v->dropped_half, v, x, y, 0) : 0;
-                double up = k->half_spp > dropped ? (double)k->half_spp / (double)(k->half_spp - dropped) : 1.0;
+                const double dropped = k->dropped > 0 ? read_at(v->dropped_half, v, x, y, 0) : 0.0;
+                const double n = by_weight ? (double)spp_at(v, k, x, y) / plane->scale : (double)k->half_spp;
+                const double shown = by_weight ? (double)s->weight[at(v, x, y)] / plane->scale : n;
+                const double up = n > dropped ? shown / (n - dropped) : 1.0;
                 for (int c = 0; c < 3; c++)
                     s->half[3 * at(v, x, y) + (size_t)c] = read_at(plane, v, x, y, c) * up;
             }
         }
     }
-    *plane = plane_of(v, s->half, sizeof *s->half, 3, LULL_TYPE_F64, LULL_NORM_HALF_SPP);
+    *plane = plane_of(v, s->half, sizeof *s->half, 3, LULL_TYPE_F64, plane->normaliser);
     return LULL_OK;
 }
 
@@ -138,6 +149,8 @@ int32_t lull_host_show(const struct lull_host_blocks *b, const struct lull_host_
         dropped |= v->dropped && b->list[i].dropped > 0;
     for (uint32_t i = 0; i < v->plane_count && i < LULL_PLANE_COUNT; i++)
         s.planes[i] = v->planes[i];
+    if (!s.planes[LULL_PLANE_WEIGHT].data)
+        s.planes[LULL_PLANE_WEIGHT] = s.planes[LULL_PLANE_SPP];
     if (counts)
         code = show_counts(b, v, &s, err);
     if (code == LULL_OK && dropped)

@@ -213,10 +213,12 @@ struct lull_host_view {
     uint32_t plane_count;
     int32_t x0, y0, x1, y1;          /* the pixels that the planes hold, all blocks among them */
     const struct lull_plane *planes; /* [plane_count], index LULL_PLANE_. SPP and WEIGHT are made by the library where a
-                                      * criterion requires one and the view has none */
+                                      * criterion requires one and the view has none; SPP serves as WEIGHT, too, so that
+                                      * sums of pixels with samples of their own are of LULL_NORM_WEIGHT */
     /* Samples left out of each pixel, for values that are not finite (u32, LULL_NORM_ONE); NULL: none. dropped belongs to
      * COLOR and MOMENT2, dropped_half to HALF; they are read where a block has `dropped`, and sums (LULL_NORM_SPP, HALF_SPP)
-     * are then divided by the samples that are in them. Not together with a plane WEIGHT. */
+     * are then divided by the samples that are in them; so are those of LULL_NORM_WEIGHT (the scale of HALF being that of
+     * samples to those in HALF). Not together with a plane WEIGHT. */
     const struct lull_plane *dropped;
     const struct lull_plane *dropped_half;
 };
