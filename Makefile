@@ -140,10 +140,13 @@ ifneq ($(filter x86_64%,$(shell $(CC) -dumpmachine)),)
 isa = $(if $(filter %_avx2.c,$(1)),-mavx2 -mfma)$(if $(filter %_avx512.c,$(1)),-mavx512f -mavx512vl -mavx512bw -mavx512dq -mfma -mprefer-vector-width=512)$(if $(filter %_avx512bf16.c,$(1)),-mavx512f -mavx512vl -mavx512bw -mavx512dq -mavx512bf16 -mfma)
 endif
 
+# Loops that are to become vectors may compute what a branch would have skipped: no flag of the processor is ever read.
+speculate = $(if $(filter pathtracer/integ/lanes_%,$(1)),-fno-trapping-math)
+
 $(OBJ)/%.c.o: %.c
 	@mkdir -p $(@D)
 	@echo "  CC   $<"
-	@$(CC) $(CFLAGS_ALL) $(call inc,$<) $(call isa,$<) -c $< -o $@
+	@$(CC) $(CFLAGS_ALL) $(call inc,$<) $(call isa,$<) $(call speculate,$<) -c $< -o $@
 
 $(OBJ)/%.c.double.o: %.c
 	@mkdir -p $(@D)

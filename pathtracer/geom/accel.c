@@ -365,17 +365,67 @@ static inline void put_ray(const struct pt_ray *from, union lane *lanes, int n, 
     lanes[RAY_ID * n + i].u = lanes[FLAGS * n + i].u = 0;
 }
 
-/* The first rays of a list of `count`, as many as go together. Lanes without one hold a ray all the same. */
-static inline int packet_fill(struct packet *p, const struct pt_ray *const *rays, int count, int n, int coherent)
+/* How many of `count` rays go together next, each in a lane of n. */
+static inline int packet_begin(struct packet *p, int count, int n, int coherent)
 {
     count = count < n ? count : n;
     rtcInitIntersectContext(&p->context);
     p->context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < n; i++)
         p->valid[i] = i < count ? -1 : 0;
-        put_ray(rays[i < count ? i : 0], p->lanes, n, i);
-    }
     return count;
+}
+
+/* The first rays of a list of `count`, as many as go together. Lanes without one hold a ray all the same. */
+static inline int packet_fill(struct packet *p, const struct pt_ray *const *rays, int count, int n, int coherent)
+{
+    count = packet_begin(p, count, n, coherent);
+    for (int i = 0; i < n; i++)
+        put_ray(rays[i < count ? i : 0], p->lanes, n, i);
+    return count;
+}
+
+static inline void put_field(const float *from, union lane *lanes, int count, int n)
+{
+    for (int i = 0; i < n; i++)
+        lanes[i].f = from[i];
+    for (int i = count; i < n; i++)
+        lanes[i].f = from[0];
+}
+
+/* The same from ray `first` on of those that lie side by side; n is a constant wherever this is inlined. */
+static inline __attribute__((always_inline)) void put_lanes(struct packet *p, const struct pt_ray_lanes *rays, int first,
+                                                            int count, int n)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        put_field(rays->origin[axis] + first, &p->lanes[(ORG_X + axis) * n], count, n);
+        put_field(rays->direction[axis] + first, &p->lanes[(DIR_X + axis) * n], count, n);
+    }
+    for (int i = 0; i < n; i++) {
+        p->lanes[TNEAR * n + i].f = p->lanes[TIME * n + i].f = 0.0f;
+        p->lanes[TFAR * n + i].f = rays->t_max;
+        p->lanes[MASK * n + i].u = ~0u;
+        p->lanes[RAY_ID * n + i].u = p->lanes[FLAGS * n + i].u = 0;
+    }
+}
+
+static inline int packet_fill_lanes(struct packet *p, const struct pt_ray_lanes *rays, int first, int count, int n,
+                                    int coherent)
+{
+    count = packet_begin(p, count - first, n, coherent);
+    if (n == 16)
+        put_lanes(p, rays, first, count, 16);
+    else if (n == 8)
+        put_lanes(p, rays, first, count, 8);
+    else
+        put_lanes(p, rays, first, count, 4);
+    return count;
+}
+
+static inline struct pt_ray lane_ray(const struct pt_ray_lanes *rays, int i)
+{
+    return (struct pt_ray){v3(rays->origin[0][i], rays->origin[1][i], rays->origin[2][i]),
+                           v3(rays->direction[0][i], rays->direction[1][i], rays->direction[2][i]), 0.0f, rays->t_max, 0.0f};
 }
 
 static void packet_intersect(const struct pt_scene *scene, struct packet *p, int n)
@@ -402,6 +452,17 @@ static void packet_occluded(const struct pt_scene *scene, struct packet *p, int 
         rtcOccluded4(p->valid, world, &p->context, (struct RTCRay4 *)p->lanes);
 }
 
+/* What ray i of n has met. */
+static inline void take_hit(const struct pt_scene *scene, const struct packet *p, int n, int i, struct pt_hit *hit)
+{
+    hit->t = p->lanes[TFAR * n + i].f;
+    hit->u = p->lanes[HIT_U * n + i].f;
+    hit->v = p->lanes[HIT_V * n + i].f;
+    hit->primitive = (int32_t)p->lanes[PRIM_ID * n + i].u;
+    hit->geometric = v3(p->lanes[NG_X * n + i].f, p->lanes[NG_Y * n + i].f, p->lanes[NG_Z * n + i].f);
+    name_shape(scene, p->lanes[GEOM_ID * n + i].u, p->lanes[INST_ID * n + i].u, hit);
+}
+
 void pt_accel_intersect_many(const struct pt_scene *scene, const struct pt_ray *const *rays, int count, int coherent,
                              struct pt_hit *const *hits)
 {
@@ -410,21 +471,32 @@ void pt_accel_intersect_many(const struct pt_scene *scene, const struct pt_ray *
     while (count > 1 && n > 1) {
         int filled = packet_fill(&p, rays, count, n, coherent);
         packet_intersect(scene, &p, n);
-        for (int i = 0; i < filled; i++) {
-            struct pt_hit *hit = hits[i];
-            hit->t = p.lanes[TFAR * n + i].f;
-            hit->u = p.lanes[HIT_U * n + i].f;
-            hit->v = p.lanes[HIT_V * n + i].f;
-            hit->primitive = (int32_t)p.lanes[PRIM_ID * n + i].u;
-            hit->geometric = v3(p.lanes[NG_X * n + i].f, p.lanes[NG_Y * n + i].f, p.lanes[NG_Z * n + i].f);
-            name_shape(scene, p.lanes[GEOM_ID * n + i].u, p.lanes[INST_ID * n + i].u, hit);
-        }
+        for (int i = 0; i < filled; i++)
+            take_hit(scene, &p, n, i, hits[i]);
         count -= filled;
         rays += filled;
         hits += filled;
     }
     for (int i = 0; i < count; i++)
         pt_accel_intersect(scene, rays[i], hits[i]);
+}
+
+void pt_accel_intersect_lanes(const struct pt_scene *scene, const struct pt_ray_lanes *rays, int count, int coherent,
+                              struct pt_hit *hits)
+{
+    struct packet p;
+    int n = scene->accel->packet, done = 0;
+    while (count - done > 1 && n > 1) {
+        int filled = packet_fill_lanes(&p, rays, done, count, n, coherent);
+        packet_intersect(scene, &p, n);
+        for (int i = 0; i < filled; i++)
+            take_hit(scene, &p, n, i, &hits[done + i]);
+        done += filled;
+    }
+    for (; done < count; done++) {
+        struct pt_ray ray = lane_ray(rays, done);
+        pt_accel_intersect(scene, &ray, &hits[done]);
+    }
 }
 
 void pt_accel_occluded_many(const struct pt_scene *scene, const struct pt_ray *const *rays, int count, uint8_t *occluded)
@@ -442,6 +514,23 @@ void pt_accel_occluded_many(const struct pt_scene *scene, const struct pt_ray *c
     }
     for (int i = 0; i < count; i++)
         occluded[i] = (uint8_t)pt_accel_occluded(scene, rays[i]);
+}
+
+void pt_accel_occluded_lanes(const struct pt_scene *scene, const struct pt_ray_lanes *rays, int count, uint8_t *occluded)
+{
+    struct packet p;
+    int n = scene->accel->packet, done = 0;
+    while (count - done > 1 && n > 1) {
+        int filled = packet_fill_lanes(&p, rays, done, count, n, 0);
+        packet_occluded(scene, &p, n);
+        for (int i = 0; i < filled; i++)
+            occluded[done + i] = p.lanes[TFAR * n + i].f < 0.0f;
+        done += filled;
+    }
+    for (; done < count; done++) {
+        struct pt_ray ray = lane_ray(rays, done);
+        occluded[done] = (uint8_t)pt_accel_occluded(scene, &ray);
+    }
 }
 
 void pt_accel_instance_transform(const struct pt_scene *scene, int32_t id, float time, struct pt_mat34 *to_render)

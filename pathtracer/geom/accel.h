@@ -48,6 +48,16 @@ void pt_accel_intersect_many(const struct pt_scene *scene, const struct pt_ray *
 /* occluded[i]: pt_accel_occluded of rays[i]. */
 void pt_accel_occluded_many(const struct pt_scene *scene, const struct pt_ray *const *rays, int count, uint8_t *occluded);
 
+/* Rays side by side, from 0 to t_max at time 0; arrays of equal length, a multiple of 16. */
+struct pt_ray_lanes {
+    const float *origin[3], *direction[3]; /* borrow */
+    float t_max;
+};
+/* As pt_accel_intersect_many and pt_accel_occluded_many with the first `count` of them. */
+void pt_accel_intersect_lanes(const struct pt_scene *scene, const struct pt_ray_lanes *rays, int count, int coherent,
+                              struct pt_hit *hits);
+void pt_accel_occluded_lanes(const struct pt_scene *scene, const struct pt_ray_lanes *rays, int count, uint8_t *occluded);
+
 /* Object → render transform of instance `id` at `time`, the one its hits were found with. */
 void pt_accel_instance_transform(const struct pt_scene *scene, int32_t id, float time, struct pt_mat34 *to_render);
 

@@ -206,17 +206,27 @@ PT_KERNEL_INLINE void pt_path_add_light(pt_effects fx, struct pt_path *path, str
         pt_trace_light(path->trace, plan->light.wi, add);
 }
 
+/* Whether the surface `at`, met along `direction` from `prev`, emits that way; *weight gets what of that counts. */
+PT_KERNEL_INLINE int pt_emission_weight(pt_effects fx, const struct pt_scene *scene, const struct pt_integrator *settings,
+                                        const struct pt_place *at, pt_vec3 direction, float pdf_prev,
+                                        const struct pt_receiver *prev, float *weight)
+{
+    *weight = 1.0f;
+    if (!scene->lights[at->shape->light].two_sided && !(v3_dot(at->s.n_geometric, direction) < 0.0f))
+        return 0;
+    if (pdf_prev > 0.0f && settings->strategy == PT_STRATEGY_MIS)
+        *weight = pt_mis_weight(
+            pdf_prev, pt_light_area_pdf(fx, scene, at->shape, at->primitive, prev, at->p, at->s.n_geometric, direction));
+    return 1;
+}
+
 /* Emission of the surface that the path has met. */
 PT_KERNEL_INLINE void pt_path_add_emission(pt_effects fx, struct pt_path *path, const struct pt_place *at)
 {
-    const struct pt_light *light = &path->scene->lights[at->shape->light];
-    if (!light->two_sided && !(v3_dot(at->s.n_geometric, path->ray.direction) < 0.0f))
+    float weight;
+    if (!pt_emission_weight(fx, path->scene, path->settings, at, path->ray.direction, path->pdf_prev, &path->prev, &weight))
         return;
-    float weight = 1.0f;
-    if (path->pdf_prev > 0.0f && path->settings->strategy == PT_STRATEGY_MIS)
-        weight = pt_mis_weight(path->pdf_prev, pt_light_area_pdf(fx, path->scene, at->shape, at->primitive, &path->prev,
-                                                                 at->p, at->s.n_geometric, path->ray.direction));
-    pt_vec3 l = v3_scale(v3_mul(path->throughput, light->emission), weight);
+    pt_vec3 l = v3_scale(v3_mul(path->throughput, path->scene->lights[at->shape->light].emission), weight);
     path->radiance = v3_add(path->radiance, l);
     if (path->trace)
         pt_trace_emission(path->trace, weight, l);
@@ -417,12 +427,19 @@ PT_KERNEL_INLINE int pt_path_vertex(pt_effects fx, struct pt_path *path)
     return !pt_path_at_max_depth(path) && pt_path_bounce(fx, path, &at);
 }
 
+/* Radiance after the film's exposure, held to the largest that a sample may have. */
+PT_KERNEL_INLINE pt_vec3 pt_path_pixel_value(const struct pt_scene *scene, const struct pt_integrator *settings,
+                                             pt_vec3 radiance)
+{
+    pt_vec3 c = v3_scale(radiance, scene->radiance_scale);
+    float peak = v3_max(c), limit = settings->max_component;
+    return peak > limit && isfinite(peak) ? v3_scale(c, limit / peak) : c;
+}
+
 /* The result of a path that is over. */
 PT_KERNEL_INLINE void pt_path_end(const struct pt_path *path)
 {
-    pt_vec3 c = v3_scale(path->radiance, path->scene->radiance_scale);
-    float peak = v3_max(c), limit = path->settings->max_component;
-    path->out->radiance = peak > limit && isfinite(peak) ? v3_scale(c, limit / peak) : c;
+    path->out->radiance = pt_path_pixel_value(path->scene, path->settings, path->radiance);
     path->out->rays = path->rays;
     if (path->trace)
         pt_trace_end(path->trace, path->out->radiance);

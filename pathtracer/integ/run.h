@@ -10,59 +10,12 @@
 #ifndef PT_INTEG_RUN_H
 #define PT_INTEG_RUN_H
 
-#include "integ/path.h"
-
-/* Smaller scenes are in the caches: there is nothing to fetch. */
-#define PT_FETCH_TRIANGLES 10000
-
-static inline const struct pt_mesh *pt_hit_mesh(const struct pt_scene *scene, const struct pt_hit *hit)
-{
-    if (hit->shape < 0 || scene->shapes[hit->shape].kind != PT_SHAPE_MESH)
-        return NULL;
-    return &scene->meshes[scene->shapes[hit->shape].data];
-}
-
-/* The texels of the texture that most hits read first. */
-PT_KERNEL_INLINE void pt_run_fetch_texels(const struct pt_scene *scene, struct pt_path *const *live, int count)
-{
-    for (int i = 0; i < count; i++) {
-        const struct pt_hit *hit = &live[i]->hit;
-        const struct pt_mesh *mesh = pt_hit_mesh(scene, hit);
-        int32_t texture = mesh ? scene->materials[scene->shapes[hit->shape].material].reflectance.texture : 0;
-        if (!texture)
-            continue;
-        struct pt_surface s;
-        pt_place_uv(mesh, pt_mesh_corners(mesh, hit->primitive), hit->u, hit->v, &s);
-        pt_texture_fetch(scene, texture, s.u, s.v);
-    }
-}
-
-/* Indices, then vertices, then texels: where one waits for another, that of all paths was asked for before. */
-PT_KERNEL_INLINE void pt_run_fetch(pt_effects fx, struct pt_path *const *live, int count)
-{
-    const struct pt_scene *scene = live[0]->scene;
-    if (scene->stats.triangles < PT_FETCH_TRIANGLES)
-        return;
-    for (int i = 0; i < count; i++) {
-        const struct pt_mesh *mesh = pt_hit_mesh(scene, &live[i]->hit);
-        if (mesh)
-            __builtin_prefetch(mesh->indices + 3 * (size_t)live[i]->hit.primitive);
-    }
-    for (int i = 0; i < count; i++) {
-        const struct pt_mesh *mesh = pt_hit_mesh(scene, &live[i]->hit);
-        if (!mesh)
-            continue;
-        struct pt_corners k = pt_mesh_corners(mesh, live[i]->hit.primitive);
-        __builtin_prefetch(k.a);
-        __builtin_prefetch(k.b);
-        __builtin_prefetch(k.c);
-    }
-    if (fx & PT_FX_TEXTURE)
-        pt_run_fetch_texels(scene, live, count);
-}
+#include "integ/fetch.h"
+#include "integ/kernel_sets.h"
+#include "integ/run_lanes.h"
 
 /* Where the paths' rays end. Camera rays keep together, those of later vertices do not. */
-PT_KERNEL_INLINE void pt_run_intersect(struct pt_path *const *live, int count, int coherent)
+PT_KERNEL_INLINE void pt_run_intersect(pt_effects fx, struct pt_path *const *live, int count, int coherent)
 {
     const struct pt_ray *rays[PT_RUN];
     struct pt_hit *hits[PT_RUN];
@@ -71,6 +24,7 @@ PT_KERNEL_INLINE void pt_run_intersect(struct pt_path *const *live, int count, i
         hits[i] = &live[i]->hit;
     }
     pt_accel_intersect_many(live[0]->scene, rays, count, coherent, hits);
+    pt_fetch_hits(fx, live[0]->scene, hits, count);
 }
 
 /* Adds to each path what its last vertex planned, if it arrives. */
@@ -132,6 +86,12 @@ PT_KERNEL_INLINE void pt_run_start(pt_effects fx, const struct pt_integrator *se
         pt_path_start(fx, &paths[i], (float)(x + (uint32_t)i) + 0.5f + dx[i], (float)y + 0.5f + dy[i]);
 }
 
+/* Whether pt_run_sample_lanes covers it. */
+PT_KERNEL_INLINE int pt_run_in_lanes(pt_effects fx, const struct pt_integrator *settings)
+{
+    return !(fx & ~(pt_effects)PT_FX_SET_DIFFUSE) && settings->strategy == PT_STRATEGY_MIS && !settings->want_aux;
+}
+
 PT_KERNEL_INLINE void pt_run_sample(pt_effects fx, const struct pt_scene *scene, const struct pt_integrator *settings,
                                     uint32_t x, uint32_t y, int count, uint32_t sample, struct pt_trace *trace,
                                     struct pt_path_result *out)
@@ -150,8 +110,7 @@ PT_KERNEL_INLINE void pt_run_sample(pt_effects fx, const struct pt_scene *scene,
     int n = count;
     for (uint32_t vertex = 1; n > 0; vertex++) {
         uint8_t alive[PT_RUN];
-        pt_run_intersect(live, n, vertex == 1);
-        pt_run_fetch(fx, live, n);
+        pt_run_intersect(fx, live, n, vertex == 1);
         pt_run_numbers(fx, live, n, vertex, &keys, u);
         for (int i = 0; i < n; i++)
             alive[i] = (uint8_t)pt_path_vertex(fx, live[i]);
@@ -171,7 +130,10 @@ PT_KERNEL_INLINE void pt_run_sample(pt_effects fx, const struct pt_scene *scene,
     void pt_kernel_##name(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, \
                           int count, uint32_t sample, struct pt_path_result *out) \
     { \
-        pt_run_sample(set, scene, settings, x, y, count, sample, NULL, out); \
+        if (pt_run_in_lanes(set, settings)) \
+            pt_run_sample_lanes(set, scene, settings, x, y, count, sample, out); \
+        else \
+            pt_run_sample(set, scene, settings, x, y, count, sample, NULL, out); \
     }
 
 #endif

@@ -15,31 +15,35 @@ int pt_light_quadric_sample(const struct pt_scene *scene, const struct pt_emitte
 float pt_light_quadric_pdf(const struct pt_scene *scene, const struct pt_shape *shape, pt_vec3 p_ref, pt_vec3 p, pt_vec3 n,
                            pt_vec3 wi);
 
-static inline int pt_light_triangle_sample(const struct pt_scene *scene, const struct pt_emitter *e, pt_vec3 p_ref, float u0,
-                                           float u1, struct pt_light_sample *out)
+/* Light that a triangle sends to p_ref from the point that (u0, u1) choose, but for its radiance. Without branches: several
+ * are worked out side by side (integ/lanes_body.h). 0: none. */
+static inline int pt_light_triangle_towards(const struct pt_emitter *e, int two_sided, pt_vec3 p_ref, float u0, float u1,
+                                            struct pt_light_sample *out)
 {
-    const struct pt_light *light = &scene->lights[e->light];
     /* Uniform on the triangle: Heitz 2019, "A Low-Distortion Map Between Triangle and Square", without its branch */
     float half = 0.5f * (u0 < u1 ? u0 : u1), b1 = u0 - half, b2 = u1 - half;
     pt_vec3 p = v3_madd(v3_madd(e->p0, b1, e->e1), b2, e->e2), d = v3_sub(p, p_ref);
     float dist2 = v3_dot(d, d), towards = -v3_dot(e->n, d);
-    if (!(towards > 0.0f)) {
-        if (!light->two_sided || !(towards < 0.0f))
-            return 0;
-        towards = -towards;
-    }
+    towards = two_sided ? fabsf(towards) : towards;
     float inv_dist = 1.0f / sqrtf(dist2);
     out->wi = v3_scale(d, inv_dist);
     /* dω = cos dA / dist², cos = towards / dist */
     out->inv_pdf_solid = e->area_over_pmf * towards * inv_dist * (inv_dist * inv_dist);
-    out->radiance = light->emission;
-    out->delta = 0;
-    out->finite = 1;
     pt_vec3 error = v3(PT_OFFSET_ERROR * (fabsf(e->p0.x) + fabsf(e->e1.x) + fabsf(e->e2.x)),
                        PT_OFFSET_ERROR * (fabsf(e->p0.y) + fabsf(e->e1.y) + fabsf(e->e2.y)),
                        PT_OFFSET_ERROR * (fabsf(e->p0.z) + fabsf(e->e1.z) + fabsf(e->e2.z)));
     out->target = pt_offset_point(p, e->n, error, v3_neg(d));
-    return out->inv_pdf_solid > 0.0f;
+    return (towards > 0.0f) & (out->inv_pdf_solid > 0.0f);
+}
+
+static inline int pt_light_triangle_sample(const struct pt_scene *scene, const struct pt_emitter *e, pt_vec3 p_ref, float u0,
+                                           float u1, struct pt_light_sample *out)
+{
+    const struct pt_light *light = &scene->lights[e->light];
+    out->radiance = light->emission;
+    out->delta = 0;
+    out->finite = 1;
+    return pt_light_triangle_towards(e, light->two_sided, p_ref, u0, u1, out);
 }
 
 /* Density with which sampling towards `at` would have chosen the point p (unit geometric normal n) of a shape's

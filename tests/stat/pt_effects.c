@@ -1,4 +1,5 @@
-/* Every scene of ours: the kernel picked for it and the general one give the same bits, with either sampler; a scene without media
+/* Every scene of ours: the kernel picked for it and the general one give the same bits, with either sampler, with
+ * auxiliary planes and without; a scene without media
  * or textures never enters their code. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -44,17 +45,18 @@ static void check_scene(const char *path)
     pt_effects effects = scene->effects;
     pt_kernel *kernel = pt_kernel_select(effects, NULL, &name);
     unsigned long long media = pt_medium_queries, textures = pt_texture_lookups;
-    for (int32_t sampler = 0; sampler < 2; sampler++) {
+    for (int32_t way = 0; way < 4; way++) {
         struct pt_integrator settings = defaults.integrator;
-        settings.sampler = sampler;
-        settings.want_aux = 1;
-        for (uint32_t i = 0; i < SIZE * SIZE * SPP; i++) {
-            struct pt_path_result a, b;
-            kernel(scene, &settings, i % SIZE, i / SIZE % SIZE, 1, i / (SIZE * SIZE), &a);
-            pt_kernel_all(scene, &settings, i % SIZE, i / SIZE % SIZE, 1, i / (SIZE * SIZE), &b);
-            if (!same(&a, &b))
-                fail_msg("%s: kernel %s differs from the general one at pixel %u, %u sample %u", path, name, i % SIZE,
-                         i / SIZE % SIZE, i / (SIZE * SIZE));
+        settings.sampler = way & 1;
+        settings.want_aux = way >> 1;
+        for (uint32_t i = 0; i < SIZE * SPP; i++) {
+            struct pt_path_result a[SIZE], b[SIZE];
+            kernel(scene, &settings, 0, i % SIZE, SIZE, i / SIZE, a);
+            pt_kernel_all(scene, &settings, 0, i % SIZE, SIZE, i / SIZE, b);
+            for (int x = 0; x < SIZE; x++)
+                if (!same(&a[x], &b[x]))
+                    fail_msg("%s: kernel %s differs from the general one at pixel %d, %u sample %u", path, name, x, i % SIZE,
+                             i / SIZE);
         }
     }
     if (!(effects & PT_FX_MEDIA) && pt_medium_queries != media)

@@ -289,6 +289,30 @@ static void compare_many(const struct pt_scene *scene, int count, int coherent, 
     }
 }
 
+static void compare_lanes(const struct pt_scene *scene, int count, int coherent, uint32_t *state)
+{
+    float d[3][48], o[3][48];
+    struct pt_hit hits[RAYS];
+    uint8_t occluded[RAYS];
+    for (int i = 0; i < count; i++) {
+        const pt_vec3 to = v3(4.0f * number(state) - 2.0f, 4.0f * number(state) - 2.0f, 9.0f);
+        d[0][i] = to.x, d[1][i] = to.y, d[2][i] = to.z;
+        o[0][i] = 0.1f, o[1][i] = 0.2f, o[2][i] = -4.0f;
+    }
+    const struct pt_ray_lanes rays = {{o[0], o[1], o[2]}, {d[0], d[1], d[2]}, 0.5f + number(state)};
+    pt_accel_intersect_lanes(scene, &rays, count, coherent, hits);
+    pt_accel_occluded_lanes(scene, &rays, count, occluded);
+    for (int i = 0; i < count; i++) {
+        const struct pt_ray ray = {v3(o[0][i], o[1][i], o[2][i]), v3(d[0][i], d[1][i], d[2][i]), 0.0f, rays.t_max, 0.0f};
+        struct pt_hit one;
+        pt_accel_intersect(scene, &ray, &one);
+        assert_int_equal(one.shape, hits[i].shape);
+        assert_int_equal(pt_accel_occluded(scene, &ray), occluded[i]);
+        if (one.shape >= 0)
+            assert_memory_equal(&one.t, &hits[i].t, sizeof one.t);
+    }
+}
+
 /* Triangles, a quadric and an instance that moves: many rays together meet what each would meet alone. */
 static void many_rays_are_as_single_ones(void **state)
 {
@@ -308,8 +332,10 @@ static void many_rays_are_as_single_ones(void **state)
     test_scene_finish(&scene);
     for (int count = 1; count <= RAYS; count++)
         for (int coherent = 0; coherent < 2; coherent++)
-            for (int round = 0; round < 20; round++)
+            for (int round = 0; round < 20; round++) {
                 compare_many(&scene, count, coherent, &seed);
+                compare_lanes(&scene, count, coherent, &seed);
+            }
     test_scene_end(&scene);
 }
 

@@ -290,7 +290,7 @@ static void hits_are_fetched_in_waves(void **state)
     static const uint32_t twice[2][6] = {{0, 1, 2, 0, 2, 3}, {1, 2, 3, 1, 3, 0}};
     static const float corners[12] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
     struct pt_scene scene;
-    struct pt_path paths[4], *live[4];
+    struct pt_hit hit[4], *hits[4];
     test_scene_begin(&scene);
     int32_t plain = test_add_diffuse(&scene, v3_splat(0.5f)), textured = test_add_diffuse(&scene, v3_splat(0.5f));
     scene.images[scene.image_count++] = (struct pt_image_map){4, 4, 1, PT_PIXEL_FLOAT, 1, texels};
@@ -301,9 +301,8 @@ static void hits_are_fetched_in_waves(void **state)
     int32_t ball = test_add_sphere(&scene, textured, v3(0, 0, 0), 1);
     const int32_t met[4] = {b, -1, ball, a};
     for (int i = 0; i < 4; i++) {
-        live[i] = &paths[i];
-        paths[i].scene = &scene;
-        paths[i].hit = (struct pt_hit){.shape = met[i], .primitive = 1, .u = 0.25f, .v = 0.5f};
+        hits[i] = &hit[i];
+        hit[i] = (struct pt_hit){.shape = met[i], .primitive = 1, .u = 0.25f, .v = 0.5f};
     }
     const struct pt_mesh *first = &scene.meshes[scene.shapes[b].data], *second = &scene.meshes[scene.shapes[a].data];
     /* without texture coordinates u = 0.75, v = 0.5: texel 2.5 across, 1.5 down */
@@ -313,7 +312,7 @@ static void hits_are_fetched_in_waves(void **state)
     for (int k = 0; k < 4; k++) {
         scene.stats.triangles = k == 0 ? PT_FETCH_TRIANGLES - 1 : PT_FETCH_TRIANGLES;
         fetched_count = 0;
-        pt_run_fetch(k == 3 ? PT_FX_ALL & ~PT_FX_TEXTURE : PT_FX_ALL, live + (k == 2), k == 2 ? 2 : 4);
+        pt_fetch_hits(k == 3 ? PT_FX_ALL & ~PT_FX_TEXTURE : PT_FX_ALL, &scene, hits + (k == 2), k == 2 ? 2 : 4);
         assert_int_equal(fetched_count, k == 0 || k == 2 ? 0 : k == 3 ? 8 : 10);
         for (int i = 0; i < fetched_count; i++)
             assert_ptr_equal(fetched[i], expected[i]);
