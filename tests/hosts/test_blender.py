@@ -300,6 +300,7 @@ def test_addon():
         os.mkdir(tmp("frames"))
         assert bpy.ops.lull.render(animation=True) == {"FINISHED"}
         assert {"lull_0001.exr", "lull_0002.exr", "lull_0002-report.json"} <= set(os.listdir(tmp("frames")))
+        assert "2 frames, by 2 pilots: " in scene.lull.state and "spp on average" in scene.lull.state, scene.lull.state
         scene.lull.criterion, scene.lull.parameters = "observer", ""
         assert abs(scene.lull.visible - float(lull.find("observer").parameter("visible").default)) < 1e-6
         assert scene.lull.chosen(scene).parameters == {}  # the criterion's own

@@ -743,6 +743,12 @@ def test_quote():
     f.close()
     f.criterion.close()
     assert len(quote.rows(d)) == 4  # of a render that is over, too
+    own = quote.chosen(d)
+    twice = own._replace(spp=tuple(2 * n for n in own.spp), time_s=own.time_s + 100)
+    assert quote.pilots(24) == [0, 8, 16, 23] and quote.pilots(1) == [0] and quote.pilots(9) == [0, 8]
+    told = quote.shot([(0, own), (2, twice), (4, own._replace(at_most=True))], 5)  # 1, 1.5, 2, 1.5 and 1 times as much
+    assert told == f"5 frames, by 3 pilots: at most {quote.time_text(5 * own.time_s + 200)}, {own.spp[1] * 1.4:,.0f} spp on average", told
+    assert quote.shot([(0, own), (1, None)], 2) == "" == quote.shot([], 0)
     _, _, d = run("fixed", parameters={})
     assert quote.rows(d) == [] and quote.line(d) == "" and "no quality parameter" in quote.table(d)
 

@@ -4,7 +4,7 @@ its setting and at coarser and finer ones, as `lull-render --quote` tells them (
 render's own instance changes."""
 from __future__ import annotations
 
-from typing import Callable, NamedTuple, Optional
+from typing import Callable, NamedTuple, Optional, Sequence
 
 from .criterion import Criterion, load
 from .driver import Driver, Result, Watcher
@@ -104,6 +104,34 @@ def table(driver: Driver) -> str:
         lines.append(f"{r.value:9.4g}  {r.name:8}  {counts}   {'at most ' if r.at_most else ''}{time_text(r.time_s)}"
                      f"{'  <- chosen' if r.chosen else ''}")
     return "\n".join(lines)
+
+
+def chosen(driver: Driver) -> Optional[Row]:
+    """What the frame costs as it is asked for, or None."""
+    return next((r for r in rows(driver) if r.chosen), None)
+
+
+def pilots(frames: int, every: int = 8) -> list[int]:
+    """Which frames of a shot to ask before it is rendered: every so many, and the last."""
+    return sorted({*range(0, frames, every), frames - 1})
+
+
+def shot(costs: Sequence[tuple[int, Optional[Row]]], frames: int) -> str:
+    """One line for a shot whose pilots cost so much, by their places in it, from the first frame to the last; what lies
+    between two costs in between. "" if one is not known."""
+    known = [(at, row) for at, row in costs if row]
+    if not known or len(known) < len(costs):
+        return ""
+    time_s = spp = 0.0
+    for (at, row), (after, other) in zip(known, known[1:]):
+        for frame in range(at, after):
+            share = (frame - at) / (after - at)
+            time_s += (1 - share) * row.time_s + share * other.time_s
+            spp += (1 - share) * row.spp[1] + share * other.spp[1]
+    last = known[-1][1]
+    most = "at most" if any(row.at_most for _, row in known) else "about"
+    return (f"{frames} frames, by {len(known)} pilots: {most} {time_text(time_s + last.time_s)}, "
+            f"{(spp + last.spp[1]) / frames:,.0f} spp on average")
 
 
 def line(driver: Driver) -> str:

@@ -9,7 +9,7 @@ from typing import Optional
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
-from .. import outputs
+from .. import outputs, quote
 from ..criterion import load
 from ..denoising import criterion_of
 from ..driver import Result
@@ -91,10 +91,12 @@ class LULL_OT_render(bpy.types.Operator):
     bl_idname = "lull.render"
     bl_label = "Render Until Noise Is Invisible"
 
-    animation: BoolProperty(name="Animation", default=False, description="The scene's frame range, into numbered files")
+    animation: BoolProperty(name="Animation", default=False, description="The scene's frame range, into numbered files; "
+                            "pilots of some frames say first what all will cost")
 
     _session: Session = None  # type: ignore[assignment] # until the first frame begins
     _timer = None
+    _price = ""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -114,12 +116,15 @@ class LULL_OT_render(bpy.types.Operator):
         except REFUSED as error:
             self.report({"ERROR"}, str(error))
             return False
+        self._count, self._costs = len(self._frames), []
+        self._pilots = quote.pilots(self._count) if self._count > 1 else []
         return self._begin(context)
 
     def _begin(self, context: bpy.types.Context) -> bool:
-        """The next frame."""
+        """The next pilot or frame."""
         scene = context.scene
-        frame, settings = self._frames.pop(0)
+        self._pilot = self._pilots.pop(0) if self._pilots else None
+        frame, settings = self._frames.pop(0) if self._pilot is None else self._frames[self._pilot]
         if frame is not None:
             scene.frame_set(frame)
         try:
@@ -138,6 +143,12 @@ class LULL_OT_render(bpy.types.Operator):
         global _running
         session = self._session
         result = session.step()
+        if self._pilot is not None:
+            context.scene.lull.state = f"What will it cost? Pilot {len(self._costs) + 1}, {len(self._pilots)} more"
+            if result is None and quote.pilot_done(session.driver):
+                result = Result("done")
+            _running = result is None
+            return result
         if session.quote and not self._told:
             self._told = True
             self.report({"INFO"}, session.quote)
@@ -149,7 +160,7 @@ class LULL_OT_render(bpy.types.Operator):
             self._show_at_s = time.monotonic() + max(1.0, 20 * (time.monotonic() - now_s))  # a twentieth of the time
         _running = result is None
         context.scene.lull.state = "\n".join([outputs.progress_text(session.driver).strip(), *session.notes,
-                                              *session.quote.split("; ")])
+                                              *session.quote.split("; "), self._price])
         return result
 
     def _step_or_cancel(self, context: bpy.types.Context) -> Optional[Result]:
@@ -160,8 +171,27 @@ class LULL_OT_render(bpy.types.Operator):
             self.cancel(context)
             raise
 
+    def _end_pilot(self, context: bpy.types.Context, result: Result) -> bool:
+        """Keeps what it says; whether the shot goes on."""
+        session, ended = self._session, result.outcome in ("interrupt", "failed")
+        assert self._pilot is not None
+        if not ended:
+            self._costs.append((self._pilot, quote.chosen(session.driver)))
+        session.__exit__()
+        if ended:
+            context.scene.lull.state = "Stopped before the first frame"
+            if result.exception:
+                self.report({"ERROR"}, f"Rendering failed: {result.exception}")
+        elif not self._pilots:
+            unknown = f"{self._count} frames: the criterion cannot tell what they cost"
+            self._price = quote.shot(self._costs, self._count) or unknown
+            self.report({"INFO"}, self._price)
+        return not ended
+
     def _end(self, context: bpy.types.Context, result: Result) -> bool:
         """Writes the frame; whether there is another one to render."""
+        if self._pilot is not None:
+            return self._end_pilot(context, result)
         session, settings = self._session, context.scene.lull
         session.__exit__()
         written, failed = session.write(result)
@@ -169,7 +199,7 @@ class LULL_OT_render(bpy.types.Operator):
         for name, path in ((shown.PICTURE, session.settings.output), (shown.STOP_MAP, session.settings.stop_map)):
             if path in written:
                 shown.keep(name, path)
-        settings.state = "\n".join([summary(session), *session.notes, *written])
+        settings.state = "\n".join([summary(session), *session.notes, *written, self._price])
         for text in failed:
             self.report({"ERROR"}, text)
         if result.exception:
@@ -179,7 +209,7 @@ class LULL_OT_render(bpy.types.Operator):
         return bool(self._frames) and result.outcome not in ("interrupt", "failed")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """From a script: every frame, before it returns."""
+        """From a script: pilots and every frame, before it returns."""
         more = self._plan(context)
         if not more:
             return {"CANCELLED"}
