@@ -278,6 +278,13 @@ static const char *read_trial(const struct ggn_study *s, const struct ggn_study_
         return "no layout";
     if (validation)
         snprintf(t->layout, sizeof t->layout, "%s", layout->valuestring);
+    const cJSON *times = cJSON_GetObjectItemCaseSensitive(body, "frame_ms");
+    int dropped;
+    if (times && (!cJSON_IsString(times) || strlen(times->valuestring) >= sizeof t->frame_ms))
+        return "no times of frames";
+    snprintf(t->frame_ms, sizeof t->frame_ms, "%s", times ? times->valuestring : "");
+    if (!ggn_study_slot_times(s, &plan->slots[t->slot], t->frame_ms, &dropped))
+        return "no times of frames";
     if (!ggn_study_slot_takes(s, &plan->slots[t->slot], t->level))
         return "no such level";
     now_utc(t->at);

@@ -36,7 +36,7 @@ struct init_options {
     const char *args[1 + GGN_STUDY_MAX_VIEWS]; /* DIR and views */
     int n_args, n_views;
     const char *views[GGN_STUDY_MAX_VIEWS];
-    int task, method, trials, repeats, show_ms, gap_ms, break_every, block;
+    int task, method, trials, repeats, show_ms, gap_ms, fps, break_every, block;
     uint32_t spp_min, spp_max;
     uint64_t seed;
     double catch_share, spacing;
@@ -90,7 +90,9 @@ static const struct base_option init_list[] = {
     {"repeats", 0, "N", TO(repeats), 1, 100,
      .help = "adjustment: settings per block (2); validation: judgements per picture (1)"},
     {"catch", 0, "SHARE", TO(catch_share), 0, 0.5, .help = "2ifc, validation: share of catch trials (0.1)"},
-    {"show", 0, "MS", TO(show_ms), MIN_SHOW_MS, 60000, .help = "2ifc: how long an interval is shown (700)"},
+    {"show", 0, "MS", TO(show_ms), MIN_SHOW_MS, 60000,
+     .help = "2ifc: how long an interval is shown (700; clips: two loops)"},
+    {"fps", 0, "N", TO(fps), 1, GGN_STUDY_MAX_FPS, .help = "2ifc: frames a second of clips (24)"},
     {"gap", 0, "MS", TO(gap_ms), 1, 60000, .help = "the blank between two pictures in the same place (400)"},
     {"break-every", 0, "N", TO(break_every), 0, 100000, .help = "offer a break after so many trials (60; 0: never)"},
     {"spacing", 0, "OCTAVES", TO(spacing), 0.01, 4, .help = "leave out levels that are nearer than that (0.15)"},
@@ -109,6 +111,7 @@ static int options_fit(const struct init_options *o, enum ggn_study_task task, s
         int given, fits;
     } rules[] = {{"trials", o->trials != 0, task == GGN_STUDY_TWO_INTERVAL},
                  {"show", o->show_ms != 0, task == GGN_STUDY_TWO_INTERVAL},
+                 {"fps", o->fps != 0, task == GGN_STUDY_TWO_INTERVAL},
                  {"kinds", o->n_kinds != 0, task == GGN_STUDY_TWO_INTERVAL},
                  {"gap", o->gap_ms != 0, task != GGN_STUDY_ADJUSTMENT},
                  {"catch", o->catch_share >= 0.0, task != GGN_STUDY_ADJUSTMENT},
@@ -145,7 +148,8 @@ static int define(const struct init_options *o, struct ggn_study *study, struct 
     study->seed = o->seed;
     study->trials = o->trials ? o->trials : 30;
     study->catch_share = o->catch_share >= 0.0 ? o->catch_share : 0.1;
-    study->show_ms = o->show_ms ? o->show_ms : 700;
+    study->show_ms = o->show_ms;
+    study->fps = o->fps;
     study->gap_ms = o->gap_ms ? o->gap_ms : 400;
     study->break_every = o->break_every;
     return 0;

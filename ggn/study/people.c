@@ -71,7 +71,10 @@ static int read_choices(const struct ggn_study_people *p, const struct input *in
         double x = s->catch_trial ? GGN_STUDY_PLAIN : log2(in->trials[i].level);
         r->catch_total += s->catch_trial != 0;
         r->catch_passed += s->catch_trial && correct;
-        if (is_fast(p, &in->trials[i]))
+        int dropped;
+        ggn_study_slot_times(p->study, s, in->trials[i].frame_ms, &dropped);
+        r->dropped += dropped > 0;
+        if (is_fast(p, &in->trials[i]) || dropped > 0)
             continue;
         r->choices[r->n_choices] = (struct ggn_study_choice){x, s->side == 0, correct};
         r->choice_cells[r->n_choices++] = p->first[s->view] + s->block;

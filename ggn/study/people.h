@@ -24,6 +24,7 @@ struct ggn_study_result { /* one person */
     int catch_passed, catch_total;
     int untouched, settings;          /* adjustment: settings left where they started, of so many */
     int fast;                         /* answers in less than min_ms: in no estimate */
+    int dropped;                      /* answers to clips with a frame that was never drawn: in no estimate */
     double minutes;                   /* answering; pauses not counted */
     double median_s;                  /* of an answer; NaN without any */
     char last[32];                    /* when the latest was stored: UTC, ISO 8601; empty without any */

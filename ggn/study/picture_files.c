@@ -12,13 +12,13 @@ int ggn_study_picture_path(char *path, const char *dir, int view, const char *na
     return n > 0 && n < 4096 ? 0 : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
 }
 
-int ggn_study_write_block(const char *dir, int view, const struct ggn_study_block *b, const char *what, const uint8_t *rgb,
-                          struct base_err *err)
+int ggn_study_write_block(const char *dir, int view, const struct ggn_study_block *b, const char *what, int frames,
+                          const uint8_t *rgb, struct base_err *err)
 {
     char name[64], path[4096];
     snprintf(name, sizeof name, "b%u-%s", b->id, what);
     int rc = ggn_study_picture_path(path, dir, view, name, err);
-    return !rc ? pic_write_png(path, (int)(b->x1 - b->x0), (int)(b->y1 - b->y0), 3, rgb, err) : rc;
+    return !rc ? pic_write_png(path, (int)(b->x1 - b->x0), frames * (int)(b->y1 - b->y0), 3, rgb, err) : rc;
 }
 
 int ggn_study_takes_level(const struct ggn_study_request_views *q, const struct ggn_study_block *b, double spp)
@@ -52,16 +52,16 @@ int ggn_study_make_heavy(const uint8_t *rgb, size_t n, uint8_t **out, struct bas
     return 0;
 }
 
-int ggn_study_write_reference(const char *dir, int view, const struct ggn_study_block *b, const uint8_t *rgb,
+int ggn_study_write_reference(const char *dir, int view, const struct ggn_study_block *b, int frames, const uint8_t *rgb,
                               struct base_err *err)
 {
     uint8_t *noisy;
-    int rc = ggn_study_write_block(dir, view, b, "reference", rgb, err);
+    int rc = ggn_study_write_block(dir, view, b, "reference", frames, rgb, err);
     if (!rc)
-        rc = ggn_study_make_heavy(rgb, 3 * (size_t)(b->x1 - b->x0) * (b->y1 - b->y0), &noisy, err);
+        rc = ggn_study_make_heavy(rgb, 3 * (size_t)(b->x1 - b->x0) * (b->y1 - b->y0) * (size_t)frames, &noisy, err);
     if (rc)
         return rc;
-    rc = ggn_study_write_block(dir, view, b, "heavy", noisy, err);
+    rc = ggn_study_write_block(dir, view, b, "heavy", frames, noisy, err);
     free(noisy);
     return rc;
 }

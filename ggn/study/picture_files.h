@@ -9,11 +9,11 @@
 
 /* path has room for 4096 bytes. */
 int ggn_study_picture_path(char *path, const char *dir, int view, const char *name, struct base_err *err);
-/* rgb: the block's pixels, 3 codes each. */
-int ggn_study_write_block(const char *dir, int view, const struct ggn_study_block *b, const char *what, const uint8_t *rgb,
-                          struct base_err *err);
+/* rgb: the block's pixels, 3 codes each, those of a clip's frames below each other. */
+int ggn_study_write_block(const char *dir, int view, const struct ggn_study_block *b, const char *what, int frames,
+                          const uint8_t *rgb, struct base_err *err);
 /* What a block is compared with, and what its catch trials show. */
-int ggn_study_write_reference(const char *dir, int view, const struct ggn_study_block *b, const uint8_t *rgb,
+int ggn_study_write_reference(const char *dir, int view, const struct ggn_study_block *b, int frames, const uint8_t *rgb,
                               struct base_err *err);
 /* *out: a copy of rgb[n] (malloc, caller frees) with noise that nobody misses, for catch trials. */
 int ggn_study_make_heavy(const uint8_t *rgb, size_t n, uint8_t **out, struct base_err *err);

@@ -43,6 +43,23 @@ int ggn_study_slot_takes(const struct ggn_study *s, const struct ggn_study_slot 
     return ggn_study_level(&s->views[slot->view].blocks[slot->block], level) >= 0;
 }
 
+int ggn_study_slot_times(const struct ggn_study *s, const struct ggn_study_slot *slot, const char *text, int *dropped)
+{
+    int n = s->views[slot->view].frames > 1 ? 2 * ggn_study_shown_frames(s) : 0;
+    *dropped = 0;
+    for (int i = 0; i < n; i++) {
+        char *end;
+        if (*text < '0' || *text > '9')
+            return 0;
+        long ms = strtol(text, &end, 10);
+        if (ms > GGN_STUDY_MAX_STAND || *end != (i + 1 < n ? ' ' : '\0'))
+            return 0;
+        *dropped += ms == 0;
+        text = *end ? end + 1 : end;
+    }
+    return *text == '\0';
+}
+
 /* Of n trials so many are catch trials: at least one when there are any. */
 static int catch_count(const struct ggn_study *s, int n)
 {

@@ -39,6 +39,11 @@ double ggn_study_plan_minutes(const struct ggn_study *study);
 /* Whether a trial of the slot can have been at that level: 0 in catch trials and validations, else one of its block's. */
 int ggn_study_slot_takes(const struct ggn_study *study, const struct ggn_study_slot *slot, uint32_t level);
 
+/* Whether the text is what the page says of how long each frame of a clip stood in the two intervals: "42 41 0 83 …",
+ * milliseconds, 0 for one that was never drawn because the next was due; *dropped counts those. Of stills the text is
+ * empty. */
+int ggn_study_slot_times(const struct ggn_study *study, const struct ggn_study_slot *slot, const char *text, int *dropped);
+
 /* The seed of the study's n-th person. Below 2^53. */
 uint64_t ggn_study_person_seed(const struct ggn_study *study, uint64_t n);
 

@@ -112,9 +112,12 @@ int ggn_study_prepare(const struct ggn_study_request_views *q, struct ggn_study 
         rc = base_fail_nomem(err, q->dir);
     for (int i = 0; i < n && !rc; i++) {
         s->n_views = i + 1;
+        s->views[i].frames = 1;
         s->views[i].kind = q->n_kinds > 0 ? q->kinds[i % kinds] : GGN_STUDY_AS_IS;
         rc = prepare_view(q, q->views[i / kinds], i, s, threads, err);
     }
+    if (!rc)
+        rc = ggn_study_fit_intervals(s, err);
     if (!rc && ggn_study_plan_count(s) > GGN_STUDY_MAX_TRIALS)
         rc = base_fail(err, BASE_EINVAL, "more than %d trials for one person: take fewer views, trials or repeats",
                        GGN_STUDY_MAX_TRIALS);

@@ -5,7 +5,8 @@
  * also simulated ones up to GGN_SIMULATED_CAP (study/stimuli.h). Without one it holds pictures of one size: `reference.png`
  * (or any extension that is read), and for thresholds one picture per level whose name ends in its samples per pixel
  * (`view-00256.png`), for a validation one picture per condition, named like it. Renders with --denoise give a view of each
- * kind that is asked for.
+ * kind that is asked for. Folders of frames in the place of pictures, reference/0001.exr …, 256/0001.exr …, are a clip: in
+ * DIR the frames of a block lie below each other in one picture, which is fetched and decoded whole before it is shown.
  */
 #ifndef GGN_STUDY_PREPARE_H
 #define GGN_STUDY_PREPARE_H

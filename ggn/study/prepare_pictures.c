@@ -1,9 +1,10 @@
-/* A view from a folder of pictures: reference, and one for each level or condition. */
+/* A view from a folder of pictures: reference, and one for each level or condition; a clip has folders of frames. */
 #include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "base/files.h"
 #include "picture/png.h"
@@ -11,16 +12,34 @@
 #include "study/picture_files.h"
 #include "study/source.h"
 
+enum { MAX_ROWS = 16384 }; /* of the picture of a clip: browsers take so many */
+
 struct picture {
-    char name[256];            /* the file's */
+    char name[256];            /* the file's, or of a clip the folder's */
     char stem[GGN_STUDY_NAME]; /* without its extension */
-    double spp;                /* the digits at the end of the stem; 0 without any */
+    double number;             /* the digits at the end of the stem: samples per pixel, or which frame; -1 without any */
+    int is_clip;
 };
 
-static int by_spp(const void *a, const void *b)
+struct strip { /* a still, or the frames of a clip */
+    int n;
+    struct pic_image *frames; /* owns */
+    double *numbers;          /* owns */
+};
+
+static void release_strip(struct strip *s)
+{
+    for (int i = 0; i < s->n; i++)
+        pic_release(&s->frames[i]);
+    free(s->frames);
+    free(s->numbers);
+    *s = (struct strip){0};
+}
+
+static int by_number(const void *a, const void *b)
 {
     const struct picture *x = a, *y = b;
-    int order = (x->spp > y->spp) - (x->spp < y->spp);
+    int order = (x->number > y->number) - (x->number < y->number);
     return order ? order : strcmp(x->name, y->name);
 }
 
@@ -36,8 +55,10 @@ static int list_pictures(const char *folder, struct picture **pictures, int *n, 
         return rc;
     }
     for (struct dirent *e; (e = readdir(d)) != NULL && count < MAX;) {
-        const char *dot = strrchr(e->d_name, '.');
+        struct stat info;
         struct picture *p = &list[count];
+        p->is_clip = fstatat(dirfd(d), e->d_name, &info, 0) == 0 && S_ISDIR(info.st_mode);
+        const char *dot = p->is_clip ? e->d_name + strlen(e->d_name) : strrchr(e->d_name, '.');
         if (!dot || e->d_name[0] == '.' || (size_t)(dot - e->d_name) >= sizeof p->stem)
             continue;
         snprintf(p->name, sizeof p->name, "%s", e->d_name);
@@ -45,11 +66,11 @@ static int list_pictures(const char *folder, struct picture **pictures, int *n, 
         const char *digits = p->stem + strlen(p->stem);
         while (digits > p->stem && digits[-1] >= '0' && digits[-1] <= '9')
             digits--;
-        p->spp = strtod(*digits ? digits : "0", NULL);
+        p->number = *digits ? strtod(digits, NULL) : -1.0;
         count++;
     }
     closedir(d);
-    qsort(list, (size_t)count, sizeof *list, by_spp);
+    qsort(list, (size_t)count, sizeof *list, by_number);
     *pictures = list;
     *n = count;
     return 0;
@@ -118,35 +139,100 @@ static int read_picture(const char *folder, const char *name, enum ggn_study_kin
     return rc;
 }
 
-/* The picture called reference; its size becomes the view's. */
+/* Frames must follow each other evenly, and be those of the reference (NULL: this is it). */
+static int check_frames(const char *folder, const struct picture *list, int n, const struct strip *reference,
+                        struct base_err *err)
+{
+    if (n < 2 || n > GGN_STUDY_MAX_FRAMES)
+        return base_fail(err, BASE_EINVAL, "%s: %d frames, wanted 2 … %d", folder, n, GGN_STUDY_MAX_FRAMES);
+    for (int i = 0; i < n; i++)
+        if (list[i].is_clip || list[i].number < 0.0)
+            return base_fail(err, BASE_EINVAL, "%s/%s: not a picture whose name ends in the number of its frame", folder,
+                             list[i].name);
+    double step = list[1].number - list[0].number;
+    for (int i = 1; i < n && !reference; i++)
+        if (list[i].number - list[i - 1].number != step || step <= 0.0)
+            return base_fail(err, BASE_EINVAL, "%s: frames are missing between %.0f and %.0f, or one is there twice", folder,
+                             list[i - 1].number, list[i].number);
+    for (int i = 0; reference && i < reference->n; i++)
+        if (i >= n || list[i].number != reference->numbers[i])
+            return base_fail(err, BASE_EINVAL, "%s: no frame %.0f, which the reference has", folder, reference->numbers[i]);
+    if (reference && n > reference->n)
+        return base_fail(err, BASE_EINVAL, "%s: frame %.0f, which the reference does not have", folder,
+                         list[reference->n].number);
+    return 0;
+}
+
+/* The first that is read gives the view its size. */
+static int read_frames(const char *folder, const struct picture *list, int n, enum ggn_study_kind kind,
+                       struct ggn_study_view *view, struct strip *out, struct base_err *err)
+{
+    struct strip s = {.frames = calloc((size_t)n, sizeof *s.frames), .numbers = malloc((size_t)n * sizeof *s.numbers)};
+    int rc = s.frames && s.numbers ? 0 : base_fail_nomem(err, folder);
+    while (!rc && s.n < n) {
+        struct pic_image *image = &s.frames[s.n];
+        rc = read_picture(folder, list[s.n].name, kind, view, image, err);
+        if (rc)
+            break;
+        view->width = (uint32_t)image->width;
+        view->height = (uint32_t)image->height;
+        s.numbers[s.n] = list[s.n].number;
+        s.n++;
+    }
+    if (rc)
+        release_strip(&s);
+    else
+        *out = s;
+    return rc;
+}
+
+static int read_strip(const char *folder, const struct picture *p, enum ggn_study_kind kind, const struct strip *reference,
+                      struct ggn_study_view *view, struct strip *out, struct base_err *err)
+{
+    char path[4096];
+    struct picture *list = NULL;
+    int n = 0;
+    if (!p->is_clip)
+        return read_frames(folder, p, 1, kind, view, out, err);
+    int rc = base_file_join(path, folder, p->name, err);
+    if (!rc)
+        rc = list_pictures(path, &list, &n, err);
+    if (!rc)
+        rc = check_frames(path, list, n, reference, err);
+    if (!rc)
+        rc = read_frames(path, list, n, kind, view, out, err);
+    free(list);
+    return rc;
+}
+
+/* The picture, or the folder of frames, called reference. */
 static int read_reference(const char *folder, const struct picture *list, int n, struct ggn_study_view *view,
-                          struct pic_image *image, struct base_err *err)
+                          struct strip *out, struct base_err *err)
 {
     for (int i = 0; i < n; i++)
         if (strcmp(list[i].stem, "reference") == 0) {
-            int rc = read_picture(folder, list[i].name, GGN_STUDY_AS_IS, view, image, err);
-            view->width = !rc ? (uint32_t)image->width : 0;
-            view->height = !rc ? (uint32_t)image->height : 0;
+            int rc = read_strip(folder, &list[i], GGN_STUDY_AS_IS, NULL, view, out, err);
+            view->frames = !rc ? out->n : 1;
             return rc;
         }
     return base_fail(err, BASE_EINVAL, "%s: neither manifest.json nor a picture called reference in it", folder);
 }
 
-/* The picture cut into blocks; what NULL: it is the reference. */
+/* The pictures cut into blocks, frames below each other; what NULL: it is the reference. */
 static int write_crops(const struct ggn_study_request_views *q, int index, const struct ggn_study_view *view,
-                       const char *what, const struct pic_image *image, struct base_err *err)
+                       const char *what, const struct strip *strip, struct base_err *err)
 {
     int rc = 0;
     for (int i = 0; i < view->n_blocks && !rc; i++) {
         const struct ggn_study_block *b = &view->blocks[i];
-        size_t w = b->x1 - b->x0, h = b->y1 - b->y0;
-        uint8_t *rgb = malloc(3 * w * h);
+        size_t w = b->x1 - b->x0, h = b->y1 - b->y0, frames = (size_t)strip->n;
+        uint8_t *rgb = malloc(3 * w * h * frames);
         if (!rgb)
             return base_fail_nomem(err, view->name);
-        for (size_t y = 0; y < h; y++)
-            memcpy(rgb + 3 * w * y, image->u8 + 3 * ((b->y0 + y) * view->width + b->x0), 3 * w);
-        rc = what ? ggn_study_write_block(q->dir, index, b, what, rgb, err)
-                  : ggn_study_write_reference(q->dir, index, b, rgb, err);
+        for (size_t y = 0; y < h * frames; y++)
+            memcpy(rgb + 3 * w * y, strip->frames[y / h].u8 + 3 * ((b->y0 + y % h) * view->width + b->x0), 3 * w);
+        rc = what ? ggn_study_write_block(q->dir, index, b, what, strip->n, rgb, err)
+                  : ggn_study_write_reference(q->dir, index, b, strip->n, rgb, err);
         free(rgb);
     }
     return rc;
@@ -159,6 +245,11 @@ static int cut_blocks(const struct ggn_study_request_views *q, const struct ggn_
     if ((uint64_t)columns * rows > GGN_STUDY_MAX_BLOCKS)
         return base_fail(err, BASE_EINVAL, "%s: %u blocks of %u pixels; --block makes them larger", view->name,
                          columns * rows, size);
+    if (view->frames > 1 && (uint32_t)view->frames * (size < view->height ? size : view->height) > MAX_ROWS)
+        return base_fail(err, BASE_EINVAL,
+                         "%s: %d frames of blocks of %u pixels, wanted at most %d rows in all; --block makes "
+                         "them smaller",
+                         view->name, view->frames, size, MAX_ROWS);
     view->blocks = calloc((size_t)columns * rows, sizeof *view->blocks);
     if (!view->blocks)
         return base_fail_nomem(err, view->name);
@@ -180,28 +271,28 @@ static int cut_blocks(const struct ggn_study_request_views *q, const struct ggn_
 }
 
 static int prepare_levels(const struct ggn_study_request_views *q, const struct ggn_study_source *source, int index,
-                          const struct picture *list, int n, const struct pic_image *reference, struct ggn_study_view *view,
+                          const struct picture *list, int n, const struct strip *reference, struct ggn_study_view *view,
                           struct base_err *err)
 {
     char what[32];
-    const char *folder = source->folder;
     int rc = cut_blocks(q, source, view, n, err);
     if (!rc)
         rc = write_crops(q, index, view, NULL, reference, err);
     for (int i = 0; i < n && !rc; i++) {
-        struct pic_image image;
-        if (list[i].spp < 1.0 || !ggn_study_takes_level(q, &view->blocks[0], list[i].spp))
+        struct strip strip = {0};
+        if (list[i].number < 1.0 || list[i].is_clip != (view->frames > 1) ||
+            !ggn_study_takes_level(q, &view->blocks[0], list[i].number))
             continue;
-        rc = read_picture(folder, list[i].name, view->kind, view, &image, err);
+        rc = read_strip(source->folder, &list[i], view->kind, reference, view, &strip, err);
         if (rc)
             break;
-        snprintf(what, sizeof what, "%.0f", list[i].spp);
-        rc = write_crops(q, index, view, what, &image, err);
-        pic_release(&image);
+        snprintf(what, sizeof what, "%.0f", list[i].number);
+        rc = write_crops(q, index, view, what, &strip, err);
+        release_strip(&strip);
         for (int b = 0; b < view->n_blocks; b++)
-            view->blocks[b].levels[view->blocks[b].n_levels++] = (uint32_t)list[i].spp;
+            view->blocks[b].levels[view->blocks[b].n_levels++] = (uint32_t)list[i].number;
     }
-    return !rc ? ggn_study_enough_levels(folder, &view->blocks[0], err) : rc;
+    return !rc ? ggn_study_enough_levels(source->folder, &view->blocks[0], err) : rc;
 }
 
 /* The first view says which conditions there are, the others must have the same. */
@@ -241,7 +332,7 @@ static int prepare_conditions(const struct ggn_study_request_views *q, const cha
     free(noisy);
     for (int i = 0; i < n && !rc; i++) {
         struct pic_image image;
-        if (strcmp(list[i].stem, "reference") == 0 || strcmp(list[i].stem, "heavy") == 0)
+        if (strcmp(list[i].stem, "reference") == 0 || strcmp(list[i].stem, "heavy") == 0 || list[i].is_clip)
             continue;
         rc = know_condition(s, index, list[i].stem, folder, err);
         if (!rc)
@@ -264,17 +355,20 @@ int ggn_study_prepare_pictures(const struct ggn_study_request_views *q, const st
                                struct ggn_study *s, struct base_err *err)
 {
     struct picture *list = NULL;
-    struct pic_image reference;
+    struct strip reference = {0};
     struct ggn_study_view *view = &s->views[index];
     int n = 0, rc = list_pictures(source->folder, &list, &n, err);
     if (rc)
         return rc;
     rc = read_reference(source->folder, list, n, view, &reference, err);
-    if (!rc) {
-        rc = s->task == GGN_STUDY_VALIDATION ? prepare_conditions(q, source->folder, index, list, n, &reference, s, err)
-                                             : prepare_levels(q, source, index, list, n, &reference, view, err);
-        pic_release(&reference);
-    }
+    if (!rc && view->frames > 1 && s->task != GGN_STUDY_TWO_INTERVAL)
+        rc = base_fail(err, BASE_EINVAL, "%s: clips are shown in two intervals: --task thresholds --method 2ifc",
+                       source->folder);
+    else if (!rc && s->task == GGN_STUDY_VALIDATION)
+        rc = prepare_conditions(q, source->folder, index, list, n, &reference.frames[0], s, err);
+    else if (!rc)
+        rc = prepare_levels(q, source, index, list, n, &reference, view, err);
+    release_strip(&reference);
     free(list);
     return rc;
 }

@@ -23,7 +23,7 @@ static int make_levels(const struct work *w, struct ggn_study_block *b, struct g
                        struct base_err *err)
 {
     char what[32];
-    int rc = ggn_study_write_reference(w->request->dir, w->view, b, s->converged, err);
+    int rc = ggn_study_write_reference(w->request->dir, w->view, b, 1, s->converged, err);
     b->levels = malloc((size_t)s->n * sizeof *b->levels);
     if (!b->levels)
         return base_fail_nomem(err, w->folder);
@@ -34,7 +34,7 @@ static int make_levels(const struct work *w, struct ggn_study_block *b, struct g
         rc = ggn_stimuli_make(s, i, rgb, err);
         snprintf(what, sizeof what, "%.0f", spp);
         if (!rc)
-            rc = ggn_study_write_block(w->request->dir, w->view, b, what, rgb, err);
+            rc = ggn_study_write_block(w->request->dir, w->view, b, what, 1, rgb, err);
         b->levels[b->n_levels++] = (uint32_t)spp;
     }
     return !rc ? ggn_study_enough_levels(w->folder, b, err) : rc;

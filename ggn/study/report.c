@@ -29,11 +29,11 @@ static int write_people(const char *dir, const struct ggn_study_people *p, struc
     int rc = begin(&out, dir, "people.csv", err);
     if (rc)
         return rc;
-    fputs("person;done;of;catch_passed;catch_total;untouched;settings;minutes;median_s;fast;excluded\n", out.file);
+    fputs("person;done;of;catch_passed;catch_total;untouched;settings;minutes;median_s;fast;dropped;excluded\n", out.file);
     for (int i = 0; i < p->n; i++) {
         const struct ggn_study_result *r = &p->results[i];
-        fprintf(out.file, "%s;%d;%d;%d;%d;%d;%d;%.2f;%.3f;%d;%s\n", r->id, r->done, r->of, r->catch_passed, r->catch_total,
-                r->untouched, r->settings, r->minutes, r->median_s, r->fast, r->excluded);
+        fprintf(out.file, "%s;%d;%d;%d;%d;%d;%d;%.2f;%.3f;%d;%d;%s\n", r->id, r->done, r->of, r->catch_passed,
+                r->catch_total, r->untouched, r->settings, r->minutes, r->median_s, r->fast, r->dropped, r->excluded);
     }
     return base_file_commit(&out, err);
 }
@@ -257,6 +257,15 @@ static int fast_answers(const struct ggn_study_people *p)
     return n;
 }
 
+/* Answers to clips of which a frame was never drawn. */
+static int dropped_answers(const struct ggn_study_people *p)
+{
+    int n = 0;
+    for (int i = 0; i < p->n; i++)
+        n += p->results[i].dropped;
+    return n;
+}
+
 static void add_head(cJSON *root, const struct ggn_study_people *p, int *failed)
 {
     base_json_text(root, "format", "lull-study-report", failed);
@@ -270,6 +279,8 @@ static void add_head(cJSON *root, const struct ggn_study_people *p, int *failed)
     base_json_number(root, "min_ms", p->study->min_ms, failed);
     base_json_number(root, "max_fast", p->study->max_fast, failed);
     base_json_number(root, "fast_answers", fast_answers(p), failed);
+    if (p->study->fps)
+        base_json_number(root, "dropped_answers", dropped_answers(p), failed);
     cJSON *list = base_json_array(root, "excluded", failed);
     for (int i = 0; i < p->n; i++)
         if (p->results[i].excluded[0] != '\0') {
@@ -354,6 +365,8 @@ static void print_figures(const struct ggn_study_people *p, const struct ggn_stu
             printf("  %s does not count: %s\n", p->results[i].id, p->results[i].excluded);
     if (fast_answers(p) > 0)
         printf("%d answers in less than %g ms are left out\n", fast_answers(p), p->study->min_ms);
+    if (dropped_answers(p) > 0)
+        printf("%d answers to clips with a frame that the screen never showed are left out\n", dropped_answers(p));
     if (p->study->task == GGN_STUDY_VALIDATION) {
         puts("judged the same as the reference, with 95 % intervals (Wilson):");
         print_scenes(stdout, p, "\t");

@@ -5,13 +5,15 @@
 
 static void print_person(FILE *out, const struct ggn_study_result *r)
 {
-    char done[32], passed[32], median[32] = "-";
+    char done[32], passed[32], median[32] = "-", dropped[64] = "";
     snprintf(done, sizeof done, "%d/%d", r->done, r->of);
     snprintf(passed, sizeof passed, "%d/%d", r->catch_passed, r->catch_total);
     if (!isnan(r->median_s))
         snprintf(median, sizeof median, "%.1f", r->median_s);
-    fprintf(out, "%-8s  %10s  %7s  %8s  %4d  %7.1f  %s%s%s\n", r->id, done, passed, median, r->fast, r->minutes,
-            *r->last ? r->last : "-", *r->excluded ? "  does not count: " : "", r->excluded);
+    if (r->dropped > 0)
+        snprintf(dropped, sizeof dropped, "  %d with frames that were never shown", r->dropped);
+    fprintf(out, "%-8s  %10s  %7s  %8s  %4d  %7.1f  %s%s%s%s\n", r->id, done, passed, median, r->fast, r->minutes,
+            *r->last ? r->last : "-", dropped, *r->excluded ? "  does not count: " : "", r->excluded);
 }
 
 void ggn_study_status(FILE *out, const struct ggn_study_people *p)

@@ -26,7 +26,8 @@ static const char schema[] =
     "CREATE TABLE IF NOT EXISTS trial (person INTEGER NOT NULL REFERENCES person(row) ON DELETE CASCADE, slot INTEGER NOT "
     "NULL,"
     " revision INTEGER NOT NULL, level INTEGER NOT NULL, answer INTEGER NOT NULL, rating INTEGER NOT NULL, ms REAL NOT NULL,"
-    " layout TEXT NOT NULL, at TEXT NOT NULL, PRIMARY KEY (person, slot, revision)) WITHOUT ROWID;";
+    " layout TEXT NOT NULL, at TEXT NOT NULL, frame_ms TEXT NOT NULL DEFAULT '', PRIMARY KEY (person, slot, revision)) "
+    "WITHOUT ROWID;";
 
 static int fail_sql(struct ggn_study_store *s, struct base_err *err)
 {
@@ -79,6 +80,14 @@ static int query_number(struct ggn_study_store *s, const char *sql, int64_t row,
     return rc < 0 ? rc : 0;
 }
 
+/* Files from before there were clips. */
+static int add_times(struct ggn_study_store *s, struct base_err *err)
+{
+    int64_t there = 0;
+    int rc = query_number(s, "SELECT COUNT(*) FROM pragma_table_info('trial') WHERE name = 'frame_ms'", 0, 0, &there, err);
+    return !rc && !there ? run(s, "ALTER TABLE trial ADD COLUMN frame_ms TEXT NOT NULL DEFAULT ''", err) : rc;
+}
+
 /* The file belongs to one study for ever. */
 static int claim(struct ggn_study_store *s, const char *study_id, struct base_err *err)
 {
@@ -125,6 +134,8 @@ int ggn_study_store_open(const char *dir, const char *study_id, int create, stru
                  err);
     if (!rc)
         rc = run(s, schema, err);
+    if (!rc)
+        rc = add_times(s, err);
     if (!rc)
         rc = claim(s, study_id, err);
     if (rc) {
@@ -310,9 +321,10 @@ static void get_trial(sqlite3_stmt *st, struct ggn_study_trial *t)
                                   .ms = sqlite3_column_double(st, 5)};
     copy_text(st, 6, t->layout, sizeof t->layout);
     copy_text(st, 7, t->at, sizeof t->at);
+    copy_text(st, 8, t->frame_ms, sizeof t->frame_ms);
 }
 
-#define TRIAL_COLUMNS "slot, revision, level, answer, rating, ms, layout, at"
+#define TRIAL_COLUMNS "slot, revision, level, answer, rating, ms, layout, at, frame_ms"
 
 /* The trial of a slot and revision. 1 there, 0 not, negative on an error. */
 static int find_trial(struct ggn_study_store *s, int64_t row, int slot, int revision, struct ggn_study_trial *t,
@@ -341,10 +353,11 @@ int ggn_study_store_add_trial(struct ggn_study_store *s, int64_t row, const stru
         return rc;
     if (rc == 1) {
         int same = old.level == t->level && old.answer == t->answer && old.rating == t->rating && old.ms == t->ms &&
-                   strcmp(old.layout, t->layout) == 0;
+                   strcmp(old.layout, t->layout) == 0 && strcmp(old.frame_ms, t->frame_ms) == 0;
         return same ? 0 : base_fail(err, BASE_EINVAL, "trial %d is done already, with another answer", t->slot);
     }
-    rc = prepare(s, "INSERT INTO trial (person, " TRIAL_COLUMNS ") VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)", &st, err);
+    rc = prepare(s, "INSERT INTO trial (person, " TRIAL_COLUMNS ") VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)", &st,
+                 err);
     if (rc)
         return rc;
     sqlite3_bind_int64(st, 1, row);
@@ -356,6 +369,7 @@ int ggn_study_store_add_trial(struct ggn_study_store *s, int64_t row, const stru
     sqlite3_bind_double(st, 7, t->ms);
     bind_text(st, 8, t->layout);
     bind_text(st, 9, t->at);
+    bind_text(st, 10, t->frame_ms);
     rc = step(s, st, err);
     sqlite3_finalize(st);
     return rc < 0 ? rc : 1;

@@ -17,7 +17,8 @@ enum {
     GGN_STUDY_KEY = 33, /* 32 hex digits: whoever has the key is the person */
     GGN_STUDY_ID = 9,   /* 8 hex digits: names the person in reports and exports */
     GGN_STUDY_PROFILE_MAX = 16384,
-    GGN_STUDY_MAX_PEOPLE = 100000
+    GGN_STUDY_MAX_PEOPLE = 100000,
+    GGN_STUDY_TIMES = 608 /* bytes of the times of a clip's frames: two intervals of 60 numbers of 4 digits */
 };
 
 struct ggn_study_store; /* owns the connection */
@@ -31,12 +32,13 @@ struct ggn_study_person {
 
 struct ggn_study_trial {
     int slot, revision;
-    uint32_t level;  /* samples per pixel shown or set; 0 in catch trials and validations */
-    int answer;      /* 2ifc: the interval said to be noisy, 1 or 2; validation: 1 same, 0 different */
-    int rating;      /* validation: 1 very disturbing … 5 no difference */
-    double ms;       /* from what was shown to the answer, by the page's clock */
-    char layout[16]; /* validation: "beside" or "flip" */
-    char at[32];     /* when it was stored: UTC, ISO 8601 */
+    uint32_t level;                 /* samples per pixel shown or set; 0 in catch trials and validations */
+    int answer;                     /* 2ifc: the interval said to be noisy, 1 or 2; validation: 1 same, 0 different */
+    int rating;                     /* validation: 1 very disturbing … 5 no difference */
+    double ms;                      /* from what was shown to the answer, by the page's clock */
+    char layout[16];                /* validation: "beside" or "flip" */
+    char frame_ms[GGN_STUDY_TIMES]; /* clips: how long each frame stood (study/plan.h); else empty */
+    char at[32];                    /* when it was stored: UTC, ISO 8601 */
 };
 
 /* Opens DIR/study.db, made when missing; `study_id` must be that of the study it was made for. create 0: must exist already.

@@ -67,6 +67,29 @@ int ggn_study_same_scene(const struct ggn_study_view *a, const struct ggn_study_
     return n == scene_length(b) && strncmp(a->name, b->name, n) == 0;
 }
 
+int ggn_study_shown_frames(const struct ggn_study *s) { return (int)ceil(s->show_ms * s->fps / 1000.0 - 1e-9); }
+
+int ggn_study_fit_intervals(struct ggn_study *s, struct base_err *err)
+{
+    enum { STILL_MS = 700, FPS = 24, LOOPS = 2 };
+    int longest = 1;
+    for (int v = 0; v < s->n_views; v++)
+        longest = s->views[v].frames > longest ? s->views[v].frames : longest;
+    if (longest == 1) {
+        if (s->fps)
+            return base_fail(err, BASE_EINVAL, "--fps does nothing: no view is a clip");
+        s->show_ms = s->show_ms ? s->show_ms : STILL_MS;
+        return 0;
+    }
+    s->fps = s->fps ? s->fps : FPS;
+    s->show_ms = s->show_ms ? s->show_ms : (LOOPS * longest * 1000 + s->fps - 1) / s->fps;
+    int shown = ggn_study_shown_frames(s);
+    if (shown < longest || shown > GGN_STUDY_MAX_SHOWN)
+        return base_fail(err, BASE_EINVAL, "%d ms are %d frames at %d a second, wanted %d (one loop) to %d: change --show",
+                         s->show_ms, shown, s->fps, longest, GGN_STUDY_MAX_SHOWN);
+    return 0;
+}
+
 int ggn_study_find_view(const struct ggn_study *study, const char *name)
 {
     for (int i = 0; i < study->n_views; i++)
@@ -172,6 +195,16 @@ static int read_kind(const struct reader *r, const cJSON *o, enum ggn_study_task
                      r->path, view->name);
 }
 
+static int read_frames(const struct reader *r, const cJSON *o, enum ggn_study_task task, struct ggn_study_view *view)
+{
+    view->frames = 1;
+    if (!cJSON_HasObjectItem(o, "frames"))
+        return 0;
+    if (task != GGN_STUDY_TWO_INTERVAL)
+        return base_fail(r->err, BASE_EINVAL, "%s: only two intervals show clips, as %s is one", r->path, view->name);
+    return whole(r, o, "frames", 2, GGN_STUDY_MAX_FRAMES, &view->frames);
+}
+
 static int read_view(const struct reader *r, const cJSON *o, enum ggn_study_task task, struct ggn_study_view *view)
 {
     int rc = plain_name(r, cJSON_GetObjectItemCaseSensitive(o, "name"), view->name);
@@ -181,6 +214,8 @@ static int read_view(const struct reader *r, const cJSON *o, enum ggn_study_task
         rc = pixels(r, o, "height", 1, &view->height);
     if (!rc)
         rc = read_kind(r, o, task, view);
+    if (!rc)
+        rc = read_frames(r, o, task, view);
     if (rc || task == GGN_STUDY_VALIDATION)
         return rc;
     const cJSON *blocks = list(r, o, "blocks", GGN_STUDY_MAX_BLOCKS), *block;
@@ -268,7 +303,9 @@ static int read_later_members(const struct reader *r, const cJSON *root, struct 
     char *const into[2] = {s->asked_by, s->contact};
     int rc = 0;
     s->max_fast = 1.0;
-    if (cJSON_HasObjectItem(root, "min_ms"))
+    if (cJSON_HasObjectItem(root, "fps"))
+        rc = whole(r, root, "fps", 1, GGN_STUDY_MAX_FPS, &s->fps);
+    if (!rc && cJSON_HasObjectItem(root, "min_ms"))
         rc = number(r, root, "min_ms", 0, 60000, 0, &s->min_ms);
     if (!rc && cJSON_HasObjectItem(root, "max_fast"))
         rc = number(r, root, "max_fast", 0, 1, 0, &s->max_fast);
@@ -317,6 +354,8 @@ int ggn_study_parse(const char *path, const char *text, size_t size, struct ggn_
         rc = read_later_members(&r, root, &s);
     if (!rc)
         rc = read_views(&r, root, &s);
+    if (!rc)
+        rc = ggn_study_fit_intervals(&s, err);
     if (!rc && s.task == GGN_STUDY_VALIDATION)
         rc = read_conditions(&r, root, &s);
     cJSON_Delete(root);
@@ -350,6 +389,8 @@ static void add_view(cJSON *views, const struct ggn_study *s, const struct ggn_s
     base_json_number(o, "height", v->height, failed);
     if (v->kind)
         base_json_text(o, "kind", ggn_study_kind_names[v->kind], failed);
+    if (v->frames > 1)
+        base_json_number(o, "frames", v->frames, failed);
     if (s->task != GGN_STUDY_VALIDATION)
         blocks = base_json_array(o, "blocks", failed);
     for (int i = 0; i < v->n_blocks; i++) {
@@ -380,6 +421,8 @@ char *ggn_study_print(const struct ggn_study *s)
     base_json_number(root, "catch_share", s->catch_share, &failed);
     base_json_number(root, "show_ms", s->show_ms, &failed);
     base_json_number(root, "gap_ms", s->gap_ms, &failed);
+    if (s->fps)
+        base_json_number(root, "fps", s->fps, &failed);
     base_json_number(root, "break_every", s->break_every, &failed);
     base_json_number(root, "min_catch_passed", s->min_catch_passed, &failed);
     base_json_number(root, "max_untouched", s->max_untouched, &failed);

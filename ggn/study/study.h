@@ -20,7 +20,11 @@ enum {
     GGN_STUDY_MAX_BLOCKS = 4096, /* of one view */
     GGN_STUDY_MAX_LEVELS = 1024, /* of one block */
     GGN_STUDY_MAX_CONDITIONS = 64,
-    GGN_STUDY_MAX_TRIALS = 200000 /* of one person */
+    GGN_STUDY_MAX_TRIALS = 200000, /* of one person */
+    GGN_STUDY_MAX_FRAMES = 60,     /* of a clip */
+    GGN_STUDY_MAX_SHOWN = 60,      /* frames in an interval, repeated loops counted */
+    GGN_STUDY_MAX_FPS = 120,
+    GGN_STUDY_MAX_STAND = 9999 /* ms that a frame of a clip stood; the page says no more */
 };
 
 enum ggn_study_task {
@@ -47,6 +51,7 @@ struct ggn_study_view {
     char name[GGN_STUDY_NAME];      /* with a kind SCENE.KIND: no reader of thresholds takes one kind for another */
     enum ggn_study_kind kind;       /* thresholds in two intervals only */
     uint32_t width, height;         /* pixels */
+    int frames;                     /* 1: stills; more: clips, two intervals only */
     int n_blocks;                   /* 0 in a validation */
     struct ggn_study_block *blocks; /* owns; ids strictly rising */
 };
@@ -59,6 +64,7 @@ struct ggn_study {
     int repeats;   /* settings per block (adjustment), judgements per picture (validation) */
     double catch_share;
     int show_ms, gap_ms;                                    /* two-interval: each interval, and the blank between them */
+    int fps;                                                /* of clips, frames a second; 0: there are none */
     int break_every;                                        /* trials between offered breaks; 0: none */
     double min_catch_passed, max_untouched;                 /* exclusion rules, shares: see FORMAT.md */
     double min_ms;                                          /* an answer in less time is left out: too fast to have looked */
@@ -92,6 +98,11 @@ int ggn_study_plain_name(const char *name);
 int ggn_study_plain_line(const char *text);
 /* Index of a level in the block, or -1. */
 int ggn_study_level(const struct ggn_study_block *block, uint32_t spp);
+/* How many frames of a clip an interval shows, those of repeated loops counted; 0 without clips. */
+int ggn_study_shown_frames(const struct ggn_study *study);
+/* Fills in show_ms and fps where they are 0: 700 ms of stills, two loops of clips at 24 frames a second. BASE_EINVAL: fps
+ * without a clip, clips in another task, an interval shorter than a loop or of more than GGN_STUDY_MAX_SHOWN frames. */
+int ggn_study_fit_intervals(struct ggn_study *study, struct base_err *err);
 /* Whether two views show the same pictures, but for their kind. */
 int ggn_study_same_scene(const struct ggn_study_view *a, const struct ggn_study_view *b);
 /* Index of a view by name, or -1. */

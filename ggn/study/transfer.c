@@ -48,6 +48,8 @@ static void add_trials(cJSON *list, const struct ggn_study *s, const struct ggn_
         base_json_number(o, "ms", t->ms, failed);
         base_json_text(o, "layout", t->layout, failed);
         base_json_text(o, "at", t->at, failed);
+        if (*t->frame_ms)
+            base_json_text(o, "frame_ms", t->frame_ms, failed);
         if (t->slot < plan->n)
             add_meaning(o, s, &plan->slots[t->slot], t, failed);
     }
@@ -123,11 +125,13 @@ static int get_text(const cJSON *o, const char *name, char *out, size_t room)
 static int read_trial(const struct reader *r, const cJSON *o, const struct ggn_study_plan *plan, struct ggn_study_trial *t)
 {
     double slot, revision, level, answer, rating, ms;
+    int dropped;
     *t = (struct ggn_study_trial){0};
     if (!base_json_get_whole(o, "slot", 0, plan->n - 1, &slot) || !base_json_get_whole(o, "revision", 0, 1000, &revision) ||
         !base_json_get_whole(o, "level", 0, 1e9, &level) || !base_json_get_whole(o, "answer", 0, 2, &answer) ||
         !base_json_get_whole(o, "rating", 0, 5, &rating) || !base_json_get(o, "ms", 0, 86400000, &ms) ||
-        !get_text(o, "layout", t->layout, sizeof t->layout) || !get_text(o, "at", t->at, sizeof t->at))
+        !get_text(o, "layout", t->layout, sizeof t->layout) || !get_text(o, "at", t->at, sizeof t->at) ||
+        (cJSON_HasObjectItem(o, "frame_ms") && !get_text(o, "frame_ms", t->frame_ms, sizeof t->frame_ms)))
         return 0;
     t->slot = (int)slot;
     t->revision = (int)revision;
@@ -135,7 +139,8 @@ static int read_trial(const struct reader *r, const cJSON *o, const struct ggn_s
     t->answer = (int)answer;
     t->rating = (int)rating;
     t->ms = ms;
-    return ggn_study_slot_takes(r->study, &plan->slots[t->slot], t->level);
+    return ggn_study_slot_takes(r->study, &plan->slots[t->slot], t->level) &&
+           ggn_study_slot_times(r->study, &plan->slots[t->slot], t->frame_ms, &dropped);
 }
 
 static int import_trials(const struct reader *r, const cJSON *list, const struct ggn_study_person *p)

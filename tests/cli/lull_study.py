@@ -373,26 +373,7 @@ fails(
     "--spp-min",
     "200",
 )
-for kinds in ("grain", "noisy,noisy", "noisy,", "denoisedx"):
-    refuses("kinds " + kinds, "--kinds " + kinds + ": expected some of noisy,denoised,blend", *intervals, "--kinds", kinds)
-refuses("kinds of settings", "--kinds does nothing in this task (adjustment)", "--task", "thresholds", "--views", levels, "--kinds", "noisy")
-none = ["init", os.path.join(TMP.name, "none"), *intervals[:-1]]
-for kind, channel in (("denoised", "denoised.R"), ("blend", "lull.weight.V")):
-    fails(f"init: {kind} of what was not denoised", f"has no channel '{channel}' (--kinds shows renders", *none, levels, "--kinds", kind)
-for blocks, missing in (("2", 2), ("0-2", 2), ("3,0", 3)):
-    fails("init: blocks " + blocks, f"levels: has no block {missing}", *none, levels + ":" + blocks)
-for word in ("", "1,,2", "1-", "-1"):
-    fails(f"init: a folder that ends in :{word}", f"levels:{word}: ", *none, levels + ":" + word)
-fails("init: blocks of a validation", "shows whole pictures, not blocks", *none[:2], "--task", "validation", "--views", levels + ":0")
 check(not os.path.exists(os.path.join(TMP.name, "none", "study.json")), "init: what failed looks like no study")
-picked = os.path.join(TMP.name, "picked")
-r = lull_study("init", picked, *intervals[:-1], levels + "/:1")
-blocks = json.load(open(os.path.join(picked, "study.json")))["views"][0]["blocks"]
-check(
-    r.returncode == 0 and [b["id"] for b in blocks] == [1] and not os.path.exists(os.path.join(picked, "stimuli", "v0", "b0-64.png")),
-    "init: only the blocks that are named",
-    r.stderr,
-)
 other = view("other", ["reference", "lull"], 20, 20)
 fails(
     "init: sizes differ",

@@ -82,5 +82,24 @@ fails "label: takes no kind for the sequence of the scene" "room" "$ggn" label "
 [ ! -e "$tmp/data/room/labels.json" ]; check "  …and writes nothing" $?
 "$ggn" label "$tmp/data/room" --human "$tmp/study/report/thresholds.csv" --view room.noisy >"$tmp/out" 2>"$tmp/err"
 check "label: the noisy one when it is named" $?
+
+# The lines of docs/shots.md: the same room in motion.
+printf 'frame;eye;at;up;fov\n1;0 1 3.4;0 1 0;0 1 0;45\n2;0.1 1 3.4;0 1 0;0 1 0;\n' >"$tmp/path.csv"
+for spp in 16 32 64; do
+    mkdir -p "$tmp/clips/room/$spp"
+    $render --camera-path "$tmp/path.csv" --spp $spp --denoise -o "$tmp/clips/room/$spp/%04d.exr" >"$tmp/out" 2>"$tmp/err"
+    check "render a shot with $spp samples" $?
+done
+mkdir "$tmp/clips/room/reference"
+$render --camera-path "$tmp/path.csv" --spp 128 --seed 2 -o "$tmp/clips/room/reference/%04d.exr" >"$tmp/out" 2>"$tmp/err"
+"$bin/lull-study" init "$tmp/moving" $asked --views "$tmp/clips/room" "$tmp/views/room:0" --kinds noisy,blend >"$tmp/out" 2>"$tmp/err"
+[ $? -eq 2 ] && grep -q "a name of its own" "$tmp/err"; check "init: two views of one name" $?
+mv "$tmp/clips/room" "$tmp/clips/walk" && rm -r "$tmp/moving"
+"$bin/lull-study" init "$tmp/moving" $asked --views "$tmp/clips/walk" "$tmp/views/room:0" --kinds noisy,blend --fps 2 >"$tmp/out" 2>"$tmp/err" &&
+    [ "$(grep -c '"frames":.2' "$tmp/moving/study.json")" -eq 2 ] && grep -q "4 views, 180 trials for each person, some 18 min" "$tmp/out"
+check "init: kinds of a shot, and stills" $?
+! cmp -s "$tmp/moving/stimuli/v0/b0-64.png" "$tmp/moving/stimuli/v1/b0-64.png" &&
+    [ "$(iinfo "$tmp/moving/stimuli/v0/b0-64.png" | grep -c '32 x *64')" -eq 1 ]
+check "  …of two frames each" $?
 echo "1..$n"
 exit $bad

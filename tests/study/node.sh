@@ -10,6 +10,13 @@ need() { # need COMMAND PACKAGE
     fi
     command -v "$1" >/dev/null 2>&1 || skip "$1 is not installed (apt-get install $2)"
 }
+need_browser() {
+    need chromium chromium
+    [ -d "$work/node_modules/playwright-core" ] && return
+    need npm npm
+    npm install --prefix "$work" --no-fund --no-audit --silent playwright-core@1.65.1 >/dev/null 2>&1 ||
+        skip "playwright-core cannot be installed with npm"
+}
 need node nodejs
 mkdir -p "$work" && copy=$(mktemp -d "$work/copy.XXXXXX") || exit 2
 cp tests/study/*.mjs "$copy" && mv -f "$copy"/*.mjs "$work" && rmdir "$copy" || exit 2 # the others run at the same time

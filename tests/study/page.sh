@@ -1,12 +1,7 @@
 #!/bin/sh
 # The page of lull-render --html in a real browser; screenshots in build/study-test/page.
 . "$(dirname "$0")/node.sh"
-need chromium chromium
-if [ ! -d "$work/node_modules/playwright-core" ]; then
-    need npm npm
-    npm install --prefix "$work" --no-fund --no-audit --silent playwright-core@1.65.1 >/dev/null 2>&1 ||
-        skip "playwright-core cannot be installed with npm"
-fi
+need_browser
 [ -x "${BUILD:-build}/bin/lull-render" ] || skip "lull-render is not built (make all)"
 rm -rf "$work/page" && mkdir -p "$work/page" || exit 2
 name="a '<b onclick=x>\"&amp; scene.pbrt"

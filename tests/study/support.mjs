@@ -104,6 +104,23 @@ export function makeLevels(folder, width, height, levels) {
         writePng(path.join(folder, `level-${n}.png`), width, height, noisy(clean, 160 / Math.sqrt(n), n));
 }
 
+// A folder of a clip: for each level and the reference a folder of frames, in which the ball moves.
+export function makeClip(folder, width, height, levels, frames) {
+    for (const level of ['reference', ...levels]) {
+        fs.mkdirSync(path.join(folder, String(level)), { recursive: true });
+        for (let k = 1; k <= frames; k++) {
+            const still = scene(width, height),
+                clean = (x, y) => still(x + 6 * (k - frames / 2), y);
+            writePng(
+                path.join(folder, String(level), `${String(k).padStart(4, '0')}.png`),
+                width,
+                height,
+                level === 'reference' ? clean : noisy(clean, 160 / Math.sqrt(level), 100 * level + k),
+            );
+        }
+    }
+}
+
 export function makeConditions(folder, width, height, sigmas) {
     fs.mkdirSync(folder, { recursive: true });
     const clean = scene(width, height);

@@ -1,11 +1,12 @@
 // Two-interval forced choice: a block clean and grainy, one after the other; QUEST+ per block chooses how grainy.
+import { play } from './clip.js';
 import { choice, element, frame, paused, wait } from './dom.js';
 import { Quest } from './quest.js';
 import { blockUrl, canvas } from './stimuli.js';
 import { say } from './texts.js';
 
 // Which of the texts speak of the task: grain is not all that denoised pictures may have.
-export const wordsOf = (study) => (study.task === '2ifc' && study.views.some((v) => v.kind) ? 'errors' : study.task);
+export const wordsOf = (study) => (study.task === '2ifc' && study.views.some((v) => v.kind || v.frames) ? 'errors' : study.task);
 
 export function twoInterval(session) {
     const words = wordsOf(session.study);
@@ -30,19 +31,27 @@ export function twoInterval(session) {
             quest.update(trial.level, trial.answer === slot.side + 1);
     }
 
-    async function present(context, bitmaps, note, label) {
-        const { show_ms, gap_ms } = session.study;
+    // Resolves to how long each frame of clips stood, of stills to nothing.
+    async function present(context, bitmaps, note, label, frames) {
+        const { show_ms, gap_ms, fps } = session.study;
+        const stood = [];
         note.textContent = '';
         await wait(gap_ms);
         for (let interval = 0; interval < 2; interval++) {
             note.textContent = label[interval];
             await frame();
-            context.drawImage(bitmaps[interval], 0, 0);
-            await wait(show_ms);
+            if (frames) {
+                const count = Math.ceil((show_ms * fps) / 1000 - 1e-9);
+                stood.push(...(await play(context, bitmaps[interval], { frames, fps, count })));
+            } else {
+                context.drawImage(bitmaps[interval], 0, 0);
+                await wait(show_ms);
+            }
             context.clearRect(0, 0, context.canvas.width, context.canvas.height);
             note.textContent = '';
             if (interval === 0) await wait(gap_ms);
         }
+        return frames ? stood.join(' ') : undefined;
     }
 
     return async function trial(display) {
@@ -72,10 +81,13 @@ export function twoInterval(session) {
         display.replaceChildren(element('div.trial', {}, note, picture, prompt));
         document.body.dataset.state = 'showing';
         while (paused()) await wait(200);
-        await present(picture.getContext('2d'), slot.side === 0 ? [grainy, clean] : [clean, grainy], note, [
-            say(`${words}.first`),
-            say(`${words}.second`),
-        ]);
+        const frame_ms = await present(
+            picture.getContext('2d'),
+            slot.side === 0 ? [grainy, clean] : [clean, grainy],
+            note,
+            [say(`${words}.first`), say(`${words}.second`)],
+            view.frames,
+        );
 
         prompt.style.visibility = 'visible';
         document.body.dataset.state = 'asking';
@@ -92,6 +104,7 @@ export function twoInterval(session) {
             answer,
             rating: 0,
             ms: Math.round(performance.now() - from),
+            frame_ms,
         });
         if (!slot.catch) learn(questOf(slot.view, slot.block), slot.view, slot.block, session.person.trials.at(-1));
     };
