@@ -288,10 +288,13 @@ static void resumed_render_is_identical(void **state)
         assert_int_equal(pt_render_run(r.render, &none, &outcome, &err), 0);
         assert_int_equal(outcome, PT_RENDER_PILOT);
         const struct pt_film *f = &r.render->film;
+        uint64_t samples = 0;
         for (size_t i = 0; i < f->pixels; i++) {
-            assert_int_equal(f->spp[i] % PT_CELLS_STEP, 0);
+            assert_true(f->spp[i] > 0 && f->spp[i] % PT_CELLS_STEP == 0);
+            samples += f->spp[i];
             in_a_wave += f->spp[i] > f->goal[i] / 2 && f->spp[i] < f->goal[i];
         }
+        assert_int_equal(r.render->totals->samples, samples);
         assert_int_equal(pt_checkpoint_save(path, r.render, "a=1\n", &err), 0);
         pt_render_destroy(r.render);
         lull_host_close(r.criterion);
