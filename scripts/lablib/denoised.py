@@ -57,7 +57,7 @@ def measure(o, scene):
     paths, mean = references(o, scene)
     folder = os.path.join(o.work, name_of(scene))
     told = tool.run(os.path.join(tool.BUILD, "bench", "pt_looks"), scene, SIZE, BLOCK, SEED, folder, ",".join(map(str, LEVELS)),
-                    "quality=" + o.quality)
+                    "quality=" + o.quality, "first-spp=%d" % LEVELS[0])
     looks = [json.loads(line) for line in told.splitlines()]
     report = os.path.join(o.work, name_of(scene) + ".price.json")
     tool.run(tool.RENDER, scene, "--size", "%dx%d" % (SIZE, SIZE), "--block", BLOCK, "--spp", PRICE_SPP, "-q", "--report", report)

@@ -1,11 +1,11 @@
 /*
  * What the criterion `denoised` believes at rising numbers of samples, and the pictures that it believes it of.
  *
- *   build/bench/pt_looks SCENE.pbrt SIZE BLOCK SEED FOLDER SPP,SPP,... [KEY=VALUE]
+ *   build/bench/pt_looks SCENE.pbrt SIZE BLOCK SEED FOLDER SPP,SPP,... [KEY=VALUE...]
  *
  * The scene is rendered once, SIZE x SIZE pixels without stopping any of its blocks of BLOCK pixels; FOLDER keeps the film of
  * each number of samples (SPP.film), from which the next run goes on without rendering. Each is shown to the criterion, with
- * the parameter KEY, if one is given: one line of JSON a block. The pictures are written beside the films: SPP-noisy.png,
+ * these parameters, if any are given: one line of JSON a block. The pictures are written beside the films: SPP-noisy.png,
  * SPP-denoised.png, SPP-blend.png. All times are processor seconds, those of the denoiser's process among them.
  */
 #include <stdio.h>
@@ -21,13 +21,14 @@
 #include "render/host_find.h"
 #include "render/output.h"
 
-enum { LEVELS_MAX = 32, BLOCKS_MAX = 1024 };
+enum { LEVELS_MAX = 32, BLOCKS_MAX = 1024, PAIRS_MAX = 8 };
 
 static struct {
     const char *scene, *folder;
     int size, block, seed, levels;
     uint64_t spp[LEVELS_MAX];
-    struct lull_pair pair;
+    struct lull_pair pairs[PAIRS_MAX];
+    uint32_t pair_count;
 } o;
 
 static double halves[BLOCKS_MAX], crossed[BLOCKS_MAX];
@@ -73,7 +74,7 @@ static struct lull_host_criterion *open_criterion(const char *name)
     struct base_err err = {0};
     if (pt_criterion_find(name, NULL, NULL, &table, &err))
         die(&err);
-    if (lull_host_create(&services, table, &o.pair, o.pair.key && !strcmp(name, "denoised"), &c, &e) != LULL_OK) {
+    if (lull_host_create(&services, table, o.pairs, strcmp(name, "denoised") ? 0 : o.pair_count, &c, &e) != LULL_OK) {
         base_fail(&err, BASE_EINVAL, "%s", e.message);
         die(&err);
     }
@@ -171,16 +172,16 @@ static void run(const struct pt_render_config *config, struct pt_scene *scene, s
 static void read_words(int argc, char **argv)
 {
     if (argc < 7) {
-        fprintf(stderr, "usage: pt_looks SCENE.pbrt SIZE BLOCK SEED FOLDER SPP,SPP,... [KEY=VALUE]\n");
+        fprintf(stderr, "usage: pt_looks SCENE.pbrt SIZE BLOCK SEED FOLDER SPP,SPP,... [KEY=VALUE...]\n");
         exit(2);
     }
     o.scene = argv[1], o.folder = argv[5];
     o.size = atoi(argv[2]), o.block = atoi(argv[3]), o.seed = atoi(argv[4]);
     for (char *at = strtok(argv[6], ","); at && o.levels < LEVELS_MAX; at = strtok(NULL, ","))
         o.spp[o.levels++] = strtoull(at, NULL, 10);
-    if (argc > 7) {
-        o.pair.key = strtok(argv[7], "=");
-        o.pair.value = strtok(NULL, "");
+    for (int i = 7; i < argc && o.pair_count < PAIRS_MAX; i++, o.pair_count++) {
+        o.pairs[o.pair_count].key = strtok(argv[i], "=");
+        o.pairs[o.pair_count].value = strtok(NULL, "");
     }
     mkdir(o.folder, 0777);
 }
@@ -194,7 +195,7 @@ int main(int argc, char **argv)
     const struct pt_load_options load = {.width = o.size, .height = o.size};
     if (pt_scene_load(o.scene, &load, &scene, &defaults, &err))
         die(&err);
-    struct base_threads *threads = base_threads_create(1, &err);
+    struct base_threads *threads = base_threads_create(base_threads_available(), &err);
     struct pt_render_config config = {.width = o.size,
                                       .height = o.size,
                                       .crop = {0, 0, o.size, o.size},
