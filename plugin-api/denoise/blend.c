@@ -9,6 +9,9 @@ enum { RADIUS = 9 };
 static const float weight[RADIUS + 1] = {1.0f,         0.945959469f, 0.800737403f, 0.606530660f, 0.411112291f,
                                          0.249352209f, 0.135335283f, 0.065728529f, 0.028565501f, 0.011108997f};
 
+/* The variance of halves that are black and white, which is the most that a display shows. */
+static const float SHOWN_MOST = 2500.0f;
+
 /* A pixel whose own square is more than this many of its neighbourhood's is a speck: two standard deviations. */
 static const float SPECK = 4.0f;
 
@@ -37,15 +40,30 @@ static void pool(float *map, int width, int height, float *scratch)
 
 float lull_blend_mse(const struct lull_estimate *pooled, size_t i) { return fmaxf(pooled->denoised[i], pooled->agreed[i]); }
 
-void lull_blend_weights(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha)
+void lull_blend_weights(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha,
+                        float *apart)
 {
-    memcpy(alpha, estimate->noisy, (size_t)width * (size_t)height * sizeof *alpha);
+    const size_t n = (size_t)width * (size_t)height;
+    memcpy(alpha, estimate->noisy, n * sizeof *alpha);
+    memcpy(apart, estimate->agreed, n * sizeof *apart);
+    for (size_t i = 0; i < n; i++)
+        estimate->noisy[i] = fminf(estimate->noisy[i], SHOWN_MOST);
     pool(estimate->denoised, width, height, scratch);
     pool(estimate->agreed, width, height, scratch);
     pool(estimate->noisy, width, height, scratch);
-    for (size_t i = 0; i < (size_t)width * (size_t)height; i++) {
+    for (size_t i = 0; i < n; i++) {
         float mse = lull_blend_mse(estimate, i), noise = fmaxf(estimate->noisy[i], alpha[i] / SPECK);
         alpha[i] = mse > 0.0f ? mse / (mse + noise) : 0.0f;
+        apart[i] = apart[i] > SPECK * estimate->agreed[i] ? sqrtf(SPECK * estimate->agreed[i] / apart[i]) : 1.0f;
+    }
+}
+
+void lull_blend_despeckle(const float *apart, size_t n, float *fa, float *fb)
+{
+    for (size_t i = 0; i < 3 * n; i++) {
+        float *brighter = fa[i] > fb[i] ? &fa[i] : &fb[i];
+        const float darker = fminf(fa[i], fb[i]);
+        *brighter = darker + apart[i / 3] * (*brighter - darker);
     }
 }
 

@@ -1,18 +1,25 @@
 /*
  * A picture between the noisy and the denoised one: at each pixel alpha of the noisy, alpha = mse(D) / (mse(D) + var(M)),
  * both pooled over the neighbourhood. Where the denoiser is right it is the denoised picture, where it is wrong the noisy
- * one; if the two errors were independent and known, no mixture would be better. A pixel in which the halves are further
- * apart than two standard deviations of its neighbourhood counts as a speck: a quarter of its own square is its var(M). Pure
- * functions, thread-safe; the same bits on every processor for the same inputs.
+ * one; if the two errors were independent and known, no mixture would be better.
+ *
+ * A pixel in which the halves are further apart than two standard deviations of its neighbourhood counts as a speck: light
+ * that one sample found, and none of its neighbours'. Of noisy halves a quarter of its own square is its var(M). Of denoised
+ * halves the brighter is brought down until they are so far apart and no further. Pure functions, thread-safe; the same bits
+ * on every processor for the same inputs.
  */
 #ifndef DENOISE_BLEND_H
 #define DENOISE_BLEND_H
 
 #include "denoise/estimate.h"
 
-/* Pools each map of the estimate in place (Gaussian of 3 px, cut off where the picture ends) and fills alpha
- * [height][width]. scratch: [height][width]. */
-void lull_blend_weights(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha);
+/* Pools each map of the estimate in place (Gaussian of 3 px, cut off where the picture ends) and fills alpha and apart, all
+ * [height][width]. apart: how much of the denoised halves' difference is no speck, in [0, 1]. scratch: [height][width]. */
+void lull_blend_weights(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha,
+                        float *apart);
+
+/* Takes the specks from denoised halves [n][3]. */
+void lull_blend_despeckle(const float *apart, size_t n, float *fa, float *fb);
 
 /* The pooled error of what is denoised, never below that on which the halves disagree. */
 float lull_blend_mse(const struct lull_estimate *pooled, size_t i);

@@ -242,7 +242,7 @@ static double cube(double v) { return v > 0.0 ? v * v * v : 0.0; }
 /* Sum of sixth powers of errors that are Gaussian, so many standard errors below what was found. */
 static double sixth_of(const struct sums *s, double less)
 {
-    return GAUSSIAN * s->n * cube(s->q / s->n - less * standard_error(s));
+    return GAUSSIAN * s->n * cube(fabs(s->q / s->n) - less * standard_error(s));
 }
 
 /* Strength of the edge at a pixel of the denoised picture, in octaves of L*: 0 for less than one. */
@@ -278,7 +278,8 @@ static double sixth_moment(const struct gd_block_view *l, int width, int height,
     for (int k = 0; k < STRATA; k++)
         edges += strata[k].n > 0.0 ? sixth_of(&strata[k], 1.0) : 0.0;
     const double halves = whole.second / whole.n, shape = halves > 0.0 ? whole.sixth / whole.n / cube(halves) : 0.0;
-    const double square = fmax(whole.q / whole.n + standard_error(&whole), halves);
+    const double mean = whole.q / whole.n, doubt = standard_error(&whole);
+    const double square = fmax(fmax(mean + doubt, -mean - doubt), halves);
     return fmax(fmax(GAUSSIAN, shape) * cube(square), fmax(tiles, edges) / whole.n);
 }
 
@@ -317,13 +318,15 @@ static float *pixel_of(struct gd_block_view *l, int which, struct lull_rect box,
     return l->box[which] + 3 * ((y + (size_t)(b->y0 - box.y0)) * (size_t)(box.x1 - box.x0) + x + (size_t)(b->x0 - box.x0));
 }
 
-/* Each denoised half becomes that of the picture that is kept. */
+/* Each denoised half becomes that of the blend. */
 static void keep(struct gd_block_view *l, struct lull_rect box, const struct lull_block *b, size_t pixels)
 {
-    for (size_t i = 0; i < pixels; i++)
+    for (size_t i = 0; i < pixels; i++) {
+        float *const denoised[2] = {pixel_of(l, DENOISED_A, box, b, i), pixel_of(l, DENOISED_B, box, b, i)};
+        lull_blend_despeckle(&l->apart[i], 1, denoised[0], denoised[1]);
         for (int k = 0; k < 2; k++)
-            lull_blend(pixel_of(l, HALF_A + k, box, b, i), pixel_of(l, DENOISED_A + k, box, b, i), &l->alpha[i], 1,
-                       pixel_of(l, DENOISED_A + k, box, b, i));
+            lull_blend(pixel_of(l, HALF_A + k, box, b, i), denoised[k], &l->alpha[i], 1, denoised[k]);
+    }
 }
 
 /* How far apart the kept halves are, at the strength of the mean: L* of the mean less that of the darker half. A speck that
@@ -389,6 +392,7 @@ int gd_block_view_errors(struct gd_block_view *l, const struct gd_form *form, co
     const double n = (double)b->spp, h = (double)b->half_spp;
     const double split = 0.5 * seq_half_scale(n, h); /* to noise as strong as the mean's */
     const struct lull_estimate estimate = {l->slope, l->crossed, l->blurred};
+    float *const sampled[2] = {l->scratch, l->edges};
 
     l->err = (struct base_err){0};
     if (denoise(l, kit))
@@ -396,17 +400,20 @@ int gd_block_view_errors(struct gd_block_view *l, const struct gd_form *form, co
     for (size_t k = 0; k < 4; k++)
         show(l, shown[k], box, b, kit, l->light[k], l->lightness[k % 2]);
     ggn_visible_texture(l->lightness[0], l->lightness[1], width, height, l->rows, l->texture);
-    struct lull_estimate_in in = {l->light[0], l->light[1], l->light[2], l->light[3], h / n};
+    for (size_t i = 0; i < pixels; i++)
+        for (int k = 0; k < 2; k++) {
+            const float *half = pixel_of(l, HALF_A + k, box, b, i);
+            sampled[k][i] = (float)(kit->exposure * base_luminance((double)half[0], (double)half[1], (double)half[2]));
+        }
+    struct lull_estimate_in in = {l->light[0], l->light[1], l->light[2], l->light[3], sampled[0], sampled[1], h / n};
     lull_estimate_pixels(&in, pixels, &estimate);
-    lull_blend_weights(&estimate, width, height, l->scratch, l->alpha);
-    if (!blend)
-        memset(l->alpha, 0, pixels * sizeof *l->alpha);
-
+    lull_blend_weights(&estimate, width, height, l->scratch, l->alpha, l->apart);
     for (size_t i = 0; i < pixels; i++) {
         l->slope[i] = (float)lull_lightness_slope(0.5 * ((double)l->light[2][i] + (double)l->light[3][i]));
         l->edges[i] = 0.5f * (l->lightness[0][i] + l->lightness[1][i]);
     }
-    keep(l, box, b, pixels);
+    if (blend)
+        keep(l, box, b, pixels);
     for (size_t k = 2; k < 4; k++)
         show(l, shown[k], box, b, kit, l->light[k], l->lightness[0]);
     cross(l, width, height);
