@@ -346,13 +346,14 @@ static void post_trial(const struct ggn_study_site *site, const struct ggn_study
 
 /* --- routes --- */
 
-/* study.json, and how long one person takes. */
+/* study.json, and what the page would otherwise make of it by rules of its own. */
 static void get_study(const struct ggn_study_site *site, struct ggn_study_response *r)
 {
     char *text = ggn_study_print(site->study);
     cJSON *o = text ? cJSON_Parse(text) : NULL;
     int failed = 0;
     base_json_number(o, "minutes", ggn_study_plan_minutes(site->study), &failed);
+    base_json_number(o, "shown_frames", ggn_study_shown_frames(site->study), &failed);
     send_json(r, o, failed);
     free(text);
 }

@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -249,22 +250,15 @@ static int people_that_count(const struct ggn_study_people *p)
     return n;
 }
 
-static int fast_answers(const struct ggn_study_people *p)
+/* The sum over people of an int of their results. */
+static int total(const struct ggn_study_people *p, size_t member)
 {
     int n = 0;
     for (int i = 0; i < p->n; i++)
-        n += p->results[i].fast;
+        n += *(const int *)(const void *)((const char *)&p->results[i] + member);
     return n;
 }
-
-/* Answers to clips of which a frame was never drawn. */
-static int dropped_answers(const struct ggn_study_people *p)
-{
-    int n = 0;
-    for (int i = 0; i < p->n; i++)
-        n += p->results[i].dropped;
-    return n;
-}
+#define TOTAL(p, member) total(p, offsetof(struct ggn_study_result, member))
 
 static void add_head(cJSON *root, const struct ggn_study_people *p, int *failed)
 {
@@ -278,9 +272,9 @@ static void add_head(cJSON *root, const struct ggn_study_people *p, int *failed)
     base_json_number(root, "max_untouched", p->study->max_untouched, failed);
     base_json_number(root, "min_ms", p->study->min_ms, failed);
     base_json_number(root, "max_fast", p->study->max_fast, failed);
-    base_json_number(root, "fast_answers", fast_answers(p), failed);
+    base_json_number(root, "fast_answers", TOTAL(p, fast), failed);
     if (p->study->fps)
-        base_json_number(root, "dropped_answers", dropped_answers(p), failed);
+        base_json_number(root, "dropped_answers", TOTAL(p, dropped), failed);
     cJSON *list = base_json_array(root, "excluded", failed);
     for (int i = 0; i < p->n; i++)
         if (p->results[i].excluded[0] != '\0') {
@@ -363,10 +357,10 @@ static void print_figures(const struct ggn_study_people *p, const struct ggn_stu
     for (int i = 0; i < p->n; i++)
         if (p->results[i].excluded[0] != '\0')
             printf("  %s does not count: %s\n", p->results[i].id, p->results[i].excluded);
-    if (fast_answers(p) > 0)
-        printf("%d answers in less than %g ms are left out\n", fast_answers(p), p->study->min_ms);
-    if (dropped_answers(p) > 0)
-        printf("%d answers to clips with a frame that the screen never showed are left out\n", dropped_answers(p));
+    if (TOTAL(p, fast) > 0)
+        printf("%d answers in less than %g ms are left out\n", TOTAL(p, fast), p->study->min_ms);
+    if (TOTAL(p, dropped) > 0)
+        printf("%d answers to clips with a frame that the screen never showed are left out\n", TOTAL(p, dropped));
     if (p->study->task == GGN_STUDY_VALIDATION) {
         puts("judged the same as the reference, with 95 % intervals (Wilson):");
         print_scenes(stdout, p, "\t");

@@ -153,15 +153,11 @@ static const cJSON *list(const struct reader *r, const cJSON *o, const char *nam
 static int read_block(const struct reader *r, const cJSON *o, const struct ggn_study_view *view, struct ggn_study_block *b)
 {
     const cJSON *levels = list(r, o, "levels", GGN_STUDY_MAX_LEVELS), *level;
-    int rc = levels ? pixels(r, o, "id", 0, &b->id) : BASE_EINVAL;
-    if (!rc)
-        rc = pixels(r, o, "x0", 0, &b->x0);
-    if (!rc)
-        rc = pixels(r, o, "y0", 0, &b->y0);
-    if (!rc)
-        rc = pixels(r, o, "x1", 1, &b->x1);
-    if (!rc)
-        rc = pixels(r, o, "y1", 1, &b->y1);
+    static const char *const names[5] = {"id", "x0", "y0", "x1", "y1"};
+    uint32_t *const into[5] = {&b->id, &b->x0, &b->y0, &b->x1, &b->y1};
+    int rc = levels ? 0 : BASE_EINVAL;
+    for (int i = 0; i < 5 && !rc; i++)
+        rc = pixels(r, o, names[i], i >= 3, into[i]);
     if (rc)
         return rc;
     if (b->x1 <= b->x0 || b->y1 <= b->y0 || b->x1 > view->width || b->y1 > view->height)
@@ -322,21 +318,23 @@ static int read_later_members(const struct reader *r, const cJSON *root, struct 
 
 static int read_numbers(const struct reader *r, const cJSON *root, struct ggn_study *s)
 {
-    int rc = whole(r, root, "trials", 1, 1000, &s->trials);
-    if (!rc)
-        rc = whole(r, root, "repeats", 1, 100, &s->repeats);
-    if (!rc)
-        rc = number(r, root, "catch_share", 0, 0.5, 0, &s->catch_share);
-    if (!rc)
-        rc = whole(r, root, "show_ms", 1, 60000, &s->show_ms);
-    if (!rc)
-        rc = whole(r, root, "gap_ms", 1, 60000, &s->gap_ms);
-    if (!rc)
-        rc = whole(r, root, "break_every", 0, 100000, &s->break_every);
-    if (!rc)
-        rc = number(r, root, "min_catch_passed", 0, 1, 0, &s->min_catch_passed);
-    if (!rc)
-        rc = number(r, root, "max_untouched", 0, 1, 0, &s->max_untouched);
+    const struct {
+        const char *name;
+        double lo, hi;
+        int *whole; /* one of the two */
+        double *real;
+    } members[] = {{"trials", 1, 1000, &s->trials, NULL},
+                   {"repeats", 1, 100, &s->repeats, NULL},
+                   {"catch_share", 0, 0.5, NULL, &s->catch_share},
+                   {"show_ms", 1, 60000, &s->show_ms, NULL},
+                   {"gap_ms", 1, 60000, &s->gap_ms, NULL},
+                   {"break_every", 0, 100000, &s->break_every, NULL},
+                   {"min_catch_passed", 0, 1, NULL, &s->min_catch_passed},
+                   {"max_untouched", 0, 1, NULL, &s->max_untouched}};
+    int rc = 0;
+    for (size_t i = 0; i < sizeof members / sizeof members[0] && !rc; i++)
+        rc = members[i].whole ? whole(r, root, members[i].name, members[i].lo, members[i].hi, members[i].whole)
+                              : number(r, root, members[i].name, members[i].lo, members[i].hi, 0, members[i].real);
     return rc;
 }
 
@@ -344,6 +342,7 @@ int ggn_study_parse(const char *path, const char *text, size_t size, struct ggn_
 {
     struct ggn_study s = {0};
     struct reader r = {path, err};
+    struct base_err why = {0};
     cJSON *root = cJSON_ParseWithLength(text, size);
     int rc = cJSON_IsObject(root) ? 0 : base_fail(err, BASE_EINVAL, "%s: not a JSON object", path);
     if (!rc)
@@ -354,8 +353,8 @@ int ggn_study_parse(const char *path, const char *text, size_t size, struct ggn_
         rc = read_later_members(&r, root, &s);
     if (!rc)
         rc = read_views(&r, root, &s);
-    if (!rc)
-        rc = ggn_study_fit_intervals(&s, err);
+    if (!rc && ggn_study_fit_intervals(&s, &why))
+        rc = base_fail(err, BASE_EINVAL, "%s: %s", path, why.text);
     if (!rc && s.task == GGN_STUDY_VALIDATION)
         rc = read_conditions(&r, root, &s);
     cJSON_Delete(root);

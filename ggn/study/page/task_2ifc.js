@@ -33,7 +33,7 @@ export function twoInterval(session) {
 
     // Resolves to how long each frame of clips stood, of stills to nothing.
     async function present(context, bitmaps, note, label, frames) {
-        const { show_ms, gap_ms, fps } = session.study;
+        const { show_ms, gap_ms, fps, shown_frames } = session.study;
         const stood = [];
         note.textContent = '';
         await wait(gap_ms);
@@ -41,8 +41,7 @@ export function twoInterval(session) {
             note.textContent = label[interval];
             await frame();
             if (frames) {
-                const count = Math.ceil((show_ms * fps) / 1000 - 1e-9);
-                stood.push(...(await play(context, bitmaps[interval], { frames, fps, count })));
+                stood.push(...(await play(context, bitmaps[interval], { frames, fps, count: shown_frames })));
             } else {
                 context.drawImage(bitmaps[interval], 0, 0);
                 await wait(show_ms);
