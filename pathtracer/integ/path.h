@@ -388,8 +388,8 @@ PT_KERNEL_INLINE void pt_path_start(pt_effects fx, struct pt_path *path, float x
     *path->out = (struct pt_path_result){.depth = INFINITY};
     struct pt_sample2 lens = {0.5f, 0.5f};
     float time = 0.0f;
-    if (fx & PT_FX_DEFOCUS)
-        lens = pt_sampler_2d(&path->sampler, PT_DIM_LENS);
+    if ((fx & PT_FX_DEFOCUS) && camera->lens_radius > 0.0f)
+        lens = pt_path_2d(path, PT_DIM_LENS);
     if (fx & PT_FX_MOTION)
         time = pt_sampler_1d(&path->sampler, PT_DIM_TIME);
     pt_camera_ray(fx, camera, x, y, lens.x, lens.y, time, &path->ray);

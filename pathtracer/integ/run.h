@@ -66,9 +66,9 @@ PT_KERNEL_INLINE void pt_run_numbers(pt_effects fx, struct pt_path *const *live,
 }
 
 /* The first rays of all paths, which are samples `sample` of pixels (x, y), (x + 1, y), … */
-PT_KERNEL_INLINE void pt_run_start(pt_effects fx, const struct pt_integrator *settings, uint32_t x, uint32_t y,
-                                   uint32_t sample, struct pt_path *paths, int count, struct pt_lane_keys *keys,
-                                   float (*u)[PT_RUN])
+PT_KERNEL_INLINE void pt_run_start(pt_effects fx, const struct pt_scene *scene, const struct pt_integrator *settings,
+                                   uint32_t x, uint32_t y, uint32_t sample, struct pt_path *paths, int count,
+                                   struct pt_lane_keys *keys, float (*u)[PT_RUN])
 {
     const int sobol = settings->sampler == PT_SAMPLER_SOBOL;
     float dx[PT_RUN], dy[PT_RUN];
@@ -77,10 +77,13 @@ PT_KERNEL_INLINE void pt_run_start(pt_effects fx, const struct pt_integrator *se
         *s = pt_sampler_make(sobol, settings->seed, x + (uint32_t)i, y, sample);
         keys->pixel_key[i] = s->pixel_key;
         keys->path_key[i] = s->path_key;
+        paths[i].u = &u[0][i];
     }
     keys->index_reversed = pt_reverse_bits(sample);
     keys->sobol = sobol;
-    pt_lanes_best()->numbers(keys, count, 0, (struct pt_lane_dims){.pairs = 1u << PT_DIM_PIXEL}, u);
+    const int lens = (fx & PT_FX_DEFOCUS) && scene->camera.lens_radius > 0.0f;
+    pt_lanes_best()->numbers(keys, count, 0,
+                             (struct pt_lane_dims){.pairs = 1u << PT_DIM_PIXEL | (lens ? 1u << PT_DIM_LENS : 0u)}, u);
     pt_filter_sample(settings, count, u[PT_DIM_PIXEL], u[PT_DIM_PIXEL + 1], dx, dy);
     for (int i = 0; i < count; i++)
         pt_path_start(fx, &paths[i], (float)(x + (uint32_t)i) + 0.5f + dx[i], (float)y + 0.5f + dy[i]);
@@ -106,7 +109,7 @@ PT_KERNEL_INLINE void pt_run_sample(pt_effects fx, const struct pt_scene *scene,
         paths[i].trace = trace;
         paths[i].out = &out[i];
     }
-    pt_run_start(fx, settings, x, y, sample, paths, count, &keys, u);
+    pt_run_start(fx, scene, settings, x, y, sample, paths, count, &keys, u);
     int n = count;
     for (uint32_t vertex = 1; n > 0; vertex++) {
         uint8_t alive[PT_RUN];
