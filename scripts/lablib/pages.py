@@ -8,8 +8,8 @@ import os
 import re
 import sys
 
-from lablib import (agreement, ablation, bench, cells, cost_page, denoised, explained, folds, peers, quote_accuracy, references, sampler,
-                    scale, shots, tool)
+from lablib import (agreement, ablation, bench, cells, cost_page, denoised, explained, folds, peers, profile, quote_accuracy, references,
+                    sampler, scale, shots, tool)
 
 TEMPLATES = os.path.join(tool.ROOT, "scripts", "lablib", "templates")
 OTHERS = ("ggn/README.md", "ggn/models/README.md", "ggn/observer/README.md")  # pages outside docs/ that show figures
@@ -42,8 +42,8 @@ def made(docs):
                              undefined=jinja2.StrictUndefined)
     jobs = {name: Job(module, tool.results(docs, name)) for name, module in (
         ("agreement", agreement), ("ablation", ablation), ("bench", bench), ("cost", cost_page), ("quote", quote_accuracy),
-        ("references", references), ("sampler", sampler), ("cells", cells), ("scale", scale), ("denoised", denoised), ("peers", peers), ("shots", shots),
-        ("explained", explained), ("folds", folds))}
+        ("references", references), ("sampler", sampler), ("profile", profile), ("cells", cells), ("scale", scale), ("denoised", denoised),
+        ("peers", peers), ("shots", shots), ("explained", explained), ("folds", folds))}
 
     def of_figures(name, make):
         try:
