@@ -47,9 +47,9 @@ static void add_trials(cJSON *list, const struct ggn_study *s, const struct ggn_
         base_json_number(o, "rating", t->rating, failed);
         base_json_number(o, "ms", t->ms, failed);
         base_json_text(o, "layout", t->layout, failed);
-        base_json_text(o, "at", t->at, failed);
         if (*t->frame_ms)
             base_json_text(o, "frame_ms", t->frame_ms, failed);
+        base_json_text(o, "at", t->at, failed);
         if (t->slot < plan->n)
             add_meaning(o, s, &plan->slots[t->slot], t, failed);
     }
