@@ -11,7 +11,7 @@ import statistics
 import sys
 import textwrap
 
-from lablib import tables, tool
+from lablib import cvvdp, denoised_judges, tables, tool
 
 SCENES = ["scenes/%s.pbrt" % name for name in "demo rock-garden kitchen cornell-box garage defocus harbour bathroom office".split()] + [
     os.path.join("..", "shared", "scenes", name) for name in ("coffee-v3/scene.pbrt", "veach-mis-v4/veach-mis.pbrt",
@@ -31,6 +31,7 @@ def options(parser):
     parser.add_argument("--work", type=tool.path, default=os.path.join(tool.BUILD, "denoised"), metavar="DIR",
                         help="references, films, pictures; what is there is not made again (build/denoised)")
     parser.add_argument("--quality", choices=("fast", "balanced", "high"), default="high", help="of the denoiser in the looks (high)")
+    parser.add_argument("--judges", nargs="+", default=[], metavar="SCENE.pbrt", help="ask ColorVideoVDP and FLIP about these, too")
     tool.writes(parser)
 
 
@@ -185,6 +186,8 @@ def text(rows, s):
         "the same number of samples everywhere (%d, where stopped blocks have %.0f in the mean): visibly off are %.0f %% of all blocks of the "
         "blend, %.0f %% of the denoised picture, %.0f %% of the noisy one" % (
             s["uniform_spp"], s["mean_spp"], 100 * s["uniform_blend"], 100 * s["uniform_denoised"], 100 * s["uniform_noisy"])]
+    if "judges" in s:
+        lines.append(denoised_judges.text(s["judges"]))
     return "%s\n%s" % (tables.table(HEAD, [cells(r) for r in rows]), "".join(textwrap.fill("- " + line, 140, subsequent_indent="  ") + "\n" for line in lines))
 
 
@@ -192,7 +195,16 @@ def page(results):
     return "%s.\n\n%s" % (tables.told(results["measured"]), text(results["rows"], results["summary"]))
 
 
+def judged(o, scene):
+    kept = os.path.join(o.work, name_of(scene) + ".judges.json")
+    if not os.path.exists(kept):
+        tool.save(denoised_judges.opinions(os.path.join(o.work, name_of(scene)), references(o, scene)[1], BLOCK), kept, indent=None)
+    return tool.load(kept)
+
+
 def main(o):
+    if o.judges and cvvdp.missing():
+        raise tool.Refused(cvvdp.missing())
     os.makedirs(o.work, exist_ok=True)
     limit, rows, all_looks = low_enough(), [], []
     for scene in o.scenes:
@@ -207,6 +219,8 @@ def main(o):
         rows.append(scene_row(scene, looks, limit))
         print("| %s |" % " | ".join(cells(rows[-1])), flush=True)
     s = summary(rows, all_looks, limit)
+    if o.judges:
+        s["judges"] = denoised_judges.summary([judged(o, scene) for scene in o.judges])
     print(text(rows, s))
     if o.write:
         tool.store(o.write, "denoised", {"measured": tool.measured(), "rows": rows, "summary": s})
