@@ -4,7 +4,7 @@
  * model/visibility.h).
  *
  * The picture that is kept is the mean of two, P(A) and P(B), each of one half: alpha of the noisy half, the rest of the
- * denoised one (denoise/blend.h); alpha is 0 where the denoised picture alone is kept. Both estimates are of what the eye is
+ * denoised one without its specks (denoise/blend.h); alpha is 0 where the denoised picture alone is kept. Both estimates are of what the eye is
  * left with after the observer's blur, over what texture hides:
  *
  * - halves: how far P(A) and P(B) are apart. Bias, which they share, is not in it.
@@ -14,6 +14,8 @@
  *     as uneven as the halves' difference, and at least Gaussian (15 cubes of the mean square);
  *   - over tiles of 25 px, with two standard errors less: a small place where the denoiser fails, beyond doubt;
  *   - over the edges of each octave of strength, with one less: there denoisers err most.
+ *   An estimate below zero counts as if above: both halves are denoised with the same albedo, whose noise, where it has any,
+ *   the other half shares.
  *
  * One struct gd_block_view per worker; nothing is allocated after gd_block_view_create.
  */
