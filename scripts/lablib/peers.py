@@ -266,8 +266,9 @@ def compared(scenes, names, suffix):
     for who, found, wanted in (("ours", ours, 0.7), ("Cycles as host", hosted, 1.0)):
         if found:
             middle = [statistics.median(r["ratio"] for r in ratios) for ratios in found.values()]
-            text += "\n%s: median over scenes **%.2f**, from %.2f to %.2f (wanted ≤ %.1f)." % (
-                who.capitalize(), statistics.median(middle), min(middle), max(middle), wanted)
+            text += "\n%s: median over scenes **%.2f**, from %.2f to %.2f%s." % (
+                who.capitalize() if who == "ours" else who, statistics.median(middle), min(middle), max(middle),
+                "" if suffix else " (wanted ≤ %.1f)" % wanted)
     return text + "\n"
 
 
