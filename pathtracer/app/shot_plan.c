@@ -9,6 +9,8 @@
 #include "quote_output.h"
 #include "shot_table.h"
 
+static const double FADE = 0.8408964152537145; /* 2^(-1/4) */
+
 /* What a pilot said of one frame. */
 struct pilot {
     size_t at;                            /* index of its frame */
@@ -97,41 +99,59 @@ uint32_t pt_shot_need(const struct lull_host_quote_block *a, const struct lull_h
     return (uint32_t)ceil(sqrt(own * most));
 }
 
-/* Of a block in a frame, whose pilots before and after it are k and k + 1; a frame that is a pilot itself lies between two
- * pairs, and gets the smaller of their answers, so that its samples do not fall below those of the frames around it. */
-static uint32_t spp_of(const struct plan *p, size_t frame, size_t k, size_t block)
+/* Samples change by at most a quarter of an octave from frame to frame, so that noise fades instead of jumping; the larger
+ * ones stay. */
+static void fade(struct pt_shot_table *t, size_t frame, size_t beside)
 {
-    const struct pilot *a = &p->pilots[k];
-    const size_t n = p->table.block_count, after = k + 1 < p->pilot_count ? k + 1 : k, before = k > 0 ? k - 1 : k;
-    const uint32_t spp = pt_shot_need(a->blocks, p->pilots[after].blocks, n, p->columns, block);
-    if (frame > a->at || before == k)
-        return spp;
-    const uint32_t other = pt_shot_need(p->pilots[before].blocks, a->blocks, n, p->columns, block);
-    return after == k || other < spp ? other : spp;
+    const size_t n = t->block_count;
+    for (size_t i = 0; i < n; i++) {
+        const uint32_t least = (uint32_t)ceil(FADE * t->spp[beside * n + i]);
+        if (t->spp[frame * n + i] < least)
+            t->spp[frame * n + i] = least;
+    }
+}
+
+/* The last pilot at or before a frame. */
+static size_t pilot_of(const struct plan *p, size_t frame)
+{
+    size_t k = 0;
+    while (k + 1 < p->pilot_count && frame >= p->pilots[k + 1].at)
+        k++;
+    return k;
 }
 
 static int fill_table(struct plan *p, const struct pt_shot *s, struct base_err *err)
 {
     struct pt_shot_table *t = &p->table;
-    const size_t n = t->block_count;
-    t->frames = calloc(s->count, sizeof *t->frames);
-    t->spp = calloc(s->count * n, sizeof *t->spp);
+    const size_t n = t->block_count, count = s->count;
+    t->frames = calloc(count, sizeof *t->frames);
+    t->spp = calloc(count * n, sizeof *t->spp);
     if (!t->frames || !t->spp)
         return base_fail_nomem(err, "shot table");
-    for (size_t f = 0, k = 0; f < s->count; f++) {
-        if (k + 1 < p->pilot_count && f >= p->pilots[k + 1].at)
-            k++;
-        const struct pilot *a = &p->pilots[k], *b = k + 1 < p->pilot_count ? a + 1 : a; /* the last frame is a pilot */
+    for (size_t f = 0; f < count; f++) {
+        const size_t k = pilot_of(p, f), after = k + 1 < p->pilot_count ? k + 1 : k; /* the last frame is a pilot */
         t->frames[f] = s->frames[f];
-        for (size_t i = 0; i < n; i++) {
-            const uint32_t spp = spp_of(p, f, k, i);
-            t->spp[f * n + i] = spp;
+        for (size_t i = 0; i < n; i++)
+            t->spp[f * n + i] = pt_shot_need(p->pilots[k].blocks, p->pilots[after].blocks, n, p->columns, i);
+    }
+    for (size_t f = 1; f < count; f++)
+        fade(t, f, f - 1);
+    for (size_t f = count - 1; f > 0; f--)
+        fade(t, f - 1, f);
+    t->frame_count = count;
+    return 0;
+}
+
+static void add_up(struct plan *p)
+{
+    const struct pt_shot_table *t = &p->table;
+    for (size_t f = 0; f < t->frame_count; f++)
+        for (size_t i = 0, k = pilot_of(p, f); i < t->block_count; i++) {
+            const uint32_t spp = t->spp[f * t->block_count + i];
+            const struct pilot *a = &p->pilots[k], *b = k + 1 < p->pilot_count ? a + 1 : a;
             p->samples += spp;
             p->thread_s += spp * 0.5 * (a->blocks[i].sample_s + b->blocks[i].sample_s);
         }
-    }
-    t->frame_count = s->count;
-    return 0;
 }
 
 static void print_price(const struct plan *p)
@@ -164,8 +184,10 @@ int pt_shot_plan(const struct pt_cli *cli, const struct pt_shot *s, struct base_
         rc = fill_table(&p, s, err);
     if (!rc && *status == 0)
         rc = pt_shot_table_write(cli->shot.plan, &p.table, err);
-    if (!rc && *status == 0)
+    if (!rc && *status == 0) {
+        add_up(&p);
         print_price(&p);
+    }
     for (size_t i = 0; i < p.pilot_count; i++)
         free(p.pilots[i].blocks);
     free(p.pilots);
