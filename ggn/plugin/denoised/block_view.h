@@ -4,8 +4,8 @@
  * model/visibility.h).
  *
  * The picture that is kept is the mean of two, P(A) and P(B), each of one half: alpha of the noisy half, the rest of the
- * denoised one without its specks (denoise/blend.h); alpha is 0 where the denoised picture alone is kept. Both estimates are of what the eye is
- * left with after the observer's blur, over what texture hides:
+ * denoised one without its specks (denoise/blend.h); alpha is 0 and specks stay where the denoised picture alone is kept.
+ * Both estimates are of what the eye is left with after the observer's blur, over what texture hides:
  *
  * - halves: how far P(A) and P(B) are apart. Bias, which they share, is not in it.
  * - crossed: how far each is from the other, noisy half (estimate.h's formula, P in the place of F). Bias is in it. The
