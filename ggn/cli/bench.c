@@ -303,7 +303,7 @@ static void print_figures(const struct bench *b, const double figure[N_FIGURES])
         return;
     }
     printf("{\"threads\": %d, \"isa\": \"%s\", \"precision\": \"%s\", \"batch\": %d", b->o.threads,
-           ggn_isa_name(b->r->kernels->isa), ggn_precision_names[b->o.precision], b->o.batch);
+           base_isa_name(b->r->kernels->isa), ggn_precision_names[b->o.precision], b->o.batch);
     if (b->o.precision == GGN_PRECISION_BF16)
         printf(", \"bf16\": \"%s\"", ggn_precision_bf16_by());
     for (int f = 0; f < N_FIGURES; f++)
@@ -322,7 +322,7 @@ int ggn_cmd_bench(int argc, char **argv)
     if (!rc)
         rc = setup(&b, &err);
     if (!rc && !b.o.json) {
-        printf("instruction set %s, %d threads\n", ggn_isa_name(b.r->kernels->isa), b.o.threads);
+        printf("instruction set %s, %d threads\n", base_isa_name(b.r->kernels->isa), b.o.threads);
         if (b.o.precision == GGN_PRECISION_BF16)
             printf("bfloat16 products by %s\n", ggn_precision_bf16_by());
         putchar('\n');

@@ -5,7 +5,7 @@
 
 #include "base/inputs.h"
 #include "base/version.h"
-#include "nn/isa.h"
+#include "base/isa.h"
 
 static unsigned data_crc(const struct ggn_series_set *set)
 {
@@ -53,7 +53,7 @@ int ggn_agree(struct job *job, const struct ggn_series_set *set, const char *con
     int rc = files_crc(files, n_files, &files_are, err);
     if (rc)
         return rc;
-    snprintf(text, sizeof text, "version=%s\ninstructions=%s (GGN_ISA)\ndata-crc=%08x\nfiles-crc=%08x\noptions-crc=%08x\n",
-             BASE_VERSION, ggn_isa_name(ggn_isa_best()), data_crc(set), (unsigned)files_are, (unsigned)options);
+    snprintf(text, sizeof text, "version=%s\ninstructions=%s (LULL_ISA)\ndata-crc=%08x\nfiles-crc=%08x\noptions-crc=%08x\n",
+             BASE_VERSION, base_isa_name(base_isa_best()), data_crc(set), (unsigned)files_are, (unsigned)options);
     return job_handshake(job, text, threads, 1, err);
 }

@@ -1,7 +1,7 @@
 #include "nn/bf16.h"
 
 #include "base/half.h"
-#include "nn/isa.h"
+#include "base/isa.h"
 
 #define INLINE static inline __attribute__((always_inline))
 
@@ -79,7 +79,7 @@ static int processor_has_it(void)
 
 const char *ggn_bf16_name(void)
 {
-    return ggn_isa_best() == GGN_ISA_AVX512 && processor_has_it() ? "AVX512-BF16" : "software";
+    return base_isa_best() == BASE_ISA_AVX512 && processor_has_it() ? "AVX512-BF16" : "software";
 }
 
 /* Where weight `o`, input channel i, tap k is in a packed convolution. */

@@ -14,7 +14,7 @@
 
 #include "nn/kernels.h"
 
-/* Which way the best kernels go (GGN_ISA): "AVX512-BF16" or "software". */
+/* Which way the best kernels go (LULL_ISA): "AVX512-BF16" or "software". */
 const char *ggn_bf16_name(void);
 
 /* Output channels and pixels of a tile; at the end of a plane, few pixels. */

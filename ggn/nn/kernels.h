@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 
-#include "nn/isa.h"
+#include "base/isa.h"
 #include "nn/real.h"
 
 enum {
@@ -46,7 +46,7 @@ struct ggn_conv_grad {
 };
 
 struct ggn_kernels {
-    enum ggn_isa isa;
+    enum base_isa isa;
     int lanes;   /* elements of a vector */
     int tile_oc; /* output channels of the largest register tile: 8 or 4 */
     int tile_px; /* pixels of a register tile; tasks start at multiples of it */
@@ -102,8 +102,8 @@ struct ggn_kernels {
 };
 
 /* The table for `isa`, or NULL where it is not available. */
-const struct ggn_kernels *ggn_kernels_for(enum ggn_isa isa);
-/* The table for ggn_isa_best(). */
+const struct ggn_kernels *ggn_kernels_for(enum base_isa isa);
+/* The table for base_isa_best(). */
 const struct ggn_kernels *ggn_kernels_best(void);
 
 /* kernels_base.c, kernels_avx2.c, kernels_avx512.c; reached through the functions above. */

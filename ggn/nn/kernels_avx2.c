@@ -6,7 +6,7 @@
 #include "nn/winograd.h"
 
 #define TABLE ggn_kernels_avx2
-#define ISA GGN_ISA_AVX2
+#define ISA BASE_ISA_AVX2
 #ifndef GGN_DOUBLE
 #define FASTER_FORMS \
     .wino = ggn_wino_conv_avx2, .wino_grad = ggn_wino_grad_avx2, .wino_pack = ggn_wino_pack, .bf16 = ggn_bf16_conv, \

@@ -6,7 +6,7 @@
 #include "nn/winograd.h"
 
 #define TABLE ggn_kernels_avx512
-#define ISA GGN_ISA_AVX512
+#define ISA BASE_ISA_AVX512
 #ifndef GGN_DOUBLE
 #define FASTER_FORMS \
     .wino = ggn_wino_conv_avx512, .wino_grad = ggn_wino_grad_avx512, .wino_pack = ggn_wino_pack, \

@@ -13,7 +13,7 @@
 
 #ifndef TABLE
 #define TABLE ggn_kernels_base
-#define ISA GGN_ISA_BASE
+#define ISA BASE_ISA_BASE
 #endif
 #ifndef FASTER_FORMS
 #define FASTER_FORMS

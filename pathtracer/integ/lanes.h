@@ -6,6 +6,7 @@
 #ifndef PT_INTEG_LANES_H
 #define PT_INTEG_LANES_H
 
+#include "base/isa.h"
 #include "integ/integrator.h"
 
 /* Vectors side by side. */
@@ -69,11 +70,10 @@ struct pt_lanes {
                    struct pt_lane_paths *paths);
 };
 
-/* Those of instruction set i, from 0 (the baseline), the weakest first; NULL where the processor or this build has none. */
-enum { PT_LANES_COUNT = 3 };
-const struct pt_lanes *pt_lanes_for(int i);
+/* Those of an instruction set; NULL where the processor or this build has none. */
+const struct pt_lanes *pt_lanes_for(enum base_isa isa);
 
-/* The best there are; the environment variable PT_ISA=base|avx2|avx512 lowers it. */
+/* Those of base_isa_best(). */
 const struct pt_lanes *pt_lanes_best(void);
 
 #endif

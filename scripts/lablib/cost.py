@@ -375,7 +375,7 @@ def grow(o, out):
 
 
 def golden(isa, *options):
-    return json.loads(ggn("golden", "--threads", "1", *options, env={"GGN_ISA": isa}))["p"]
+    return json.loads(ggn("golden", "--threads", "1", *options, env={"LULL_ISA": isa}))["p"]
 
 
 def pictures_of(program, *options):
@@ -428,7 +428,7 @@ def decisions(o, builds):
     own = scores(o, "data", model)
     rows = [changes(name, own, scores(o, "data", *a, **k)) for name, a, k in (
         ("double instead of float", (model, "--precision", "f64"), {}),
-        ("AVX2: Winograd's algorithm in more layers", (model,), {"env": {"GGN_ISA": "avx2"}}),
+        ("AVX2: Winograd's algorithm in more layers", (model,), {"env": {"LULL_ISA": "avx2"}}),
         ("bfloat16 products", (model, "--precision", "bf16"), {}),
         ("weights stored as half floats", (half,), {}),
         ("flush-to-zero, denormals-are-zero", (model,), {"env": {"LD_PRELOAD": flushing()}}),
@@ -436,7 +436,7 @@ def decisions(o, builds):
     few_views(o)  # what is slow
     own = scores(o, "few", model)
     return rows + [changes(name, own, scores(o, "few", model, **k)) for name, k in (
-        ("baseline x86-64: direct convolution", {"env": {"GGN_ISA": "base"}}),
+        ("baseline x86-64: direct convolution", {"env": {"LULL_ISA": "base"}}),
         ("-O0", {"program": os.path.join(builds["-O0"], "bin", "ggn")}))]
 
 

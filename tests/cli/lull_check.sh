@@ -107,5 +107,5 @@ all() { # all CHECKER LIBDIR WHERE CHECK...: each criterion of the build
 t "every criterion of the baselines is checked here" sh -c '[ "$("$1" --list-criteria | grep -c "baselines.so")" = 3 ]' - "$BUILD/bin/lull-render"
 all "$check" "$BUILD/lib/lull" "" newer-host order
 # Once: not again for each instruction set (tests/processors/list).
-[ "$BUILD" = build ] && [ -z "${GGN_ISA:-}" ] && [ -x build/asan/bin/lull-check ] && all build/asan/bin/lull-check build/asan/lib/lull " under ASan and UBSan"
+[ "$BUILD" = build ] && [ -z "${LULL_ISA:-}" ] && [ -x build/asan/bin/lull-check ] && all build/asan/bin/lull-check build/asan/lib/lull " under ASan and UBSan"
 approved tests/golden/lull_check.txt

@@ -78,7 +78,7 @@ mpi_refused "rank 1 on host $(hostname)" 2 sh -c "cd host\$OMPI_COMM_WORLD_RANK 
 for h in 0 1; do cp -r "$data" host$h/data; cp one.ggn host$h/init.ggn; done
 own="--data data --kr 3 --km 3 --kd 4 --crop 32 --ratio 0 --batch 4 --steps-denoiser 1 --steps 1 --picture 0.5"
 each() { mpi_refused "$1" 2 sh -c "cd host\$OMPI_COMM_WORLD_RANK && exec $2 $G train $own --out m.ggn -q $3"; }
-each "has instructions=base (GGN_ISA)" 'env GGN_ISA=$([ $OMPI_COMM_WORLD_RANK = 1 ] && echo base || echo avx512)' ""
+each "has instructions=base (LULL_ISA)" 'env LULL_ISA=$([ $OMPI_COMM_WORLD_RANK = 1 ] && echo base || echo avx512)' ""
 each "has options-crc=" "" '--lr 0.01$OMPI_COMM_WORLD_RANK'
 each "rank 1 on host $(hostname)" "" '--seed $OMPI_COMM_WORLD_RANK' # of which synthetic data are a function
 cp one-paper.ggn host1/init.ggn

@@ -144,17 +144,17 @@ if [ "$(uname -m)" = x86_64 ]; then
 mkdir "$tmp/tests"
 cat >"$tmp/tests/way" <<'END'
 #!/bin/sh
-[ "$GGN_ISA" = base ] && echo 'ok 1 - it is told'
+[ "$LULL_ISA" = base ] && echo 'ok 1 - it is told'
 END
 chmod +x "$tmp/tests/way"
-printf '# why\n\nGGN_ISA=base way\nGGN_ISA=avx512 way # it fails there\n' >"$tmp/list"
+printf '# why\n\nLULL_ISA=base way\nLULL_ISA=avx512 way # it fails there\n' >"$tmp/list"
 export BUILD="$tmp"
 runs "as on other processors: each line of a list" 1 "$tmp/skipped" --processors "$tmp/list" <<'END'
 skipped 0 passed, 1 skipped
     ok 1 # SKIP as cmocka spells it
-[GGN_ISA=base] tests/way 1 passed
-[GGN_ISA=avx512] tests/way 0 passed, 1 FAILED (exit 1)
-FAILED: [GGN_ISA=avx512] tests/way (exit 1)
+[LULL_ISA=base] tests/way 1 passed
+[LULL_ISA=avx512] tests/way 0 passed, 1 FAILED (exit 1)
+FAILED: [LULL_ISA=avx512] tests/way (exit 1)
 1 passed, 1 failed, 1 skipped
 END
 unset BUILD

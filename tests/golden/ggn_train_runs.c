@@ -84,7 +84,7 @@ static void make_gnuplot(void)
 static int setup(void **state)
 {
     (void)state;
-    setenv("GGN_ISA", "base", 1);
+    setenv("LULL_ISA", "base", 1);
     if (!mkdtemp(dir))
         return -1;
     snprintf(data, sizeof data, "%s/data", dir);

@@ -159,7 +159,7 @@ static void test_overflowing_weights(void **state)
 }
 
 /* A pixel that is no number makes every maximum it takes part in none: it must not vanish on the way to a decision. */
-static void check_nan_in_pool(int kernel, enum ggn_isa isa)
+static void check_nan_in_pool(int kernel, enum base_isa isa)
 {
     enum { W = 50, H = 7 };
     static struct ggn_graph g;
@@ -191,9 +191,9 @@ static void check_nan_in_pool(int kernel, enum ggn_isa isa)
 
 static void test_nan_in_pools(void **state)
 {
-    for (int isa = 0; isa < GGN_ISA_COUNT; isa++)
-        for (int kernel = 2; kernel <= 3 && ggn_isa_available((enum ggn_isa)isa); kernel++)
-            check_nan_in_pool(kernel, (enum ggn_isa)isa);
+    for (int isa = 0; isa < BASE_ISA_COUNT; isa++)
+        for (int kernel = 2; kernel <= 3 && base_isa_available((enum base_isa)isa); kernel++)
+            check_nan_in_pool(kernel, (enum base_isa)isa);
     (void)state;
 }
 

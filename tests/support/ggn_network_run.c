@@ -22,7 +22,7 @@ static size_t elements(const struct ggn_value *v, int batch)
     return (size_t)batch * (size_t)v->c * (size_t)v->h * (size_t)v->w;
 }
 
-struct ggn_network_pass GGN_TYPED(ggn_network_run)(const struct ggn_graph *g, enum ggn_isa isa, int batch,
+struct ggn_network_pass GGN_TYPED(ggn_network_run)(const struct ggn_graph *g, enum base_isa isa, int batch,
                                                    struct base_threads *threads, const double *params, const double *x,
                                                    const double *dy)
 {

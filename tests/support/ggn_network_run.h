@@ -4,7 +4,7 @@
 
 #include "base/threads.h"
 #include "nn/graph.h"
-#include "nn/isa.h"
+#include "base/isa.h"
 
 struct ggn_network_pass {
     double *y, *dx, *grad; /* [batch] outputs and input gradients without gaps, [n_params]; owns */
@@ -12,10 +12,11 @@ struct ggn_network_pass {
 };
 
 /* params [n_params], or NULL for hashed ones; x, dy: [batch] inputs and gradients of the output, without gaps. */
-struct ggn_network_pass ggn_network_run(const struct ggn_graph *g, enum ggn_isa isa, int batch, struct base_threads *threads,
-                                        const double *params, const double *x, const double *dy);
+struct ggn_network_pass ggn_network_run(const struct ggn_graph *g, enum base_isa isa, int batch,
+                                        struct base_threads *threads, const double *params, const double *x,
+                                        const double *dy);
 /* In double. */
-struct ggn_network_pass ggn_network_run_f64(const struct ggn_graph *g, enum ggn_isa isa, int batch,
+struct ggn_network_pass ggn_network_run_f64(const struct ggn_graph *g, enum base_isa isa, int batch,
                                             struct base_threads *threads, const double *params, const double *x,
                                             const double *dy);
 

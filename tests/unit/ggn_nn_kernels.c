@@ -67,7 +67,7 @@ static void free_oracle(struct oracle *o)
         free(all[i]);
 }
 
-typedef struct ggn_network_pass run_fn(const struct ggn_graph *, enum ggn_isa, int, struct base_threads *, const double *,
+typedef struct ggn_network_pass run_fn(const struct ggn_graph *, enum base_isa, int, struct base_threads *, const double *,
                                        const double *, const double *);
 
 static void free_pass(struct ggn_network_pass *r)
@@ -78,7 +78,7 @@ static void free_pass(struct ggn_network_pass *r)
 }
 
 /* One convolution, as a network of one layer. */
-static void check(run_fn *run, const struct oracle *o, enum ggn_isa isa, uint32_t seed, double tolerance)
+static void check(run_fn *run, const struct oracle *o, enum base_isa isa, uint32_t seed, double tolerance)
 {
     static struct ggn_graph g;
     const int area = o->c.h * o->c.w;
@@ -109,10 +109,10 @@ static void test_convolutions(void **state)
 {
     for (uint32_t seed = 10; seed < 28; seed++) {
         struct oracle o = make_oracle(seed);
-        for (int isa = 0; isa < GGN_ISA_COUNT; isa++)
-            if (ggn_isa_available((enum ggn_isa)isa)) {
-                check(ggn_network_run, &o, (enum ggn_isa)isa, seed, F32_TOLERANCE);
-                check(ggn_network_run_f64, &o, (enum ggn_isa)isa, seed, F64_TOLERANCE);
+        for (int isa = 0; isa < BASE_ISA_COUNT; isa++)
+            if (base_isa_available((enum base_isa)isa)) {
+                check(ggn_network_run, &o, (enum base_isa)isa, seed, F32_TOLERANCE);
+                check(ggn_network_run_f64, &o, (enum base_isa)isa, seed, F64_TOLERANCE);
             }
         free_oracle(&o);
     }
@@ -126,9 +126,9 @@ static void test_large_convolutions(void **state)
                                                   {.c_in = 20, .c_out = 35, .h = 41, .w = 30, .kernel = 3, .transposed = 1}};
     for (uint32_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++) {
         struct oracle o = oracle_of(sizes[k], 0.25, 60 + k);
-        for (int isa = 0; isa < GGN_ISA_COUNT; isa++)
-            if (ggn_isa_available((enum ggn_isa)isa))
-                check(ggn_network_run, &o, (enum ggn_isa)isa, 60 + k, F32_TOLERANCE);
+        for (int isa = 0; isa < BASE_ISA_COUNT; isa++)
+            if (base_isa_available((enum base_isa)isa))
+                check(ggn_network_run, &o, (enum base_isa)isa, 60 + k, F32_TOLERANCE);
         free_oracle(&o);
     }
     (void)state;
@@ -136,7 +136,7 @@ static void test_large_convolutions(void **state)
 
 /* A convolution with bfloat16 products, and if `bn` a batch norm: [c_out][h][w], on one instruction set. Owned by the caller. */
 static float *bf16_forward(const struct ggn_naive_conv *c, const float *weight, const float *bias, const float *x,
-                           double slope, int bn, enum ggn_isa isa)
+                           double slope, int bn, enum base_isa isa)
 {
     static struct ggn_graph g;
     const int area = c->h * c->w, row = c->w + 1;
@@ -192,12 +192,12 @@ static void check_bf16(struct oracle *o, uint32_t seed)
     round_to_bf16(o->weight, n_w);
     round_to_bf16(o->x, n_x);
     ggn_naive_forward(&o->c, o->x, o->weight, o->bias, o->slope, o->y);
-    for (int isa = 0; isa < GGN_ISA_COUNT; isa++) {
-        if (!ggn_isa_available((enum ggn_isa)isa))
+    for (int isa = 0; isa < BASE_ISA_COUNT; isa++) {
+        if (!base_isa_available((enum base_isa)isa))
             continue;
-        float *y = bf16_forward(&o->c, weight, bias, x, o->slope, 0, (enum ggn_isa)isa);
+        float *y = bf16_forward(&o->c, weight, bias, x, o->slope, 0, (enum base_isa)isa);
         for (int i = 0; i < o->c.c_out * area; i++)
-            near("bfloat16 forward", (enum ggn_isa)isa, seed, (double)y[i], o->y[i], o->c.c_in, F32_TOLERANCE);
+            near("bfloat16 forward", (enum base_isa)isa, seed, (double)y[i], o->y[i], o->c.c_in, F32_TOLERANCE);
         free(y);
     }
     free(weight);
@@ -238,10 +238,10 @@ static void test_bf16_bits(void **state)
         if (seed % 2) /* sums at the edge of what is zero */
             for (int i = 0; i < c.c_in * AREA; i++)
                 x[i] = (float)ldexp((double)x[i] / 0x1p60, -100);
-        float *base = bf16_forward(&c, weight, bias, x, seed % 4 < 2 ? 0.25 : 1, seed % 3 == 0, GGN_ISA_BASE);
-        for (int isa = 1; isa < GGN_ISA_COUNT; isa++)
-            if (ggn_isa_available((enum ggn_isa)isa)) {
-                float *y = bf16_forward(&c, weight, bias, x, seed % 4 < 2 ? 0.25 : 1, seed % 3 == 0, (enum ggn_isa)isa);
+        float *base = bf16_forward(&c, weight, bias, x, seed % 4 < 2 ? 0.25 : 1, seed % 3 == 0, BASE_ISA_BASE);
+        for (int isa = 1; isa < BASE_ISA_COUNT; isa++)
+            if (base_isa_available((enum base_isa)isa)) {
+                float *y = bf16_forward(&c, weight, bias, x, seed % 4 < 2 ? 0.25 : 1, seed % 3 == 0, (enum base_isa)isa);
                 assert_memory_equal(y, base, sizeof *y * (size_t)(c.c_out * AREA));
                 free(y);
             }
@@ -267,8 +267,8 @@ static void test_row_ends(void **state)
     ggn_graph_stage(&g, "a");
     ggn_graph_conv(&g, 0, -1, C, 3, 0, 1);
     assert_int_equal(ggn_graph_end(&g, NULL), 0);
-    for (int isa = 0; isa < GGN_ISA_COUNT; isa++) {
-        const struct ggn_kernels *k = ggn_kernels_for((enum ggn_isa)isa);
+    for (int isa = 0; isa < BASE_ISA_COUNT; isa++) {
+        const struct ggn_kernels *k = ggn_kernels_for((enum base_isa)isa);
         if (!k)
             continue;
         struct ggn_weights *w = ggn_weights_create(&g, k, 0, NULL);
@@ -297,7 +297,7 @@ static void test_row_ends(void **state)
 }
 
 /* A whole small network on hashed inputs and gradients. */
-static struct ggn_network_pass pass_of(run_fn *run, const struct ggn_graph *g, enum ggn_isa isa, int batch,
+static struct ggn_network_pass pass_of(run_fn *run, const struct ggn_graph *g, enum base_isa isa, int batch,
                                        struct base_threads *threads)
 {
     const struct ggn_value *in = &g->value[0], *out = &g->value[g->n_values - 1];
@@ -346,13 +346,13 @@ static void test_instruction_sets(void **state)
 
     for (int net = 0; net < GGN_NETS; net++) {
         build(&g, net);
-        struct ggn_network_pass want = pass_of(ggn_network_run_f64, &g, GGN_ISA_BASE, 3, NULL);
-        for (int isa = 0; isa < GGN_ISA_COUNT; isa++)
-            if (ggn_isa_available((enum ggn_isa)isa)) {
-                struct ggn_network_pass d = pass_of(ggn_network_run_f64, &g, (enum ggn_isa)isa, 3, NULL),
-                                        f = pass_of(ggn_network_run, &g, (enum ggn_isa)isa, 3, NULL);
-                agree(&d, &want, 1e-10, ggn_isa_name((enum ggn_isa)isa));
-                agree(&f, &want, 1e-4, ggn_isa_name((enum ggn_isa)isa));
+        struct ggn_network_pass want = pass_of(ggn_network_run_f64, &g, BASE_ISA_BASE, 3, NULL);
+        for (int isa = 0; isa < BASE_ISA_COUNT; isa++)
+            if (base_isa_available((enum base_isa)isa)) {
+                struct ggn_network_pass d = pass_of(ggn_network_run_f64, &g, (enum base_isa)isa, 3, NULL),
+                                        f = pass_of(ggn_network_run, &g, (enum base_isa)isa, 3, NULL);
+                agree(&d, &want, 1e-10, base_isa_name((enum base_isa)isa));
+                agree(&f, &want, 1e-4, base_isa_name((enum base_isa)isa));
                 free_pass(&d);
                 free_pass(&f);
             }
@@ -367,10 +367,10 @@ static void test_threads_same_bytes(void **state)
 
     for (int net = 0; net < GGN_NETS; net++) {
         build(&g, net);
-        struct ggn_network_pass want = pass_of(ggn_network_run, &g, ggn_isa_best(), 3, NULL);
+        struct ggn_network_pass want = pass_of(ggn_network_run, &g, base_isa_best(), 3, NULL);
         for (int count = 1; count <= 3; count++) {
             struct base_threads *threads = base_threads_create(count, NULL);
-            struct ggn_network_pass got = pass_of(ggn_network_run, &g, ggn_isa_best(), 3, threads);
+            struct ggn_network_pass got = pass_of(ggn_network_run, &g, base_isa_best(), 3, threads);
             assert_memory_equal(got.y, want.y, want.n_y * sizeof *want.y);
             assert_memory_equal(got.grad, want.grad, want.n_grad * sizeof *want.grad);
             free_pass(&got);

@@ -62,7 +62,7 @@ static void structure(void **state)
     FILE *f = open_memstream(&text, &size);
     (void)state;
 
-    setenv("GGN_ISA", "base", 1);
+    setenv("LULL_ISA", "base", 1);
     for (int h = 0; h < 2; h++)
         for (int net = 0; net < GGN_NETS; net++) {
             assert_int_equal(ggn_network_build(&graph, net, hypers[h], NULL), 0);
@@ -76,7 +76,7 @@ static void structure(void **state)
     fprintf(f, "a judge: %zu bytes, with two threads %zu\n", ggn_inference_bytes(model, GGN_PRECISION_F32, 1),
             ggn_inference_bytes(model, GGN_PRECISION_F32, 2));
     ggn_model_destroy(model);
-    unsetenv("GGN_ISA");
+    unsetenv("LULL_ISA");
     fclose(f);
     approve_text("tests/golden/ggn_nn_networks.txt", text);
     free(text);
@@ -85,9 +85,9 @@ static void structure(void **state)
 /* Scratch is as large as the largest task of any layer needs, in every form that the kernels have. */
 static void scratch(void **state)
 {
-    for (int isa = 0; isa < GGN_ISA_COUNT; isa++)
+    for (int isa = 0; isa < BASE_ISA_COUNT; isa++)
         for (int k = 0; k < 6; k++) {
-            const struct ggn_kernels *kernels = ggn_kernels_for((enum ggn_isa)isa);
+            const struct ggn_kernels *kernels = ggn_kernels_for((enum base_isa)isa);
             const int in = k < 3 ? 9 : 60, out = k % 3 == 0 ? 9 : 70, wide = k % 3 == 1;
             static const int flags[] = {0, GGN_EXEC_GRADS, GGN_EXEC_BF16};
             for (int m = 0; m < 3 && kernels; m++) {
@@ -261,25 +261,25 @@ static void packed(void **state)
 static void instruction_sets(void **state)
 {
     static const char *const names[] = {"base", "avx2", "avx512"};
-    const enum ggn_isa best = (unsetenv("GGN_ISA"), ggn_isa_best());
+    const enum base_isa best = (unsetenv("LULL_ISA"), base_isa_best());
     (void)state;
 
-    assert_true(ggn_isa_available(GGN_ISA_BASE) && ggn_isa_available(best) && !ggn_isa_available(GGN_ISA_COUNT));
-    for (int i = 0; i < GGN_ISA_COUNT; i++) {
-        assert_string_equal(ggn_isa_name((enum ggn_isa)i), names[i]);
-        assert_true(i <= (int)best || !ggn_isa_available((enum ggn_isa)i));
-        setenv("GGN_ISA", names[i], 1);
-        assert_int_equal(ggn_isa_best(), i < (int)best ? i : (int)best);
-        assert_true(i == GGN_ISA_AVX512 || strcmp(ggn_bf16_name(), "software") == 0);
-        assert_ptr_equal(ggn_kernels_best(), ggn_kernels_for(ggn_isa_best()));
-        if (ggn_isa_available((enum ggn_isa)i))
-            assert_int_equal(ggn_kernels_for((enum ggn_isa)i)->isa, i);
+    assert_true(base_isa_available(BASE_ISA_BASE) && base_isa_available(best) && !base_isa_available(BASE_ISA_COUNT));
+    for (int i = 0; i < BASE_ISA_COUNT; i++) {
+        assert_string_equal(base_isa_name((enum base_isa)i), names[i]);
+        assert_true(i <= (int)best || !base_isa_available((enum base_isa)i));
+        setenv("LULL_ISA", names[i], 1);
+        assert_int_equal(base_isa_best(), i < (int)best ? i : (int)best);
+        assert_true(i == BASE_ISA_AVX512 || strcmp(ggn_bf16_name(), "software") == 0);
+        assert_ptr_equal(ggn_kernels_best(), ggn_kernels_for(base_isa_best()));
+        if (base_isa_available((enum base_isa)i))
+            assert_int_equal(ggn_kernels_for((enum base_isa)i)->isa, i);
         else
-            assert_null(ggn_kernels_for((enum ggn_isa)i));
+            assert_null(ggn_kernels_for((enum base_isa)i));
     }
-    setenv("GGN_ISA", "avx", 1); /* none of them: the best */
-    assert_int_equal(ggn_isa_best(), best);
-    unsetenv("GGN_ISA");
+    setenv("LULL_ISA", "avx", 1); /* none of them: the best */
+    assert_int_equal(base_isa_best(), best);
+    unsetenv("LULL_ISA");
 }
 
 /* --- what is refused ------------------------------------------------------------------------------------------------------------------- */

@@ -26,18 +26,18 @@ static void fresh(uint32_t seed)
     }
 }
 
-static void compare(const char *what, enum ggn_isa isa, int w, double tolerance)
+static void compare(const char *what, enum base_isa isa, int w, double tolerance)
 {
     for (int i = 0; i < ROOM; i++)
         if (!(fabs((double)got[i] - wanted[i]) <= tolerance * fmax(1, fabs(wanted[i]))))
-            fail_msg("%s on %s, width %d, element %d: %.9g, not %.9g", what, ggn_isa_name(isa), w, i, (double)got[i],
+            fail_msg("%s on %s, width %d, element %d: %.9g, not %.9g", what, base_isa_name(isa), w, i, (double)got[i],
                      wanted[i]);
 }
 
-static void scalar(const char *what, enum ggn_isa isa, int w, double value, double want)
+static void scalar(const char *what, enum base_isa isa, int w, double value, double want)
 {
     if (!(fabs(value - want) <= F32_TOLERANCE * fmax(1, fabs(want))))
-        fail_msg("%s on %s, width %d: %.9g, not %.9g", what, ggn_isa_name(isa), w, value, want);
+        fail_msg("%s on %s, width %d: %.9g, not %.9g", what, base_isa_name(isa), w, value, want);
 }
 
 /* Sums and maps of a plane of h × w with rows of w + 2. */
@@ -199,8 +199,8 @@ static void check_vectors(const struct ggn_kernels *k, int n)
 
 static void test_planes(void **state)
 {
-    for (int isa = 0; isa < GGN_ISA_COUNT; isa++) {
-        const struct ggn_kernels *k = ggn_kernels_for((enum ggn_isa)isa);
+    for (int isa = 0; isa < BASE_ISA_COUNT; isa++) {
+        const struct ggn_kernels *k = ggn_kernels_for((enum base_isa)isa);
         for (int w = 1; w < 50 && k; w += w < 10 ? 1 : 7) {
             check_plane(k, 3, w);
             check_scaling(k, 4 + w % 2, 2 + w);

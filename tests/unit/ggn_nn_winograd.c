@@ -98,10 +98,10 @@ static void end(struct work *w)
     free(w->graph);
 }
 
-static void near(const char *what, enum ggn_isa isa, size_t at, double got, double want, double scale)
+static void near(const char *what, enum base_isa isa, size_t at, double got, double want, double scale)
 {
     if (!(fabs(got - want) <= TOLERANCE * fmax(fabs(want), scale)))
-        fail_msg("%s on %s, element %zu: %.9g, not %.9g", what, ggn_isa_name(isa), at, got, want);
+        fail_msg("%s on %s, element %zu: %.9g, not %.9g", what, base_isa_name(isa), at, got, want);
 }
 
 /* u as the kernels of `k` want it. */
@@ -167,16 +167,16 @@ static void test_forward(void **state)
 
         assert_non_null(now);
         add[w.c.c_out - 1] = 1;
-        for (int isa = 0; isa < GGN_ISA_COUNT; isa++)
+        for (int isa = 0; isa < BASE_ISA_COUNT; isa++)
             for (int cut = 0; cut < 3; cut++) {
-                const struct ggn_kernels *k = ggn_kernels_for((enum ggn_isa)isa);
+                const struct ggn_kernels *k = ggn_kernels_for((enum base_isa)isa);
                 if (!k || !k->wino)
                     continue;
                 run(&w, k, least + 2 * cut, cut == 1 ? k->tile_oc : cut == 2 ? 16 : w.c.c_out, add);
                 for (int i = 0; i < count; i++) {
                     const int o = i / plane, y = i % plane / row, x = i % row;
                     now[i] = w.y[o][y * row + x]; /* with the column behind the picture, which nobody writes */
-                    near("forward", (enum ggn_isa)isa, (size_t)i, (double)now[i],
+                    near("forward", (enum base_isa)isa, (size_t)i, (double)now[i],
                          x == w.c.w ? 0 : w.out[(o * w.c.h + y) * w.c.w + x] + add[o], w.c.c_in);
                 }
                 if (!first) {
@@ -228,16 +228,16 @@ static void test_gradient(void **state)
         assert_non_null(dw);
         for (int o = 0; o < w.c.c_out; o++)
             put(&w, w.y[o], w.dz + o * w.c.h * w.c.w);
-        for (int isa = 0; isa < GGN_ISA_COUNT; isa++)
+        for (int isa = 0; isa < BASE_ISA_COUNT; isa++)
             for (int mirrored = 0; mirrored < 2; mirrored++) {
-                const struct ggn_kernels *k = ggn_kernels_for((enum ggn_isa)isa);
+                const struct ggn_kernels *k = ggn_kernels_for((enum base_isa)isa);
                 if (!k || !k->wino_grad)
                     continue;
                 dw[count] = 7;
                 run_gradient(&w, k, mirrored, dw);
                 assert_true(dw[count] == 7); /* whole vectors do not reach behind the weights */
                 for (size_t i = 0; i < count; i++)
-                    near("gradient", (enum ggn_isa)isa, i, (double)dw[i], w.dw[mirrored ? i / 9 * 9 + 8 - i % 9 : i],
+                    near("gradient", (enum base_isa)isa, i, (double)dw[i], w.dw[mirrored ? i / 9 * 9 + 8 - i % 9 : i],
                          w.c.h * w.c.w);
                 if (!first) {
                     first = malloc(count * sizeof *first);
@@ -257,8 +257,8 @@ static void test_gradient(void **state)
 /* The weights of the shipped networks are transformed with AVX2, too. */
 static void test_every_vector_unit(void **state)
 {
-    for (int isa = GGN_ISA_AVX2; isa < GGN_ISA_COUNT; isa++) {
-        const struct ggn_kernels *k = ggn_kernels_for((enum ggn_isa)isa);
+    for (int isa = BASE_ISA_AVX2; isa < BASE_ISA_COUNT; isa++) {
+        const struct ggn_kernels *k = ggn_kernels_for((enum base_isa)isa);
         assert_true(!k || (k->wino && k->wino_grad && k->wino_pack));
     }
     (void)state;
