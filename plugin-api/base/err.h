@@ -9,9 +9,10 @@
 #define BASE_ERR_H
 
 enum {
-    BASE_EINVAL = -1, /* bad input or argument: exit status 2 */
-    BASE_ENOMEM = -2, /* out of memory: exit status 1 */
-    BASE_EIO = -3     /* a file could not be read or written: exit status 2 */
+    BASE_EINVAL = -1,    /* bad input or argument: exit status 2 */
+    BASE_ENOMEM = -2,    /* out of memory: exit status 1 */
+    BASE_EIO = -3,       /* a file could not be read or written: exit status 2 */
+    BASE_ECANCELLED = -4 /* the caller's callback said so */
 };
 
 struct base_err {

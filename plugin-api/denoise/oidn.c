@@ -93,7 +93,7 @@ static int run_program(struct lull_oidn *o, int (*cancelled)(void *data), void *
         return rc == ENOMEM ? base_fail_nomem(err, "lull-denoiser")
                             : base_fail(err, BASE_EIO, "cannot run %s: %s", o->program, strerror(rc));
     if (wait_for(pid, cancelled, data))
-        return base_fail(err, BASE_EINVAL, "cancelled");
+        return base_fail(err, BASE_ECANCELLED, "cancelled");
     if (!s->done)
         return base_fail(err, BASE_EINVAL, "Open Image Denoise ended its process: a crash, or no memory");
     s->version[sizeof s->version - 1] = s->text[sizeof s->text - 1] = '\0';

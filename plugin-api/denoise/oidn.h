@@ -57,7 +57,7 @@ const char *lull_oidn_version(const struct lull_oidn *oidn);
 int lull_oidn_prepare(struct lull_oidn *oidn, const struct lull_oidn_form *form, struct base_err *err);
 
 /* Denoises each color of the prepared form. cancelled(data), which may be NULL, is asked 50 times a second; not 0 ends the
- * program and the call, with BASE_EINVAL "cancelled". Allocates nothing. BASE_ENOMEM; BASE_EIO: the program cannot be run;
+ * program and the call, with BASE_ECANCELLED. Allocates nothing. BASE_ENOMEM; BASE_EIO: the program cannot be run;
  * BASE_EINVAL: the library's own error, in its words, or that the program died. out is undefined after a failure. */
 int lull_oidn_run(struct lull_oidn *oidn, const struct lull_oidn_pictures *pictures, int (*cancelled)(void *data),
                   void *data, struct base_err *err);

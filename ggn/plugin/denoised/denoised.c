@@ -141,12 +141,11 @@ static void tell(const struct lull_instance *in, const struct lull_block *b, con
     gp_log(&in->kit, LULL_LOG_DEBUG, line);
 }
 
-static int32_t fail_of(const struct lull_instance *in, const struct gd_block_view *seen, struct lull_error *err)
+static int32_t fail_of(const struct gd_block_view *seen, struct lull_error *err)
 {
-    const struct lull_host *host = in->kit.host;
-    int32_t code = seen->err.code == BASE_ENOMEM ? LULL_E_MEMORY : LULL_E_INTERNAL;
-    if (host && host->cancelled && host->cancelled(host))
-        code = LULL_E_CANCELLED;
+    int32_t code = seen->err.code == BASE_ENOMEM       ? LULL_E_MEMORY
+                   : seen->err.code == BASE_ECANCELLED ? LULL_E_CANCELLED
+                                                       : LULL_E_INTERNAL;
     return lull_kit_fail(err, code, "evaluate: %.400s", seen->err.text);
 }
 
@@ -160,7 +159,7 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
     int32_t status = lull_kit_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
     for (uint32_t i = 0; !status && i < in->workers; i++)
         if (in->seen[i].err.code)
-            status = fail_of(in, &in->seen[i], err);
+            status = fail_of(&in->seen[i], err);
     for (uint32_t i = 0; i < count && !status; i++) {
         const struct lull_block *b = lull_kit_at(blocks, block_stride, i);
         const int again = in->past[b->id].spp == b->spp;
