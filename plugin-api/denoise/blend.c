@@ -9,9 +9,6 @@ enum { RADIUS = 9 };
 static const float weight[RADIUS + 1] = {1.0f,         0.945959469f, 0.800737403f, 0.606530660f, 0.411112291f,
                                          0.249352209f, 0.135335283f, 0.065728529f, 0.028565501f, 0.011108997f};
 
-/* The variance of halves that are black and white, which is the most that a display shows. */
-static const float SHOWN_MOST = 2500.0f;
-
 /* A pixel whose own square is more than this many of its neighbourhood's is a speck: two standard deviations. */
 static const float SPECK = 4.0f;
 
@@ -46,8 +43,6 @@ void lull_blend_weights(const struct lull_estimate *estimate, int width, int hei
     const size_t n = (size_t)width * (size_t)height;
     memcpy(alpha, estimate->noisy, n * sizeof *alpha);
     memcpy(apart, estimate->agreed, n * sizeof *apart);
-    for (size_t i = 0; i < n; i++)
-        estimate->noisy[i] = fminf(estimate->noisy[i], SHOWN_MOST);
     pool(estimate->denoised, width, height, scratch);
     pool(estimate->agreed, width, height, scratch);
     pool(estimate->noisy, width, height, scratch);

@@ -21,10 +21,9 @@ void lull_estimate_pixels(const struct lull_estimate_in *in, size_t n, const str
         const double a = (double)in->a[i], b = (double)in->b[i], fa = (double)in->fa[i], fb = (double)in->fb[i];
         const double slope = lull_lightness_slope(0.5 * (fa + fb)), unit = slope * slope;
         const double halves = (a - b) * (a - b), filtered = (fa - fb) * (fa - fb);
-        const double sampled = (double)in->ra[i] - (double)in->rb[i];
         const double crossed = 0.5 * ((fa - b) * (fa - b) + (fb - a) * (fb - a));
         out->denoised[i] = bounded(unit * (crossed - 0.5 * halves - 0.25 * filtered));
         out->agreed[i] = bounded(unit * 0.25 * filtered);
-        out->noisy[i] = bounded(unit * split * sampled * sampled);
+        out->noisy[i] = bounded(unit * split * halves);
     }
 }

@@ -17,17 +17,16 @@
 
 #include <stddef.h>
 
-struct lull_estimate_in { /* luminance, 1 = the display's white, in [0, 1] but for ra and rb; [n]; finite */
+struct lull_estimate_in { /* luminance, 1 = the display's white; [n]; finite */
     const float *a, *b;   /* the halves */
     const float *fa, *fb; /* denoised */
-    const float *ra, *rb; /* the halves, not cut off at white */
     double share;         /* of all samples that are in A, in (0, 1) */
 };
 
 struct lull_estimate { /* squares of L*; [n] each, the caller's */
     float *denoised;   /* mse of D, unbiased; may be negative */
     float *agreed;     /* (F(A) - F(B))^2 / 4: the pooled mse of D is at least the pooled one of this */
-    float *noisy;      /* variance of the mean of all samples, not cut off either */
+    float *noisy;      /* variance of the mean of all samples */
 };
 
 /* The derivative of L* by Y (CIE 15:2004), Y = 1 at white; goes on above it. */

@@ -104,32 +104,29 @@ static int32_t run(struct picture *p, int count, struct lull_error *err)
     return lull_oidn_run(p->oidn, &pictures, how->cancelled, how->context, &why) ? lull_host_translate(&why, err) : LULL_OK;
 }
 
-/* Luminance, 1 is the display's white. */
-static float luminance(const struct picture *p, const float *rgb)
+/* Luminance as a display shows it, 1 is its white. */
+static float shown(const struct picture *p, const float *rgb)
 {
     double y = 0.0;
     for (int c = 0; c < 3; c++)
         y += p->luminance[c] * (double)rgb[c];
-    return (float)(p->exposure * y);
+    y *= p->exposure;
+    return (float)(y > 0.0 ? fmin(y, 1.0) : 0.0);
 }
-
-/* As a display shows it. */
-static float shown(float y) { return y > 0.0f ? fminf(y, 1.0f) : 0.0f; }
 
 static void estimate(struct picture *p, const struct lull_kit_span *s, size_t at)
 {
-    float light[4][LULL_KIT_SPAN_MAX], sampled[2][LULL_KIT_SPAN_MAX];
+    float light[4][LULL_KIT_SPAN_MAX];
     const struct lull_estimate part = {p->error.denoised + at, p->error.agreed + at, p->error.noisy + at};
     if (!has_halves(s->block))
         return;
     for (size_t i = 0; i < (size_t)s->count; i++)
         for (int k = 0; k < 2; k++) {
-            sampled[k][i] = luminance(p, p->color[k] + 3 * (at + i));
-            light[k][i] = shown(sampled[k][i]);
-            light[2 + k][i] = shown(luminance(p, p->clean[k] + 3 * (at + i)));
+            light[k][i] = shown(p, p->color[k] + 3 * (at + i));
+            light[2 + k][i] = shown(p, p->clean[k] + 3 * (at + i));
         }
-    const struct lull_estimate_in in = {
-        light[0], light[1], light[2], light[3], sampled[0], sampled[1], (double)s->block->half_spp / (double)s->block->spp};
+    const struct lull_estimate_in in = {light[0], light[1], light[2], light[3],
+                                        (double)s->block->half_spp / (double)s->block->spp};
     lull_estimate_pixels(&in, (size_t)s->count, &part);
 }
 

@@ -94,11 +94,12 @@ static const struct subject {
     const char *name;
     meeting *meet;
     double seen;          /* what may be left where a block stops; 1 is just seen */
+    double kept;          /* what may be left where none stops it: of a sample of 10^6 a grey point */
     uint64_t least, most; /* samples at which a block stops */
-} subjects[] = {{"stripes", stripes, 1.1, 256, SPP_MAX}, {"defocus", defocus, 2, 100, SPP_MAX},
-                {"motion", motion, 2, 100, SPP_MAX},     {"fog", fog, 1.1, 64, SPP_MAX},
-                {"black", black, 0.01, 80, 80},          {"white", white, 0.01, 80, 80},
-                {"hot", hot, 1.1, 80, SPP_MAX}};
+} subjects[] = {{"stripes", stripes, 1.1, 3, 256, SPP_MAX}, {"defocus", defocus, 2, 3, 100, SPP_MAX},
+                {"motion", motion, 2, 3, 100, SPP_MAX},     {"fog", fog, 1.1, 3, 64, SPP_MAX},
+                {"black", black, 0.01, 3, 80, 80},          {"white", white, 0.01, 3, 80, 80},
+                {"hot", hot, 1.1, 4.5, 80, SPP_MAX}};
 
 static const struct subject *subject;
 
@@ -233,7 +234,7 @@ static void a_picture(void **state)
         assert_true(isfinite(made.rgb[i]) && made.rgb[i] >= 0);
     printf("# figure %s: stopped at up to %llu samples, up to %.2f of what is just seen, weight %.2f\n", subject->name,
            (unsigned long long)spp, worst, made.weight_mean);
-    assert_true(spp <= subject->most && worst < 3);
+    assert_true(spp <= subject->most && worst < subject->kept);
     pt_denoised_release(&made);
     pt_render_destroy(r);
     lull_host_close(criterion);

@@ -392,7 +392,6 @@ int gd_block_view_errors(struct gd_block_view *l, const struct gd_form *form, co
     const double n = (double)b->spp, h = (double)b->half_spp;
     const double split = 0.5 * seq_half_scale(n, h); /* to noise as strong as the mean's */
     const struct lull_estimate estimate = {l->slope, l->crossed, l->blurred};
-    float *const sampled[2] = {l->scratch, l->edges};
 
     l->err = (struct base_err){0};
     if (denoise(l, kit))
@@ -400,12 +399,7 @@ int gd_block_view_errors(struct gd_block_view *l, const struct gd_form *form, co
     for (size_t k = 0; k < 4; k++)
         show(l, shown[k], box, b, kit, l->light[k], l->lightness[k % 2]);
     ggn_visible_texture(l->lightness[0], l->lightness[1], width, height, l->rows, l->texture);
-    for (size_t i = 0; i < pixels; i++)
-        for (int k = 0; k < 2; k++) {
-            const float *half = pixel_of(l, HALF_A + k, box, b, i);
-            sampled[k][i] = (float)(kit->exposure * base_luminance((double)half[0], (double)half[1], (double)half[2]));
-        }
-    struct lull_estimate_in in = {l->light[0], l->light[1], l->light[2], l->light[3], sampled[0], sampled[1], h / n};
+    struct lull_estimate_in in = {l->light[0], l->light[1], l->light[2], l->light[3], h / n};
     lull_estimate_pixels(&in, pixels, &estimate);
     lull_blend_weights(&estimate, width, height, l->scratch, l->alpha, l->apart);
     for (size_t i = 0; i < pixels; i++) {
