@@ -50,7 +50,7 @@ static void numbers(void **state)
     (void)state;
     int found = 0;
     for (int isa = 0; isa < BASE_ISA_COUNT; isa++) {
-        const struct pt_lanes *lanes = pt_lanes_for(isa);
+        const struct pt_lanes *lanes = pt_lanes_for((enum base_isa)isa);
         for (int k = 0; lanes && k < 2 * 5 * PT_RUN; k++)
             check_numbers(lanes, k % 2, 1 + k / 10, (uint32_t)(k / 2 % 5));
         found += lanes != NULL;
