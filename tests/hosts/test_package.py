@@ -803,7 +803,9 @@ def test_denoise():
         made, full = lull.denoise(f), lull.denoise(f, full=True, threads=1)
     assert [a.shape for a in made] == [(32, 32, 3), (32, 32, 3), (32, 32), (4,), (4,)]
     assert {a.dtype.name for a in made[:3]} == {"float32"} and np.isfinite([made.error, made.noisy_error]).all()
-    assert np.allclose(made.denoised, box5(f.mean()), atol=1e-5) and (full.picture == full.denoised).all() and not full.weight.any()
+    smooth = box5(f.mean())  # of which specks of one half are brought down
+    assert np.isclose(made.denoised, smooth, atol=1e-5).mean() > .9 and (made.denoised <= smooth + 1e-5).all()
+    assert (full.picture == full.denoised).all() and not full.weight.any()
     weight = made.weight[..., None]
     assert 0 <= weight.min() < .2 and weight.max() <= 1
     assert np.allclose(made.picture, weight * f.mean() + (1 - weight) * made.denoised, atol=1e-5)
