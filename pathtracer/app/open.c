@@ -29,6 +29,18 @@ static void override(const struct pt_integrator *by, struct pt_integrator *i)
     }
 }
 
+/* Says where the time went when a person would have noticed it. */
+static void note_slow_load(struct base_log *log, const char *path, const struct pt_scene_stats *stats)
+{
+    const double noticeable_s = 3;
+    double total_s = stats->parse_s + stats->texture_s + stats->build_s + stats->accel_s;
+    if (total_s >= noticeable_s)
+        base_log_note(log,
+                      "%.200s: loaded in %.1f s: text and meshes %.1f, textures %.1f, acceleration structure %.1f, the rest "
+                      "%.1f",
+                      path, total_s, stats->parse_s, stats->texture_s, stats->accel_s, stats->build_s);
+}
+
 int pt_open_scene(const struct pt_cli *cli, struct job *job, struct base_log *log, struct pt_open *o, struct base_err *err)
 {
     struct pt_load_options options = cli->load;
@@ -51,6 +63,7 @@ int pt_open_scene(const struct pt_cli *cli, struct job *job, struct base_log *lo
     o->config.integrator = found.integrator;
     override(&cli->render.integrator, &o->config.integrator);
     o->load_s = base_clock_wall_s() - o->start_s;
+    note_slow_load(log, cli->scene, &o->scene->stats);
     return 0;
 }
 

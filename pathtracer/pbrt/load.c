@@ -21,18 +21,6 @@ void pt_scene_destroy(struct pt_scene *scene)
     free(scene);
 }
 
-/* Says where the time went when a person would have noticed it. */
-static void note_slow_load(struct base_log *log, const char *path, const struct pt_scene_stats *stats)
-{
-    const double noticeable_s = 3;
-    double total_s = stats->parse_s + stats->texture_s + stats->build_s + stats->accel_s;
-    if (total_s >= noticeable_s)
-        base_log_note(log,
-                      "%.200s: loaded in %.1f s: text and meshes %.1f, textures %.1f, acceleration structure %.1f, the rest "
-                      "%.1f",
-                      path, total_s, stats->parse_s, stats->texture_s, stats->accel_s, stats->build_s);
-}
-
 int pt_scene_load_source(const char *path, const struct pt_source *source, const struct pt_load_options *options,
                          struct pt_scene **out, struct pt_scene_defaults *defaults, struct base_err *err)
 {
@@ -61,7 +49,6 @@ int pt_scene_load_source(const char *path, const struct pt_source *source, const
         rc = pt_builder_finish(b);
     scene->stats.build_s = base_clock_wall_s() - start_s - scene->stats.accel_s;
     if (!rc) {
-        note_slow_load(b->options->log, path, &scene->stats);
         *out = scene;
         *defaults = found;
         scene = NULL;

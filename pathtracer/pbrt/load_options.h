@@ -22,7 +22,7 @@ struct pt_load_options {
     int light_selection;        /* enum pt_light_selection */
     pt_effects forced;          /* effects to turn on whether needed or not (--effects=all) */
     struct base_inputs *inputs; /* gets every file that is read; may be NULL */
-    struct base_log *log;       /* notes of warnings and of a slow load; may be NULL */
+    struct base_log *log;       /* notes of warnings; may be NULL */
 };
 
 /* What the file says about the image and how to render it; the command line may override it. */
