@@ -10,6 +10,7 @@
 #include "cli/commands.h"
 #include "figures/stats.h"
 #include "model/inference.h"
+#include "model/measure.h"
 #include "model/stopper.h"
 #include "model/trainer.h"
 #include "nn/hash.h"
@@ -192,12 +193,22 @@ static double denoiser_train_ms(struct bench *b, struct base_err *err)
 /* Generator and discriminator on both windows of each sample. */
 static double judge_train_ms(struct bench *b, struct base_err *err)
 {
+    static const double law[64];
+    static const float nothing[GGN_SCALARS];
+    const float *scalars[64];
     double label[64], bce, start = now_s(b);
-    struct ggn_batch batch = {
-        .count = b->o.batch, .noisy = b->noisy, .denoised = b->noisy, .label = label, .noise_map = b->noise_map};
+    struct ggn_batch batch = {.count = b->o.batch,
+                              .noisy = b->noisy,
+                              .denoised = b->noisy,
+                              .noise_map = b->noise_map,
+                              .scalars = scalars,
+                              .law = law,
+                              .label = label};
 
-    for (int i = 0; i < b->o.batch; i++)
+    for (int i = 0; i < b->o.batch; i++) {
         label[i] = i & 1;
+        scalars[i] = nothing;
+    }
     if (ggn_trainer_classifier_step(b->trainer, &batch, &bce, NULL, err))
         return 0;
     return 1e3 * (now_s(b) - start) / b->o.batch;
