@@ -38,8 +38,8 @@ def test_pattern():
         with Cycles(scene, 600) as host:
             own, notes = host.pattern == name, [n for n in host.notes if "pattern" in n]
             rect = [Rect(0, 0, 24, 16)]
-            waves = [(0, 16), (16, 16), (32, 480), (512, 88)]
-            mean = sum(n * next(iter(host.render(rect, first, n, False)))["color"].astype(float) for first, n in waves) / 600
+            waves = [(0, 16), (16, 16), (32, 480), (512, 88)]  # of one half, so from 2 * first on
+            mean = sum(n * next(iter(host.render(rect, 2 * first, n, False)))["color"].astype(float) for first, n in waves) / 600
             whole = next(iter(host.render(rect, 0, 600, False)))["color"]
         assert scene.cycles.sampling_pattern == name and own == (not notes), (name, notes)
         assert abs(mean - whole).max() < SAME * 10, (name, abs(mean - whole).max())
@@ -72,18 +72,19 @@ def colourful(width=40, height=30):
 def test_passes():
     """alpha and the view layer's passes are those of one render, also after a resume; Blender finds them by name"""
     scene = colourful()
-    settings = Settings("null", spp_max=48, block=20, output=tmp("passes.exr"), checkpoint=tmp("passes.npz"))
-    for spp in (32, 48):
+    settings = Settings("null", spp_max=64, block=20, output=tmp("passes.exr"), checkpoint=tmp("passes.npz"))
+    for spp in (32, 64):
         with Session(scene, dataclasses.replace(settings, spp_max=spp)) as session:
+            session.host.seeds = (scene.cycles.seed, scene.cycles.seed)  # equal halves: one render of half the samples
             session.begin(resume=True)
             session.write(session.driver.run())
     assert any("Cryptomatte" in note for note in session.notes)
     found = layers(tmp("passes.exr"))
     layer = scene.view_layers[0]
     layer.use_pass_diffuse_color = True
-    with Cycles(scene, 48) as host:
+    with Cycles(scene, 64) as host:
         whole = Rect(0, 0, 40, 30)
-        wanted, early = host._render_area(whole, 0, 48), host._render_area(whole, 0, 16)
+        wanted, early = host._render_area(whole, 0, 32), host._render_area(whole, 0, 16)
     wanted.update({name: plane for name, plane in early.items() if name.startswith("Vector.")})  # of the first wave
     compared = set()
     for name, plane in wanted.items():
@@ -120,7 +121,7 @@ def passes_in_blender(path):
 
 
 def test_same_picture():
-    """blocks and waves add up to one Cycles render with the same samples"""
+    """blocks and waves add up to a Cycles render for each half with the same samples"""
     scene = cube()
     with Session(scene, Settings("fixed", {"spp": "40"}, block=24)) as session:
         assert session.driver.run().outcome == "done" and len(session.frame.blocks) == 6
@@ -128,6 +129,22 @@ def test_same_picture():
     assert {b.spp for b in session.frame.blocks} == {64}
     whole = one_render(scene, 64)
     assert whole.std() > .01 and abs(mean - whole).max() < SAME * whole.max(), abs(mean - whole).max()
+
+
+def test_halves():
+    """at the edges of a bright lamp the halves differ as much as the picture is wrong, although Cycles' samples are even there"""
+    scene = cube(32, 24)
+    material = bpy.data.objects["Cube"].material_slots[0].material
+    lamp = material.node_tree.nodes.new("ShaderNodeEmission")
+    lamp.inputs["Strength"].default_value = 20
+    output = next(n for n in material.node_tree.nodes if n.type == "OUTPUT_MATERIAL")
+    material.node_tree.links.new(lamp.outputs[0], output.inputs["Surface"])
+    with Session(scene, Settings("halfbuf", {"threshold": "1e-9"}, block=32, spp_max=256)) as session:
+        assert session.driver.run().outcome == "done"
+        mean, half = session.frame.mean(), session.frame.mean("half")
+    wrong = np.sqrt(((mean - one_render(scene, 4096)) ** 2).mean())
+    apart = np.sqrt(((half - mean) ** 2).mean())
+    assert .5 * wrong < apart < 2 * wrong, (apart, wrong)
 
 
 def exported(name, width=48, height=36):
@@ -143,8 +160,8 @@ def exported(name, width=48, height=36):
 
 
 def test_exported_scenes():
-    """three scenes of ours: where blocks stopped, the picture is that of one Cycles render with the same samples"""
-    for name, threshold in (("cornell-box", ".01"), ("soft-shadow", ".006"), ("glossy", ".02")):
+    """three scenes of ours: where blocks stopped, the picture is that of a Cycles render for each half with the same samples"""
+    for name, threshold in (("cornell-box", ".012"), ("soft-shadow", ".006"), ("glossy", ".02")):
         scene = exported(name)
         settings = Settings("halfbuf", {"threshold": threshold, "tail-share": "1"}, block=24, spp_max=96)
         with Session(scene, settings) as session:
@@ -169,7 +186,7 @@ def test_borders():
             for _ in range(12):
                 x0, x1 = sorted(rng.choice(width + 1, 2, False).tolist())
                 y0, y1 = sorted(rng.choice(height + 1, 2, False).tolist())
-                part = next(iter(host.render([Rect(x0, y0, x1, y1)], 0, 1, False)))["color"]
+                part = next(iter(host.render([Rect(x0, y0, x1, y1)], 0, 1, True)))["color"]
                 assert (part == whole[y0:y1, x0:x1]).all(), (width, height, x0, y0, x1, y1)
 
 

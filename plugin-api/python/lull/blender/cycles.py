@@ -3,6 +3,8 @@
 
 Relies on what Cycles does with persistent data, a fixed seed, a pattern that allows it and a sample offset: samples [first,
 first + count) of a pixel are those that one long render would take, whatever border is rendered, so that waves add up to it.
+Each half is such a render, with a seed of its own. Halves of one sequence would be less even than the whole: at the edge of
+a bright lamp they differ by far more than the picture is wrong.
 The pixels come back through an uncompressed EXR, because the Render Result cannot be read in background mode; the file has
 no name and lies in memory, so that it is gone with the process however that ends. Every setting that is touched is put
 back on exit.
@@ -47,6 +49,8 @@ def _silence() -> Iterator[None]:
 # Of the view layer: the picture, and what its denoiser would read
 PLANES = {"color": [f"Combined.{c}" for c in "RGB"], "albedo": [f"Denoising Albedo.{c}" for c in "RGB"],
           "normal": [f"Denoising Normal.{c}" for c in "XYZ"]}
+
+WAVE = 16  # samples
 
 # Names of the colour passes by which Cycles divides light, in 4.x and in 5.x
 COLOURS = {"diffuse": {"DiffCol", "Diffuse Color"}, "glossy": {"GlossCol", "Glossy Color"},
@@ -124,6 +128,7 @@ class Cycles:
         if not any(layer.use for layer in scene.view_layers):
             raise HostError(f"scene '{scene.name}' has no view layer that is used for rendering")
         self.scene, self.spp_max, self.denoised = scene, spp_max, denoised
+        self.seeds = (scene.cycles.seed ^ 0x3504F333, scene.cycles.seed)  # of half B, of half A
         self.width = render.resolution_x * render.resolution_percentage // 100
         self.height = render.resolution_y * render.resolution_percentage // 100
         self.threads, self.crop = render.threads, self._region()
@@ -175,7 +180,7 @@ class Cycles:
                       color_management="FOLLOW_SCENE")
             self._set(cycles, use_adaptive_sampling=False, use_denoising=False, use_layer_samples="IGNORE", time_limit=0.0,
                       use_sample_subset=True, sample_offset=0, samples=1, sample_subset_length=1)
-            self._set(cycles, sampling_pattern=self.pattern)
+            self._set(cycles, sampling_pattern=self.pattern, seed=cycles.seed)
             for layer in self.scene.view_layers:
                 self._set(layer, use=layer == self.layer)
             self._set(self.layer, use_pass_combined=True)
@@ -235,11 +240,13 @@ class Cycles:
 
     # --- rendering -----------------------------------------------------------------------------------------------------
 
-    def render(self, rects: Sequence[Rect], first: int, count: int, _half: bool) -> Iterator[dict[str, np.ndarray]]:
-        """The driver's render function: means of samples [first, first + count), float32, per rectangle: "color" [h, w, 3],
-        the planes of PLANES likewise, and the passes [h, w]."""
+    def render(self, rects: Sequence[Rect], first: int, count: int, half: bool) -> Iterator[dict[str, np.ndarray]]:
+        """The driver's render function: means of samples [first, first + count) of waves of WAVE, float32, per rectangle:
+        "color" [h, w, 3], the planes of PLANES likewise, and the passes [h, w]."""
         planes = PLANES if self.denoised else {"color": PLANES["color"]}
-        areas = {area: self._render_area(area, first, count) for area in merge(rects)}
+        self.scene.cycles.seed = self.seeds[half]
+        own_first = first // (2 * WAVE) * WAVE  # in its half, as every pair of waves is split
+        areas = {area: self._render_area(area, own_first, count) for area in merge(rects)}
         for r in rects:
             area, channels = next((a, c) for a, c in areas.items() if a.x0 <= r.x0 < a.x1 and a.y0 <= r.y0 < a.y1)
             at = np.s_[r.y0 - area.y0:r.y1 - area.y0, r.x0 - area.x0:r.x1 - area.x0]

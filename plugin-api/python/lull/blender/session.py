@@ -17,7 +17,7 @@ from ..files import Output, check_outputs, write_each
 from ..frame import Frame
 from ..library import LullError
 from . import shown
-from .cycles import Cycles
+from .cycles import WAVE, Cycles
 from .view import display_of, is_plain, read_grey, view_text
 
 # Blender's own output path, which nobody has chosen
@@ -119,7 +119,7 @@ def _identity(scene: bpy.types.Scene, host: Cycles) -> dict[str, str]:
     return {"files": f"{os.path.basename(bpy.data.filepath) or 'unsaved'} {crc:08x}", "scene": scene.name,
             "frame": str(scene.frame_current), "camera": f"{camera.name} {view:08x}", "view": view_text(scene),
             "view-layer": host.layer.name, "film": "transparent" if scene.render.film_transparent else "opaque",
-            "pattern": host.pattern, "device": host.device(),
+            "pattern": host.pattern, "seeds": f"{host.seeds[1]} {host.seeds[0]}", "device": host.device(),
             "renderer": f"Blender {bpy.app.version_string} {bpy.app.build_hash.decode(errors='replace')}"}
 
 
@@ -146,7 +146,7 @@ class Session:
         exposure, display = 2.0 ** scene.view_settings.exposure if is_plain(scene) else 1.0, display_of(scene)
         self.host.__enter__()
         try:
-            self.frame = Frame(judge, self.host.width, self.host.height, block=settings.block, crop=self.host.crop,
+            self.frame = Frame(judge, self.host.width, self.host.height, wave=WAVE, block=settings.block, crop=self.host.crop,
                                layers=self.host.passes.names, spp_max=spp_max, time_budget_s=time_s,
                                deterministic=time_s <= 0, denoised=bool(settings.denoise),
                                supplies=("albedo", "normal") if settings.denoise else (),
