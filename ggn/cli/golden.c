@@ -56,7 +56,6 @@ static void add_train(cJSON *j, const struct ggn_golden_train *t, int *failed)
     add_array(j, "d_prob_before", t->d_prob_before, 4, failed);
     add_number(j, "bce_before", t->bce_before, failed);
     add_number(j, "d_grad_l2", t->d_grad_l2, failed);
-    add_number(j, "m_grad_l2", t->m_grad_l2, failed);
     add_array(j, "d_prob_after", t->d_prob_after, 4, failed);
     add_number(j, "bce_after", t->bce_after, failed);
     add_number(j, "m_grad_l2_accumulated", t->m_grad_l2_accumulated, failed);

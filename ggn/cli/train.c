@@ -40,6 +40,11 @@ static const struct base_option list[] = {
     {"epochs", 0, "N", TO(plan.epochs), 1, 1e6, .help = "passes over all windows, preset paper only (30)"},
     {"epoch-steps", 0, "N", TO(plan.epoch_steps), 1, 1e8,
      .help = "steps between validations and checkpoints (lull 100; paper: one pass)"},
+    {"hours", 0, "HOURS", TO(plan.hours), 0, 1e6,
+     .help = "end with the first validation of generator and discriminator after so many hours of processors, all sittings "
+             "together, 0 = no limit (0)"},
+    {"denoiser-every", 0, "N", TO(plan.denoiser_every), 1, 1e6,
+     .help = "preset paper: the denoiser learns in every Nth step only, which saves up to two thirds of its time (1)"},
     {"patience", 0, "N", TO(plan.patience), 0, 1e6,
      .help = "end after so many validations without a lower loss, 0 = never (lull 8)"},
     {"lr-denoiser", 0, "N", TO(plan.lr_r), 1e-9, 1, .help = "learning rate of the denoiser (lull 1e-3, paper 2e-4)"},

@@ -208,7 +208,6 @@ static int train(struct state *s, struct ggn_golden_train *out, struct base_err 
     out->bce_before = record.bce_before;
     out->bce_after = record.bce_after;
     out->d_grad_l2 = record.d_grad_l2;
-    out->m_grad_l2 = record.m_grad_l2;
     out->m_grad_l2_accumulated = record.m_grad_l2_accumulated;
     for (int i = 0; i < W_COUNT; i++) {
         out->d_prob_before[i] = ggn_sigmoid(record.logit_before[i]);

@@ -260,20 +260,26 @@ static double denoiser_loss(struct ggn_trainer *t, const real *const *reference,
     return 1 - total / count;
 }
 
-/* Forward and backward of R; its gradient is left in grad. */
-static int denoiser_gradient(struct ggn_trainer *t, const real *const *x, int x_stride, const real *const *reference,
-                             int count, double *loss, struct base_err *err)
+/* R on `count` images; *loss = mean of 1 − SSIM, whose gradient is left behind R's output. */
+static int denoiser_forward(struct ggn_trainer *t, const real *const *x, int x_stride, const real *const *reference,
+                            int count, double *loss, struct base_err *err)
 {
     int first, n = mine(t, count, &first);
 
     for (int i = 0; i < n; i++)
         set_input(t->r, i, x + (size_t)i * (size_t)x_stride, 3);
-    zero_grad(t, GGN_NET_R);
     ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_TRAIN);
     *loss = denoiser_loss(t, reference, count);
-    ggn_exec_backward(t->r, t->weights[GGN_NET_R], t->grad[GGN_NET_R]);
     int rc = job_failed(t->job, err);
     return rc ? rc : check(t, GGN_NET_R, *loss, "loss", err);
+}
+
+/* R's gradient, into grad. */
+static int denoiser_backward(struct ggn_trainer *t, struct base_err *err)
+{
+    zero_grad(t, GGN_NET_R);
+    ggn_exec_backward(t->r, t->weights[GGN_NET_R], t->grad[GGN_NET_R]);
+    return job_failed(t->job, err);
 }
 
 static int check_batch(const struct ggn_trainer *t, int count, int parts, struct base_err *err)
@@ -291,7 +297,9 @@ int ggn_trainer_denoiser_step(struct ggn_trainer *t, const real *const *x, const
     int rc = check_batch(t, count, GGN_TRAIN_R, err);
 
     if (!rc)
-        rc = denoiser_gradient(t, x, 3, reference, count, loss, err);
+        rc = denoiser_forward(t, x, 3, reference, count, loss, err);
+    if (!rc)
+        rc = denoiser_backward(t, err);
     if (!rc)
         rc = update(t, GGN_NET_R, t->graph[GGN_NET_R].n_params, err);
     if (!rc)
@@ -424,21 +432,31 @@ int ggn_trainer_classifier_step(struct ggn_trainer *t, const struct ggn_batch *b
     return rc;
 }
 
+/* R's answer to image k of the windows, with a step of Adam if it learns. */
+static int paper_denoise_image(struct ggn_trainer *t, const struct ggn_batch *b, int k, struct ggn_paper_record *record,
+                               struct base_err *err)
+{
+    const int planes = 3 * t->hyper.window;
+    int rc = denoiser_forward(t, b->noisy + 3 * k, planes, b->reference, b->count, &record->denoiser_loss[k], err);
+
+    if (rc || b->denoiser_rests)
+        return rc;
+    rc = denoiser_backward(t, err);
+    if (!rc && k == 0)
+        record->denoiser_grad_l2 = grad_l2(t, GGN_NET_R, t->graph[GGN_NET_R].n_params);
+    return rc ? rc : update(t, GGN_NET_R, t->graph[GGN_NET_R].n_params, err);
+}
+
 /* Step 1 of the published order: R on each image of the window, its output kept as the generator's denoised input. */
 static int paper_denoise(struct ggn_trainer *t, const struct ggn_batch *b, struct ggn_paper_record *record,
                          struct base_err *err)
 {
-    const int planes = 3 * t->hyper.window, out = t->graph[GGN_NET_R].n_values - 1;
+    const int out = t->graph[GGN_NET_R].n_values - 1;
     const struct ggn_value *v = &t->graph[GGN_NET_R].value[out];
     int first, n = mine(t, b->count, &first);
 
     for (int k = 0; k < t->hyper.window; k++) {
-        int rc = denoiser_gradient(t, b->noisy + 3 * k, planes, b->reference, b->count, &record->denoiser_loss[k], err);
-        if (rc)
-            return rc;
-        if (k == 0)
-            record->denoiser_grad_l2 = grad_l2(t, GGN_NET_R, t->graph[GGN_NET_R].n_params);
-        rc = update(t, GGN_NET_R, t->graph[GGN_NET_R].n_params, err);
+        int rc = paper_denoise_image(t, b, k, record, err);
         if (rc)
             return rc;
         for (int i = 0; i < n; i++)
@@ -448,12 +466,20 @@ static int paper_denoise(struct ggn_trainer *t, const struct ggn_batch *b, struc
     return 0;
 }
 
-/* Backward through both generator passes from D's input gradient. */
-static void paper_generator_backward(struct ggn_trainer *t, const struct maps maps[2], int count)
+/* Adds D's input gradients to those of the maps: between two backward passes of D, M is the same, so that both can go back
+ * through it at once: Jᵀg + Jᵀg' = Jᵀ(g + g'). */
+static void add_map_gradients(struct ggn_trainer *t, const struct maps maps[2], int count)
 {
-    exchange_maps(t, maps, count, 1);
-    ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
-    ggn_exec_backward(t->m2, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
+    const int out = t->graph[GGN_NET_M].n_values - 1;
+    const struct ggn_value *v = &t->graph[GGN_NET_M].value[out];
+
+    for (int i = 0; i < 2 * count; i++) {
+        real *sum = ggn_exec_grad(maps[i % 2].m, out, i / 2, 0);
+        const real *more = ggn_exec_grad(t->d, 0, i / 2, i % 2);
+        for (int y = 0; y < v->h; y++)
+            for (int x = 0; x < v->w; x++)
+                sum[y * v->row + x] += more[y * v->row + x];
+    }
 }
 
 int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, struct ggn_paper_record *record,
@@ -488,9 +514,8 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
         rc = check(t, GGN_NET_D, record->bce_before, "loss", err);
     if (rc)
         return rc;
-    paper_generator_backward(t, maps, n);
+    exchange_maps(t, maps, n, 1);
     record->d_grad_l2 = grad_l2(t, GGN_NET_D, d->n_params);
-    record->m_grad_l2 = grad_l2(t, GGN_NET_M, m->n_params);
     rc = job_failed(t->job, err);
     if (!rc)
         rc = update(t, GGN_NET_D, d->n_params, err);
@@ -499,7 +524,9 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
 
     zero_grad(t, GGN_NET_D);
     record->bce_after = classify(t, b, record_all ? record->logit_after : NULL);
-    paper_generator_backward(t, maps, n);
+    add_map_gradients(t, maps, n);
+    ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
+    ggn_exec_backward(t->m2, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
     record->m_grad_l2_accumulated = grad_l2(t, GGN_NET_M, m_trained);
     rc = job_failed(t->job, err);
     if (!rc)

@@ -49,6 +49,7 @@ struct ggn_batch {
     const real *const *noise_map; /* [mine] noise maps, GGN_NOISE_MAP_GAIN · codes, NULL: none; with hyper.noise_map */
     const real *const *scalars;   /* [mine][GGN_SCALARS], with hyper.scalars */
     const double *law;            /* [count] with hyper.reach: log2 of the law's error */
+    int denoiser_rests;           /* ggn_trainer_paper_step: R denoises, but learns nothing */
     const double *label;          /* [count] 1 = still noisy, 0 = not, between = uncertain */
 };
 
@@ -106,8 +107,7 @@ struct ggn_paper_record {
     double logit_before[64], logit_after[64]; /* [count], counts above 64 are not recorded */
     double bce_before, bce_after;
     double d_grad_l2;
-    double m_grad_l2;             /* after the first backward pass, all parameters */
-    double m_grad_l2_accumulated; /* the sum, last convolution excluded */
+    double m_grad_l2_accumulated; /* last convolution excluded */
 };
 int ggn_trainer_paper_step(struct ggn_trainer *trainer, const struct ggn_batch *batch, struct ggn_paper_record *record,
                            struct base_err *err);

@@ -44,7 +44,8 @@ int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct base_e
 
     if (rc)
         return rc;
-    fputs("phase,step,loss,accuracy,validation_loss,validation_accuracy,validation_auc,learning_rate,seconds\n", out.file);
+    fputs("phase,step,loss,accuracy,validation_loss,validation_accuracy,validation_auc,learning_rate,seconds,processor_s\n",
+          out.file);
     for (int i = 0; i < log->n; i++) {
         const struct ggn_log_row *r = &log->rows[i];
         fprintf(out.file, "%s,", ggn_log_phases[r->phase]);
@@ -55,7 +56,7 @@ int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct base_e
         put(out.file, r->validation_accuracy, ',');
         put(out.file, r->validation_auc, ',');
         put(out.file, r->lr, ',');
-        fprintf(out.file, "%.1f\n", r->seconds);
+        fprintf(out.file, "%.1f,%.1f\n", r->seconds, r->processor_s);
     }
     return base_file_commit(&out, err);
 }

@@ -9,7 +9,8 @@ extern const char *const ggn_log_phases[]; /* "denoiser", "judge" (generator and
 struct ggn_log_row {
     int phase;                                                                             /* of ggn_log_phases */
     double step, loss, accuracy, validation_loss, validation_accuracy, validation_auc, lr; /* NaN = not measured */
-    double seconds; /* since the phase began, on this machine; the only column that two runs may differ in */
+    /* Since the phase began, on this machine; only here two runs may differ. Of all processes: */
+    double seconds, processor_s;
 };
 
 struct ggn_log {

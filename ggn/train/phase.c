@@ -57,7 +57,7 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
     const uint64_t begin = s->progress.step, left = phase->steps - begin;
     const uint64_t n = left < phase->epoch_steps ? left : phase->epoch_steps;
     struct ggn_log_row row = {.phase = s->progress.phase};
-    double start = base_clock_wall_s(), loss, right;
+    double start = base_clock_wall_s(), processor = base_clock_process_s(), loss, right;
 
     while (s->progress.step < begin + n) {
         int stop = asked_to_stop(s), rc = job_failed(s->plan->job, err);
@@ -77,10 +77,16 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
     if (rc)
         return rc;
     s->progress.seconds[row.phase] += base_clock_wall_s() - start;
+    processor = base_clock_process_s() - processor;
+    rc = job_sum(s->plan->job, &processor, 1, sizeof processor);
+    if (rc)
+        return base_fail(err, rc, "processor time");
+    s->progress.processor_s[row.phase] += processor;
     ggn_trainer_keep(s->trainer);
     row.lr = s->trainer->options.lr[phase->net];
     row.step = (double)s->progress.step;
     row.seconds = s->progress.seconds[row.phase];
+    row.processor_s = s->progress.processor_s[row.phase];
     rc = ggn_log_add(&s->log, &row, err);
     if (rc)
         return rc;
@@ -88,9 +94,16 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
     return job_rank(s->plan->job) == 0 ? write_files(s, err) : 0;
 }
 
+/* The denoiser's own phase is not cut short, and there is no model without a validation. */
+static int hours_spent(const struct ggn_session *s)
+{
+    return s->plan->hours > 0 && s->progress.phase == GGN_PHASE_CLASSIFIER && s->progress.step > 0 &&
+           s->progress.processor_s[0] + s->progress.processor_s[1] >= 3600 * s->plan->hours;
+}
+
 int ggn_phase_run(struct ggn_session *s, const struct ggn_phase *phase, struct base_err *err)
 {
-    while (s->progress.step < phase->steps) {
+    while (s->progress.step < phase->steps && !hours_spent(s)) {
         int rc = epoch(s, phase, err);
         if (rc == GGN_EDIVERGED && ++s->progress.divergences <= MOST_DIVERGENCES) {
             if (s->plan->progress)

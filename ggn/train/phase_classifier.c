@@ -343,6 +343,7 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
     b.count = n;
     b.label = label;
     b.law = law;
+    b.denoiser_rests = step % (uint64_t)s->plan->denoiser_every != 0;
     double scale = paper ? 1 : ggn_session_lr(s, 1, step, steps);
     s->trainer->options.lr[GGN_NET_M] = s->trainer->options.lr[GGN_NET_D] = s->plan->lr * scale;
     s->trainer->options.lr[GGN_NET_R] = s->plan->lr_r * scale;
@@ -476,8 +477,10 @@ static int begin(struct ggn_session *s, struct base_err *err)
 {
     const int paper = s->hyper.preset == GGN_PRESET_PAPER;
 
-    s->progress =
-        (struct ggn_progress){.phase = GGN_PHASE_CLASSIFIER, .best_loss = HUGE_VAL, .seconds = {s->progress.seconds[0], 0}};
+    s->progress = (struct ggn_progress){.phase = GGN_PHASE_CLASSIFIER,
+                                        .best_loss = HUGE_VAL,
+                                        .seconds = {s->progress.seconds[0], 0},
+                                        .processor_s = {s->progress.processor_s[0], 0}};
     int rc =
         ggn_session_begin(s, paper ? GGN_TRAIN_ALL : GGN_TRAIN_MD, s->plan->batch, s->hyper.height, s->hyper.width, err);
     for (int net = paper ? GGN_NET_R : GGN_NET_M; net < GGN_NETS && !rc; net++) {

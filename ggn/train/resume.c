@@ -9,7 +9,7 @@
 #include "base/json.h"
 #include "model/container.h"
 
-enum { N_ROW = 9 };
+enum { N_ROW = 10 };
 
 uint32_t ggn_resume_key(const struct ggn_session *s)
 {
@@ -26,6 +26,7 @@ uint32_t ggn_resume_key(const struct ggn_session *s)
                               p->steps,
                               p->epochs,
                               p->epoch_steps,
+                              p->denoiser_every,
                               p->patience,
                               p->lr_r,
                               p->lr,
@@ -97,8 +98,8 @@ static float *state_array(struct ggn_session *s, int i, size_t *count)
 static double *row_field(struct ggn_log_row *r, int i)
 {
     double *const fields[N_ROW] = {
-        NULL,   &r->step,   &r->loss, &r->accuracy, &r->validation_loss, &r->validation_accuracy, &r->validation_auc,
-        &r->lr, &r->seconds};
+        NULL,   &r->step,    &r->loss,       &r->accuracy, &r->validation_loss, &r->validation_accuracy, &r->validation_auc,
+        &r->lr, &r->seconds, &r->processor_s};
     return fields[i];
 }
 
@@ -120,6 +121,8 @@ static char *describe(struct ggn_session *s)
                    {"best_step", (double)p->best_step},
                    {"seconds0", p->seconds[0]},
                    {"seconds1", p->seconds[1]},
+                   {"processor_s0", p->processor_s[0]},
+                   {"processor_s1", p->processor_s[1]},
                    {"steps", (double)s->trainer->steps},
                    {"t0", (double)s->trainer->adam_t[0]},
                    {"t1", (double)s->trainer->adam_t[1]},
@@ -158,6 +161,8 @@ static int restore(struct ggn_session *s, const cJSON *root, const char *path, s
     p->best_step = (uint64_t)fmax(field(root, "best_step"), 0);
     p->seconds[0] = field(root, "seconds0");
     p->seconds[1] = field(root, "seconds1");
+    p->processor_s[0] = fmax(field(root, "processor_s0"), 0);
+    p->processor_s[1] = fmax(field(root, "processor_s1"), 0);
     s->trainer->steps = (uint64_t)steps;
     s->trainer->adam_t[0] = (uint64_t)field(root, "t0");
     s->trainer->adam_t[1] = (uint64_t)field(root, "t1");

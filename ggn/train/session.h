@@ -20,7 +20,7 @@ struct ggn_progress {
     int divergences; /* each one halves the learning rates and changes the draws */
     double best_loss;
     uint64_t best_step;
-    double seconds[2]; /* spent in the phases */
+    double seconds[2], processor_s[2]; /* spent in the phases; the latter by all processes together */
 };
 
 struct ggn_session {

@@ -22,6 +22,8 @@ struct ggn_train_plan {
     int steps_r, steps;        /* steps of the two phases; preset paper: of its one phase, 0 = epochs · windows / batch */
     int epochs;                /* preset paper */
     int epoch_steps;           /* steps between validations and checkpoints */
+    int denoiser_every;        /* preset paper: the denoiser learns in every so many-th step */
+    double hours;              /* of processors; once spent, a validation of the last phase ends it. 0: no limit */
     int patience;              /* epochs without a lower calibrated validation loss before the end; 0 = never */
     double lr_r, lr;
     double difference; /* preset lull: see ggn_train_fold */

@@ -175,7 +175,7 @@ def golden(br, bm, bd):
     loss = bce(z, y)
     loss.backward(retain_graph=True)
     out["d_prob_before"], out["bce_before"] = torch.sigmoid(z).flatten().tolist(), float(loss)
-    out["d_grad_l2"], out["m_grad_l2"] = l2(d.parameters()), l2(m.parameters())
+    out["d_grad_l2"] = l2(d.parameters())
     opt_d.step()
     z = d(nfm)
     loss = bce(z, y)

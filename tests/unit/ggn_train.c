@@ -168,23 +168,25 @@ static void learning_curves(void **state)
                                 .validation_accuracy = 0.25,
                                 .validation_auc = 0.75,
                                 .lr = 1e-3,
-                                .seconds = 0.06 * i};
+                                .seconds = 0.06 * i,
+                                .processor_s = 0.5 * i};
         *(i % 3 ? &r.validation_auc : &r.lr) = (double)NAN;
         assert_int_equal(ggn_log_add(&log, &r, &err), 0);
     }
     assert_int_equal(ggn_log_write_csv(&log, path, &err), 0);
     assert_int_equal(base_file_read(path, 1 << 16, &text, &size, &err), 0);
     assert_string_equal(text,
-                        "phase,step,loss,accuracy,validation_loss,validation_accuracy,validation_auc,learning_rate,seconds\n"
-                        "denoiser,0,1,,0.5,0.25,0.75,,0.0\n"
-                        "denoiser,10,0.5,,1.5,0.25,,0.001,0.1\n"
-                        "denoiser,20,0.333333333,,2.5,0.25,,0.001,0.1\n"
-                        "denoiser,30,0.25,,3.5,0.25,0.75,,0.2\n"
-                        "denoiser,40,0.2,,4.5,0.25,,0.001,0.2\n"
-                        "denoiser,50,0.166666667,,5.5,0.25,,0.001,0.3\n"
-                        "denoiser,60,0.142857143,,6.5,0.25,0.75,,0.4\n"
-                        "judge,70,0.125,,7.5,0.25,,0.001,0.4\n"
-                        "judge,80,0.111111111,,8.5,0.25,,0.001,0.5\n");
+                        "phase,step,loss,accuracy,validation_loss,validation_accuracy,validation_auc,learning_rate,seconds,"
+                        "processor_s\n"
+                        "denoiser,0,1,,0.5,0.25,0.75,,0.0,0.0\n"
+                        "denoiser,10,0.5,,1.5,0.25,,0.001,0.1,0.5\n"
+                        "denoiser,20,0.333333333,,2.5,0.25,,0.001,0.1,1.0\n"
+                        "denoiser,30,0.25,,3.5,0.25,0.75,,0.2,1.5\n"
+                        "denoiser,40,0.2,,4.5,0.25,,0.001,0.2,2.0\n"
+                        "denoiser,50,0.166666667,,5.5,0.25,,0.001,0.3,2.5\n"
+                        "denoiser,60,0.142857143,,6.5,0.25,0.75,,0.4,3.0\n"
+                        "judge,70,0.125,,7.5,0.25,,0.001,0.4,3.5\n"
+                        "judge,80,0.111111111,,8.5,0.25,,0.001,0.5,4.0\n");
     free(text);
     ggn_log_release(&log);
     assert_true(log.n == 0 && !log.rows);
