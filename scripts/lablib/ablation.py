@@ -49,7 +49,8 @@ def spent(path, more=0.0):
     return before + more
 
 
-def train(options, data, model):
+def claim(options, data, model):
+    """Refuses a model, or what there is of it, that was begun with other options."""
     note, text = model + ".options", " ".join(options + ["--data", data]) + "\n"
     if os.path.exists(note):
         with open(note, encoding="utf-8") as f:
@@ -57,6 +58,10 @@ def train(options, data, model):
                 raise Refused("%s: trained with other options; remove it or give it another name" % model)
     with open(note, "w", encoding="utf-8") as f:
         f.write(text)
+
+
+def train(options, data, model):
+    claim(options, data, model)
     if os.path.exists(model):
         return True
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
