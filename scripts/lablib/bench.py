@@ -126,11 +126,15 @@ def machine(parts, part):
 
 
 def page(parts):
-    """Machine and table; what was measured in another run than the first part says so in its row."""
-    first, rows = machine(parts, next(iter(parts))), []
+    """Machine and table; a part that was measured in another run than the first says what is other from there on, in its first row."""
+    first, before, rows = machine(parts, next(iter(parts))), "", []
     for name, part in parts.items():
-        other = "" if machine(parts, name) == first else " (%s)" % machine(parts, name)
-        rows += [[r["name"] + other, *cells(r)[1:]] for r in part["rows"]]
+        other = ", ".join(word for word in machine(parts, name).split(", ") if word not in first.split(", "))
+        names = [r["name"] for r in part["rows"]]
+        if other != before:
+            names[0] += " (from here: %s)" % (other or "as at first")
+        before = other
+        rows += [[n, *cells(r)[1:]] for n, r in zip(names, part["rows"])]
     return "%s.\n\n%s" % (first, tables.table(("what", "ours", "peer or limit", "share of it", "wanted", "reached"), rows))
 
 
