@@ -97,6 +97,9 @@ run bench --rounds=2 --batch=1 --threads=2 --model "$corpus/f16.ggn"
 check "bench: the times of the layers are that of the network" $?
 awk '$1 == "all" { if (FILENAME == ARGV[1]) small += $2; else large += $2 } END { exit !(small > 0 && small < large / 5) }' "$tmp/out" "$tmp/published"
 check "bench --model: a small one has less than a fifth of the work" $?
+run bench --json --rounds=1 --batch=1 --model=ggn/models/lull-3.ggn
+[ $rc = 0 ] && grep -q '"train_sample_ms": [0-9]' "$tmp/out"
+check "bench --model: a residual one trains, too" $?
 run frobnicate
 [ $rc = 2 ]
 check "an unknown command is exit 2" $?
