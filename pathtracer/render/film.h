@@ -76,7 +76,8 @@ static inline uint64_t pt_film_spp(const struct pt_film *film, size_t index, uin
  * 2k+1), so that half of it would be no better than random numbers and the difference of the halves would overstate the
  * noise (measured: by 1.34 against 1.28 with groups of four). Bit 2 takes part: two successive groups are split. The mask
  * leaves out bits, because the parity of all of them is the first digit of Sobol dimension 1. A sequence for each half
- * would make the difference honest and the picture worse: its error at 64 and 256 samples grew by 1.0 to 2.0 (four scenes). */
+ * would make the difference honest and the picture worse: its error at 64 and 256 samples grew by 1.0 to 2.0 (four
+ * scenes). */
 static inline int pt_film_in_half(uint32_t sample) { return !__builtin_parity(sample & UINT32_C(0x7D29F06C)); }
 /* How many of the samples [0, spp) are in half A: within two of spp / 2. */
 static inline uint64_t pt_film_half_spp(uint64_t spp)
