@@ -5,6 +5,7 @@ shifts: what it would be worth if it were more or less careful. Shifts are chose
 import os
 import random
 import statistics
+import textwrap
 
 from lablib import denoised, tables, tool
 
@@ -133,9 +134,10 @@ def worth(network, off, spp):
 def verdict(ways):
     estimate, network = ways[0], next(way for way in ways if way["name"].startswith("network"))
     say = lambda *beside: "**yes**" if worth(network, *beside) else "**no**"
-    return ("Is the mean of the networks worth its keep (off at most %.1f at equal samples, or at most %.1f of the samples)? Beside the estimate as it "
-            "is: %s; beside the estimate at its own best shift: %s.\n" % (
+    told = ("Is the mean of the networks worth its keep (at most %.1f as many off at equal samples, or at most %.1f of the samples for as many)? "
+            "Beside the estimate as it is: %s; beside the estimate at its own best shift: %s." % (
                 HALF, CHEAPER, say(estimate["off"], 1), say(estimate["as_dear"], estimate["as_safe"])))
+    return textwrap.fill(told, 140) + "\n"
 
 
 def page(r):
