@@ -2,8 +2,8 @@
 
 A line of scripts/published.plan is `NAME  OPTIONS of ggn train`. Each is trained on DATA until it has spent --hours, by `ggn train
 --resume` at nice 19: interrupted, or with more hours, the same command goes on, and draws all validations so far. Hours are those of
-processors, validations among them, without loading of data. Then the models, lull-3, the observer's law and the number of samples
-alone are judged on the validation blocks, which chose the best step of each model. Levels beyond the recorded ones are simulated, by
+processors, validations among them, without loading data and, preset lull, denoising them once. Then the models, lull-3, the observer's
+law and the number of samples alone are judged on the validation blocks, which chose the best step of each model. Levels beyond the recorded ones are simulated, by
 the noise that made the labels: there the law is right by construction."""
 import csv
 import json
@@ -90,8 +90,8 @@ def page(r):
     rows = [row(run["name"], "`%s`" % run["options"], r["judged"][run["name"] + ".ggn"], run) for run in r["runs"]]
     rows += [row(shown, "", r["judged"][name]) for name, shown in beside(r)]
     data, first = r["data"], r["runs"][0]
-    text = "%s. %d blocks of %d scenes (%d windows) to train on, %d blocks of %d other scenes to validate.\n\n" % (
-        tables.told(r["measured"]), data["training_blocks"], len(data["train"]), data["training_windows"], data["validation_blocks"], len(data["validation"]))
+    text = "%s. %d blocks of %d scenes (%d windows) to train on, %d blocks of %d other scenes to validate; all with\n`%s`.\n\n" % (
+        tables.told(r["measured"]), data["training_blocks"], len(data["train"]), data["training_windows"], data["validation_blocks"], len(data["validation"]), r["common"])
     text += "![validation AUC against processor hours](../docs/published-curve.png)\n\n" + tables.table(
         ("network", "options", "processor hours", "windows", "passes", "s per window", "AUC", "early", "samples", "median \\|log2\\|"), rows)
     text += "\nAt %.2f s per window %d passes over the %d windows of `scripts/dataset.plan` would take %.0f processor hours, a tenth of them %.0f; " \
@@ -103,8 +103,8 @@ def parts(r):
     """What a step's milliseconds go into, from ggn bench."""
     f, b = r["step_ms"]["f32"], r["step_ms"]["bf16"]
     six, generator = 6 * f["denoiser_train_ms"], 2 * f["generator_train_ms"]
-    return ("one window is %.0f ms of the denoiser (six images, forward and back) and %.0f ms of the generator (two windows); a denoiser that only "
-            "answers takes %.0f ms. With bfloat16 products a decision takes %.2f of its time in float" % (
+    return ("One window is %.0f ms of the denoiser (six images, forward and back) and %.0f ms of the generator (two windows);\na denoiser that only "
+            "answers takes %.0f ms. With bfloat16 products a decision takes %.2f of its time in float.\n" % (
                 six, generator, 6 * f["denoiser_forward_ms"], b["decision_ms"] / f["decision_ms"]))
 
 
@@ -112,9 +112,9 @@ def draw(folder, r):
     last = max(10.0, *[p[0] for run in r["runs"] for p in run["points"]])
     data = "".join(plots.data("run%d" % i, [(p[0], p[2]) for p in run["points"]]) for i, run in enumerate(r["runs"]))
     lines = ["$run%d using 1:2 with linespoints lw 2 pt 7 ps 0.6 lc '%s' title '%s'" % (i, COLOURS[i % len(COLOURS)], run["name"]) for i, run in enumerate(r["runs"])]
-    lines += ["%g with lines dt %d lc '#666666' title '%s'" % (r["judged"][name]["auc"], i + 2, shown)
+    lines += ['%g with lines dt %d lc "#666666" title "%s"' % (r["judged"][name]["auc"], i + 2, shown)
               for i, (name, shown) in enumerate(beside(r))]
-    plots.plot(folder, "published-curve.png", (760, 460), data + "set logscale x\nset xrange [0.005:%g]\nset yrange [0.4:1]\nset grid\nset key bottom right\n"
+    plots.plot(folder, "published-curve.png", (760, 460), data + "set logscale x\nset xrange [0.005:%g]\nset yrange [0.4:1.03]\nset grid\nset key bottom right\n"
                "set xlabel 'processor hours'\nset ylabel 'AUC on validation windows'\nplot %s\n" % (2 * last, ", ".join(lines)))
 
 
@@ -129,11 +129,11 @@ def main(o):
             status = train(o, name, common + words)
             if status:
                 return 130 if status == 130 else 2
-    there = [(name, common + words, os.path.join(o.out, name + ".ggn")) for name, words in lines if os.path.exists(os.path.join(o.out, name + ".ggn"))]
+    there = [(name, words, os.path.join(o.out, name + ".ggn")) for name, words in lines if os.path.exists(os.path.join(o.out, name + ".ggn"))]
     if not there:
         raise Refused("%s: nothing is trained yet" % o.out)
     data = tool.load(there[0][2] + ".card.json")["data"]
-    results = {"measured": tool.measured(), "data": data, "runs": [run_of(*line) for line in there],
+    results = {"measured": tool.measured(), "data": data, "common": " ".join(common), "runs": [run_of(*line) for line in there],
                "judged": judge(o, data["validation"], [model for _, _, model in there] + [o.beside])}
     print(page(results), end="")
     if o.write:

@@ -9,7 +9,7 @@ common --kr 3 --km 3 --kd 4 --batch 8 -q
 order --preset paper --epoch-steps 2 --steps 8
 rests --preset paper --epoch-steps 2 --steps 8 --denoiser-every 4   # one change
 END
-published --hours 1e-9 && [ "$(validations order)" -eq 2 ] && [ "$(grep -c '^| \(order\|rests\) | `--kr 3' "$tmp/table")" -eq 2 ]
+published --hours 1e-9 && [ "$(validations order)" -eq 2 ] && [ "$(grep -c '^| \(order\|rests\) | `--preset' "$tmp/table")" -eq 2 ]
 check "a row for each network" $?
 grep -q '^| number of samples alone |  | – ' "$tmp/table" && grep -q '^| tiny |  | – ' "$tmp/table"
 check "  …and for what is trivial, and for the model beside them" $?
@@ -25,7 +25,7 @@ from lablib import published
 judged = {"auc": 0.9, "early_stop_rate": 0.1, "samples_ratio": 1.1, "median_abs_log2": 0.3}
 run = published.run_of("order", ["-q"], sys.argv[1] + "/out/order.ggn")
 assert len(run["points"]) == 4 and run["points"][-1][1] == 8 and [p[0] for p in run["points"]] == sorted(p[0] for p in run["points"])
-published.draw(sys.argv[1], {"runs": [run], "judged": {"order.ggn": judged, "-spp": judged}})
+published.draw(sys.argv[1], {"runs": [run], "judged": {"order.ggn": judged, "observer": judged}})
 END
 check "points of all validations in the order of their hours" $?
 ! command -v gnuplot >/dev/null || [ -s "$tmp/published-curve.png" ]
