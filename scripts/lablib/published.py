@@ -3,8 +3,8 @@
 A line of scripts/published.plan is `NAME  OPTIONS of ggn train`. Each is trained on DATA until it has spent --hours, by `ggn train
 --resume` at nice 19: interrupted, or with more hours, the same command goes on, and draws all validations so far. Hours are those of
 processors, validations among them, without loading data and, preset lull, denoising them once. Then the models, lull-3, the observer's
-law and the number of samples alone are judged on the validation blocks, which chose the best step of each model. Levels beyond the recorded ones are simulated, by
-the noise that made the labels: there the law is right by construction."""
+law and the number of samples alone are judged on the validation blocks, which chose the best step of each
+model. Levels beyond the recorded ones are simulated, by the noise that made the labels: there the law is right by construction."""
 import csv
 import json
 import os
