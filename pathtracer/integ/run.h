@@ -75,11 +75,11 @@ PT_KERNEL_INLINE void pt_run_start(pt_effects fx, const struct pt_scene *scene, 
     for (int i = 0; i < count; i++) {
         struct pt_sampler *s = &paths[i].sampler;
         *s = pt_sampler_make(sobol, settings->seed, x + (uint32_t)i, y, sample);
+        keys->index_reversed = s->index_reversed; /* the same of all */
         keys->pixel_key[i] = s->pixel_key;
         keys->path_key[i] = s->path_key;
         paths[i].u = &u[0][i];
     }
-    keys->index_reversed = pt_reverse_bits(sample);
     keys->sobol = sobol;
     const int lens = (fx & PT_FX_DEFOCUS) && scene->camera.lens_radius > 0.0f;
     pt_lanes_best()->numbers(keys, count, 0,

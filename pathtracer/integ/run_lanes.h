@@ -33,9 +33,9 @@ PT_KERNEL_INLINE void pt_lane_start(pt_effects fx, struct pt_lane_run *run, uint
     const struct pt_integrator *settings = run->settings;
     float dx[PT_RUN], dy[PT_RUN];
     run->keys.sobol = settings->sampler == PT_SAMPLER_SOBOL;
-    run->keys.index_reversed = pt_reverse_bits(sample);
     for (int i = 0; i < count; i++) {
         struct pt_sampler s = pt_sampler_make(run->keys.sobol, settings->seed, x + (uint32_t)i, y, sample);
+        run->keys.index_reversed = s.index_reversed; /* the same of all */
         run->keys.pixel_key[i] = s.pixel_key;
         run->keys.path_key[i] = s.path_key;
         run->pixel[i] = i;

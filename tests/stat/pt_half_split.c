@@ -84,13 +84,11 @@ static void independent(void **state)
     assert_true(q > 0.85 && q < 1.15);
 }
 
-/* Halves of a Sobol sequence are worse than half as good as the whole, so D may overstate the error, but not by much (1.28
- * here; 1.34 with even and odd samples). */
 static void sobol(void **state)
 {
     (void)state;
     double q = ratio(PT_SAMPLER_SOBOL);
-    assert_true(q > 0.85 && q < 1.35);
+    assert_true(q > 0.85 && q < 1.15);
 }
 
 int main(void)

@@ -19,13 +19,14 @@ static void check_numbers(const struct pt_lanes *lanes, int sobol, int count, ui
     static const struct pt_lane_dims dims = {
         .pairs = 1u << 0 | 1u << 2 | 1u << 14, .singles = 1u << 4 | 1u << 5, .bits = 1u << 6};
     struct pt_sampler samplers[PT_RUN];
-    struct pt_lane_keys keys = {.sobol = sobol, .index_reversed = pt_reverse_bits(block * 37 + 5)};
+    struct pt_lane_keys keys = {.sobol = sobol};
     float u[PT_DIMS_PER_VERTEX][PT_RUN];
     memset(u, 0xa5, sizeof u);
     const float untouched = u[0][0];
     for (int i = 0; i < count; i++) {
         samplers[i] = pt_sampler_make(sobol, 3, 100 + (uint32_t)i, 7, block * 37 + 5);
         pt_sampler_block(&samplers[i], block);
+        keys.index_reversed = samplers[i].index_reversed;
         keys.pixel_key[i] = samplers[i].pixel_key;
         keys.path_key[i] = samplers[i].path_key;
     }
