@@ -9,7 +9,7 @@
  *   and its own Owen scrambles (Burley 2020, "Practical Hash-based Owen Scrambling"). Blocks beyond PT_SOBOL_BLOCKS get
  *   independent numbers: stratification no longer shows there and costs time.
  *
- * A pixel's even samples are one sequence and its odd ones another, independent of it. So the two are halves whose difference
+ * A pixel's even samples are one sequence and its odd ones another, independent of it. So they are halves whose difference
  * tells the noise of their mean. Halves of one sequence have errors of opposite sign: their difference overstates the noise
  * (by 1.3 to 1.4 in scenes/cornell-box.pbrt), and one half is no neutral judge of what is made of the other.
  */

@@ -116,7 +116,8 @@ static void drop_memory(struct lull_oidn *o)
 
 int lull_oidn_prepare(struct lull_oidn *o, const struct lull_oidn_form *form, struct base_err *err)
 {
-    const size_t pictures = SHARED_PICTURES * 3 * (size_t)form->width * (size_t)form->height;
+    const size_t width = (size_t)form->width + 2 * (size_t)form->margin, height = (size_t)form->height + 2 * (size_t)form->margin;
+    const size_t pictures = SHARED_PICTURES * 3 * width * height;
     drop_memory(o);
     o->bytes = sizeof *o->shared + pictures * sizeof(float);
     o->memory_fd = memfd_create("lull-denoiser", MFD_CLOEXEC);
@@ -135,6 +136,8 @@ int lull_oidn_prepare(struct lull_oidn *o, const struct lull_oidn_form *form, st
         return base_fail_nomem(err, "the denoiser's pictures");
     }
     o->shared->form = *form;
+    o->shared->form.width = (int32_t)width;
+    o->shared->form.height = (int32_t)height;
     return 0;
 }
 
@@ -173,12 +176,29 @@ const char *lull_oidn_version(const struct lull_oidn *o) { return o->version; }
 
 /* --- pictures ---------------------------------------------------------------------------------------------------------- */
 
-/* A copy in which everything is finite and inside [lo, hi]; what is no number is 0. */
-static void clean(const float *from, size_t n, float lo, float hi, float *to)
+/* A copy with its margin, in which everything is finite and inside [lo, hi]; what is no number is 0. form: with the margin. */
+static void clean(const float *from, const struct lull_oidn_form *form, float lo, float hi, float *to)
 {
-    for (size_t i = 0; i < n; i++) {
-        float v = isfinite(from[i]) ? from[i] : 0.0f;
-        to[i] = v < lo ? lo : v > hi ? hi : v;
+    const int32_t width = form->width - 2 * form->margin, height = form->height - 2 * form->margin;
+    for (int32_t y = -form->margin; y < height + form->margin; y++) {
+        const float *row = from + 3 * (size_t)width * (size_t)lull_oidn_mirrored(y, height);
+        for (int32_t x = -form->margin; x < width + form->margin; x++)
+            for (int32_t c = 0; c < 3; c++, to++) {
+                const float v = row[3 * lull_oidn_mirrored(x, width) + c], finite = isfinite(v) ? v : 0.0f;
+                *to = finite < lo ? lo : finite > hi ? hi : finite;
+            }
+    }
+}
+
+/* The picture inside the margin; where the denoiser found no number, what it was given. */
+static void take(struct shared *s, int which, float *to)
+{
+    const int32_t margin = s->form.margin, width = s->form.width - 2 * margin, height = s->form.height - 2 * margin;
+    for (int32_t y = 0; y < height; y++) {
+        const size_t at = 3 * ((size_t)(y + margin) * (size_t)s->form.width + (size_t)margin);
+        const float *in = shared_picture(s, SHARED_COLOR + which) + at, *out = shared_picture(s, SHARED_OUT + which) + at;
+        for (size_t i = 0; i < 3 * (size_t)width; i++)
+            *to++ = isfinite(out[i]) ? out[i] : in[i];
     }
 }
 
@@ -188,18 +208,14 @@ int lull_oidn_run(struct lull_oidn *o, const struct lull_oidn_pictures *p, int (
     struct shared *s = o->shared;
     if (!s)
         return base_fail(err, BASE_EINVAL, "Open Image Denoise is not prepared");
-    const size_t n = 3 * (size_t)s->form.width * (size_t)s->form.height;
     for (s->colors = 0; s->colors < LULL_OIDN_COLORS && p->color[s->colors]; s->colors++)
-        clean(p->color[s->colors], n, 0.0f, FLT_MAX, shared_picture(s, SHARED_COLOR + s->colors));
+        clean(p->color[s->colors], &s->form, 0.0f, FLT_MAX, shared_picture(s, SHARED_COLOR + s->colors));
     if (s->form.albedo)
-        clean(p->albedo, n, 0.0f, 1.0f, shared_picture(s, SHARED_ALBEDO));
+        clean(p->albedo, &s->form, 0.0f, 1.0f, shared_picture(s, SHARED_ALBEDO));
     if (s->form.albedo && s->form.normal)
-        clean(p->normal, n, -1.0f, 1.0f, shared_picture(s, SHARED_NORMAL));
+        clean(p->normal, &s->form, -1.0f, 1.0f, shared_picture(s, SHARED_NORMAL));
     int rc = run_program(o, cancelled, data, err);
-    for (int k = 0; k < s->colors && !rc; k++) {
-        const float *in = shared_picture(s, SHARED_COLOR + k), *out = shared_picture(s, SHARED_OUT + k);
-        for (size_t i = 0; i < n; i++)
-            p->out[k][i] = isfinite(out[i]) ? out[i] : in[i];
-    }
+    for (int k = 0; k < s->colors && !rc; k++)
+        take(s, k, p->out[k]);
     return rc;
 }

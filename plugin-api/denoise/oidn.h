@@ -15,6 +15,9 @@
  * gives the bits of the whole picture inside if its corner lies on a multiple of LULL_OIDN_GRID of the frame and it has
  * LULL_OIDN_HALO pixels around (as far as the frame reaches); measured with 2.5.1.
  *
+ * A denoiser errs most where a picture ends: the outermost pixels of a frame are two to three times as far off as others. Mirrored
+ * on for LULL_OIDN_MARGIN pixels they are not. A crop that reaches the end of the frame must be mirrored there, too.
+ *
  * Calls on one struct lull_oidn must not overlap; different ones may.
  */
 #ifndef DENOISE_OIDN_H
@@ -24,7 +27,7 @@
 
 #include "base/err.h"
 
-enum { LULL_OIDN_GRID = 16, LULL_OIDN_HALO = 96, LULL_OIDN_COLORS = 2 };
+enum { LULL_OIDN_GRID = 16, LULL_OIDN_HALO = 96, LULL_OIDN_MARGIN = LULL_OIDN_GRID, LULL_OIDN_COLORS = 2 };
 
 enum lull_oidn_quality { LULL_OIDN_FAST = 4, LULL_OIDN_BALANCED = 5, LULL_OIDN_HIGH = 6 }; /* the library's own numbers */
 
@@ -35,6 +38,7 @@ struct lull_oidn_form { /* of the pictures; all of one size */
     int32_t albedo, normal; /* whether there are such pictures; normal only with albedo */
     int32_t quality;        /* LULL_OIDN_ */
     int32_t threads;        /* 0: all processors */
+    int32_t margin;         /* pixels around each picture in which it is mirrored, a multiple of LULL_OIDN_GRID */
     float exposure;         /* factor to where white is 1; > 0 */
 };
 
@@ -45,6 +49,13 @@ struct lull_oidn_pictures {
     const float *normal;                  /* there, in [-1, 1] */
     float *out[LULL_OIDN_COLORS];         /* of each color, in its units; finite everywhere */
 };
+
+/* Which of the pixels [0, n) stands at i, which may lie outside, where a picture is mirrored; n > 0. */
+static inline int32_t lull_oidn_mirrored(int32_t i, int32_t n)
+{
+    const int32_t period = n > 1 ? 2 * (n - 1) : 1, at = (i % period + period) % period;
+    return at < n ? at : period - at;
+}
 
 /* *out is owned by the caller. BASE_EINVAL: no lull-denoiser; no library (one line says how to get it), one of another major
  * version, or one whose device cannot be made. */

@@ -157,6 +157,7 @@ static int32_t prepare(struct picture *p, struct lull_error *err)
                                         .normal = p->normal,
                                         .quality = LULL_OIDN_HIGH,
                                         .threads = (int32_t)how->threads,
+                                        .margin = LULL_OIDN_MARGIN,
                                         .exposure = (float)p->exposure};
     if (lull_oidn_open(how->library, &p->oidn, &why) || lull_oidn_prepare(p->oidn, &form, &why))
         return lull_host_translate(&why, err);

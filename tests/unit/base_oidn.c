@@ -121,7 +121,8 @@ static void bad_numbers(void **unused)
         normal[i] = i % 3 ? -3.0f : INFINITY;
     }
     struct lull_oidn_pictures p = {{color, color}, albedo, normal, {out, other}};
-    struct lull_oidn_form form = {W, H, 1, 1, LULL_OIDN_FAST, 1, 0.5f};
+    struct lull_oidn_form form = {
+        .width = W, .height = H, .albedo = 1, .normal = 1, .quality = LULL_OIDN_FAST, .threads = 1, .exposure = 0.5f};
     static const char *const kinds[] = {"identity", "nan"};
     for (size_t k = 0; k < 2; k++) {
         struct lull_oidn *o = open_stub(kinds[k]);
@@ -133,6 +134,33 @@ static void bad_numbers(void **unused)
         assert_memory_equal(out, other, sizeof out);
         lull_oidn_close(o);
     }
+}
+
+/* The margin is the picture, mirrored, and does not come back: at each pixel the stub's mean of 5x5 reaches into it. */
+static void mirrored(void **unused)
+{
+    (void)unused;
+    enum { W = 7, H = 3, N = 3 * W * H };
+    const struct lull_oidn_form form = {
+        .width = W, .height = H, .quality = LULL_OIDN_HIGH, .threads = 1, .margin = LULL_OIDN_MARGIN, .exposure = 1};
+    float color[N], out[N];
+    struct lull_oidn_pictures p = {.color = {color}, .out = {out}};
+    struct lull_oidn *o = open_stub("box");
+    struct base_err err = {0};
+    for (int i = 0; i < N; i++)
+        color[i] = (float)(i * i % 17);
+    if (lull_oidn_prepare(o, &form, &err) || lull_oidn_run(o, &p, NULL, NULL, &err))
+        fail_msg("%s", err.text);
+    static const int column[W + 4] = {2, 1, 0, 1, 2, 3, 4, 5, 6, 5, 4}, row[H + 4] = {2, 1, 0, 1, 2, 1, 0};
+    for (int i = 0; i < N; i++) {
+        double sum = 0;
+        for (int k = 0; k < 25; k++)
+            sum += (double)color[3 * (row[i / 3 / W + k / 5] * W + column[i / 3 % W + k % 5]) + i % 3];
+        assert_true(fabs((double)out[i] - sum / 25) < 1e-5);
+    }
+    assert_int_equal(lull_oidn_mirrored(-5, 1), 0);
+    assert_int_equal(lull_oidn_mirrored(9, 2), 1);
+    lull_oidn_close(o);
 }
 
 /* --- the real library -------------------------------------------------------------------------------------------------- */
@@ -162,9 +190,10 @@ static float next(void)
     return (float)(seed >> 8) * 0x1p-24f;
 }
 
-static void denoise(struct lull_oidn *o, const float *color, int width, int height, int threads, float *out)
+static void denoise(struct lull_oidn *o, const float *color, int width, int height, int threads, int margin, float *out)
 {
-    struct lull_oidn_form form = {width, height, 0, 0, LULL_OIDN_HIGH, threads, 1.0f};
+    struct lull_oidn_form form = {
+        .width = width, .height = height, .quality = LULL_OIDN_HIGH, .threads = threads, .margin = margin, .exposure = 1};
     struct lull_oidn_pictures p = {.color = {color}, .out = {out}};
     struct base_err err = {0};
     if (lull_oidn_prepare(o, &form, &err) || lull_oidn_run(o, &p, NULL, NULL, &err))
@@ -181,8 +210,8 @@ static void real_library(void **unused)
     assert_non_null(color);
     for (int i = 0; i < N; i++)
         color[i] = 0.5f + 0.2f * (next() - 0.5f) + ((i / 3 % W) / 40 % 2 ? 0.2f : 0.0f);
-    denoise(o, color, W, H, 1, out);
-    denoise(o, color, W, H, 2, again);
+    denoise(o, color, W, H, 1, 0, out);
+    denoise(o, color, W, H, 2, 0, again);
     assert_memory_equal(out, again, N * sizeof *out);
     double noise = 0, left = 0;
     for (int i = 0; i < N; i++) {
@@ -197,14 +226,44 @@ static void real_library(void **unused)
     assert_true(X - X0 >= LULL_OIDN_HALO && Y - Y0 >= LULL_OIDN_HALO && X0 % LULL_OIDN_GRID + Y0 % LULL_OIDN_GRID == 0);
     for (int y = 0; y < CUT_H; y++)
         memcpy(part + y * CUT_W * 3, color + ((y + Y0) * W + X0) * 3, CUT_W * 3 * sizeof *part);
-    denoise(o, part, CUT_W, CUT_H, 1, again);
+    denoise(o, part, CUT_W, CUT_H, 1, 0, again);
     for (int y = Y; y < H; y++)
         assert_memory_equal(again + ((y - Y0) * CUT_W + X - X0) * 3, out + (y * W + X) * 3, (W - X) * 3 * sizeof *out);
 
     static const int sides[][2] = {{1, 1}, {15, 15}, {1, 200}, {37, 3}};
     for (size_t s = 0; s < 4; s++)
-        denoise(o, color, sides[s][0], sides[s][1], 1, again);
+        denoise(o, color, sides[s][0], sides[s][1], 1, (int)s % 2 * LULL_OIDN_MARGIN, again);
     free(color);
+    lull_oidn_close(o);
+}
+
+/* Grey with noise: how far the outermost pixels are off, root mean square, over the same of those inside. */
+static double border_error(struct lull_oidn *o, int margin)
+{
+    enum { W = 100, H = 90, N = 3 * W * H, INSIDE = 8 };
+    static float color[N], out[N];
+    double square[2] = {0}, count[2] = {0};
+    seed = 1;
+    for (int i = 0; i < N; i++)
+        color[i] = 0.4f + 0.1f * (next() - 0.5f);
+    denoise(o, color, W, H, 1, margin, out);
+    for (int i = 0; i < N; i++) {
+        const int x = i / 3 % W, y = i / 3 / W, border = x == 0 || y == 0 || x == W - 1 || y == H - 1;
+        if (border || (x >= INSIDE && y >= INSIDE && x < W - INSIDE && y < H - INSIDE)) {
+            square[border] += pow((double)out[i] - 0.4, 2);
+            count[border]++;
+        }
+    }
+    return sqrt(square[1] / count[1] / (square[0] / count[0]));
+}
+
+static void real_margin(void **unused)
+{
+    (void)unused;
+    struct lull_oidn *o = open_real();
+    double without = border_error(o, 0), with = border_error(o, LULL_OIDN_MARGIN);
+    print_message("outermost pixels are off %.1f times as much as others, mirrored on %.1f times\n", without, with);
+    assert_true(with < 2.0 && without > 2.0 * with);
     lull_oidn_close(o);
 }
 
@@ -217,7 +276,8 @@ int main(void)
         return 1;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(finding),     cmocka_unit_test(failures),     cmocka_unit_test(cancelling),
-        cmocka_unit_test(bad_numbers), cmocka_unit_test(real_library),
+        cmocka_unit_test(bad_numbers), cmocka_unit_test(mirrored),     cmocka_unit_test(real_library),
+        cmocka_unit_test(real_margin),
     };
     return cmocka_run_group_tests_name("oidn", tests, NULL, NULL);
 }

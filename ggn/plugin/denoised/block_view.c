@@ -17,10 +17,10 @@ static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
 
 static int32_t least(int32_t a, int32_t b) { return a < b ? a : b; }
 
-/* A side with what is denoised around it, as far as the frame's blocks reach: 0 < side <= area. */
+/* A side with what is denoised around it, as far as the frame's blocks and their margin reach: 0 < side <= area. */
 static int32_t widened(int32_t side, int32_t area)
 {
-    return area - side > GD_REACH + GD_HALO ? side + GD_REACH + GD_HALO : area;
+    return least(side + GD_REACH + GD_HALO, area + 2 * LULL_OIDN_MARGIN);
 }
 
 struct gd_form gd_form_of(const struct lull_frame *frame, enum lull_oidn_quality quality)
@@ -85,13 +85,12 @@ void gd_block_view_release(struct gd_block_view *seen)
 
 /* --- reading ----------------------------------------------------------------------------------------------------------- */
 
-/* Where along one side a box begins: its corner is on the denoiser's grid, and it holds the block and its halo. */
+/* Where along one side a box begins: its corner is on the denoiser's grid, and it holds the block and its halo as far as the
+ * margin of the frame, where the picture that is kept ends, too. */
 static int32_t corner(int32_t area0, int32_t area1, int32_t box, int32_t block0)
 {
-    int32_t from = block0 - GD_HALO - area0;
-    if (box == area1 - area0)
-        return area0;
-    return area0 + (from >= 0 ? from / LULL_OIDN_GRID : -((-from + LULL_OIDN_GRID - 1) / LULL_OIDN_GRID)) * LULL_OIDN_GRID;
+    const int32_t from = least(block0 - GD_HALO, area1 + LULL_OIDN_MARGIN - box) - (area0 - LULL_OIDN_MARGIN);
+    return area0 - LULL_OIDN_MARGIN + (from > 0 ? from / LULL_OIDN_GRID * LULL_OIDN_GRID : 0);
 }
 
 static struct lull_rect box_of(const struct gd_form *form, const struct lull_block *b)
@@ -145,13 +144,14 @@ static int read_part(struct gd_block_view *seen, struct lull_rect box, struct lu
     return differ;
 }
 
-/* Beyond `known` a box repeats its outermost pixels. */
-static void repeat_edges(float *picture, struct lull_rect box, struct lull_rect known)
+/* Beyond `known` a box is mirrored. */
+static void mirror_edges(float *picture, struct lull_rect box, struct lull_rect known)
 {
     const size_t width = (size_t)(box.x1 - box.x0);
     for (int32_t y = box.y0; y < box.y1; y++)
         for (int32_t x = box.x0; x < box.x1; x++) {
-            const int32_t u = most(known.x0, least(x, known.x1 - 1)), v = most(known.y0, least(y, known.y1 - 1));
+            const int32_t u = known.x0 + lull_oidn_mirrored(x - known.x0, known.x1 - known.x0);
+            const int32_t v = known.y0 + lull_oidn_mirrored(y - known.y0, known.y1 - known.y0);
             if (u != x || v != y)
                 memcpy(picture + 3 * ((size_t)(y - box.y0) * width + (size_t)(x - box.x0)),
                        picture + 3 * ((size_t)(v - box.y0) * width + (size_t)(u - box.x0)), 3 * sizeof *picture);
@@ -179,7 +179,7 @@ int gd_block_view_read(struct gd_block_view *seen, const struct gd_form *form, c
     }
     int differ = read_part(seen, box, core, view, b, planes, tally);
     for (int i = HALF_A; i <= NORMAL; i++)
-        repeat_edges(seen->box[i], box, known);
+        mirror_edges(seen->box[i], box, known);
     return differ;
 }
 
