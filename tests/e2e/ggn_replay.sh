@@ -94,10 +94,10 @@ watch() {
     check "observer, visible $1: nearly the same stop and p for every block" $?
     cp "$tmp/rendered" "$tmp/watched-$1"
 }
-watch 0.985
+watch 0.995
 watch 0.9995
-[ "$(awk '$2 < 250' "$tmp/watched-0.985" | wc -l)" -ge 4 ] && [ "$(awk '$2 == 250' "$tmp/watched-0.985" | wc -l)" -ge 1 ] &&
-    paste "$tmp/watched-0.985" "$tmp/watched-0.9995" | awk '$6 > $2 || $6 < 16 { bad = 1 } $6 < $2 { n++ } END { exit bad || n < 5 }'
+[ "$(awk '$2 < 250' "$tmp/watched-0.995" | wc -l)" -ge 4 ] && [ "$(awk '$2 == 250' "$tmp/watched-0.995" | wc -l)" -ge 1 ] &&
+    paste "$tmp/watched-0.995" "$tmp/watched-0.9995" | awk '$6 > $2 || $6 < 16 { bad = 1 } $6 < $2 { n++ } END { exit bad || n < 4 }'
 check "blocks stop or do not, and sooner when more viewers may see noise" $?
 echo "1..$n"
 exit $bad
