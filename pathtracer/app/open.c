@@ -8,6 +8,7 @@
 #include "pbrt/load.h"
 #include "render/host_find.h"
 #include "render/output.h"
+#include "sample/sampler.h"
 
 /* --- scene ---------------------------------------------------------------------------------------------------------- */
 
@@ -183,14 +184,14 @@ static int write_settings(const struct pt_cli *cli, struct pt_open *o, struct ba
            used = (size_t)snprintf(o->settings, room,
                                    "scene-crc=%08x\nsize=%dx%d\ncrop=%d,%d,%d,%d\nblock=%dx%d\nspp-min=%llu\nspp-max=%"
                                    "llu\nuniform=%d\nmax-seam=%g\n"
-                                   "aov=%u\nseed=%u\nsampler=%d\nintegrator=%d\nfilter=%d:%gx%g:%g\n"
+                                   "aov=%u\nseed=%u\nsampler=%d.%d\nintegrator=%d\nfilter=%d:%gx%g:%g\n"
                                    "light-selection=%s\nmax-depth=%d\nrr-depth=%d\nclamp=%g\n",
                                    scene_crc, c->width, c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3],
                                    c->block_width, c->block_height, (unsigned long long)c->spp_min,
                                    (unsigned long long)c->spp_max, c->uniform, c->max_seam, c->planes, i->seed, i->sampler,
-                                   i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y, (double)i->filter_sigma,
-                                   pt_light_selection_words[cli->load.light_selection], i->max_depth, i->rr_depth,
-                                   (double)i->max_component);
+                                   PT_SAMPLER_VERSION, i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y,
+                                   (double)i->filter_sigma, pt_light_selection_words[cli->load.light_selection],
+                                   i->max_depth, i->rr_depth, (double)i->max_component);
     const struct pt_view *view = &cli->load.view;
     used += (size_t)snprintf(o->settings + used, room - used, "fov=%.17g\nlook-at=", view->fov_deg);
     for (int k = 0; view->has_look_at && k < 9; k++)

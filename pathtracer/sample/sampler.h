@@ -21,6 +21,8 @@
 #include "sample/rng.h"
 
 enum { PT_DIMS_PER_VERTEX = 16, PT_SOBOL_BLOCKS = 3 };
+/* Changes whenever the numbers do: samples of two versions must not meet in one pixel. */
+enum { PT_SAMPLER_VERSION = 2 };
 
 enum pt_camera_dim { PT_DIM_PIXEL = 0, PT_DIM_LENS = 2, PT_DIM_TIME = 4 };
 enum pt_vertex_dim {

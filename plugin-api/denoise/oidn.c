@@ -116,7 +116,8 @@ static void drop_memory(struct lull_oidn *o)
 
 int lull_oidn_prepare(struct lull_oidn *o, const struct lull_oidn_form *form, struct base_err *err)
 {
-    const size_t width = (size_t)form->width + 2 * (size_t)form->margin, height = (size_t)form->height + 2 * (size_t)form->margin;
+    const size_t around = 2 * (size_t)form->margin;
+    const size_t width = (size_t)form->width + around, height = (size_t)form->height + around;
     const size_t pictures = SHARED_PICTURES * 3 * width * height;
     drop_memory(o);
     o->bytes = sizeof *o->shared + pictures * sizeof(float);
@@ -176,7 +177,7 @@ const char *lull_oidn_version(const struct lull_oidn *o) { return o->version; }
 
 /* --- pictures ---------------------------------------------------------------------------------------------------------- */
 
-/* A copy with its margin, in which everything is finite and inside [lo, hi]; what is no number is 0. form: with the margin. */
+/* A copy with its margin, in which everything is finite and inside [lo, hi]; what is no number is 0. form: of the copy. */
 static void clean(const float *from, const struct lull_oidn_form *form, float lo, float hi, float *to)
 {
     const int32_t width = form->width - 2 * form->margin, height = form->height - 2 * form->margin;

@@ -15,8 +15,9 @@
  * gives the bits of the whole picture inside if its corner lies on a multiple of LULL_OIDN_GRID of the frame and it has
  * LULL_OIDN_HALO pixels around (as far as the frame reaches); measured with 2.5.1.
  *
- * A denoiser errs most where a picture ends: the outermost pixels of a frame are two to three times as far off as others. Mirrored
- * on for LULL_OIDN_MARGIN pixels they are not. A crop that reaches the end of the frame must be mirrored there, too.
+ * A denoiser errs most where a picture ends: outermost pixels are several times as far off as others, but not in a picture
+ * that is mirrored on for LULL_OIDN_MARGIN pixels (tests/unit/base_oidn.c). A crop that reaches the end of the frame must be
+ * mirrored there, too, or it is not what the whole picture is.
  *
  * Calls on one struct lull_oidn must not overlap; different ones may.
  */

@@ -275,8 +275,8 @@ int main(void)
     if (api_folder(stub, sizeof stub, "../oidn-stub") != 0)
         return 1;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(finding),     cmocka_unit_test(failures),     cmocka_unit_test(cancelling),
-        cmocka_unit_test(bad_numbers), cmocka_unit_test(mirrored),     cmocka_unit_test(real_library),
+        cmocka_unit_test(finding),     cmocka_unit_test(failures), cmocka_unit_test(cancelling),
+        cmocka_unit_test(bad_numbers), cmocka_unit_test(mirrored), cmocka_unit_test(real_library),
         cmocka_unit_test(real_margin),
     };
     return cmocka_run_group_tests_name("oidn", tests, NULL, NULL);

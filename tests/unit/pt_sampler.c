@@ -297,16 +297,11 @@ static void streams_are_uniform(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(second_dimension_is_sobol),
-        cmocka_unit_test(pairs_are_nets),
-        cmocka_unit_test(single_numbers_are_stratified),
-        cmocka_unit_test(offsets_within_strata_are_independent),
-        cmocka_unit_test(smooth_functions_converge_faster),
-        cmocka_unit_test(sequences_are_independent),
-        cmocka_unit_test(no_dimension_has_two_uses),
-        cmocka_unit_test(dimensions_are_independent),
-        cmocka_unit_test(numbers_depend_on_their_key_only),
-        cmocka_unit_test(streams_are_uniform),
+        cmocka_unit_test(second_dimension_is_sobol),        cmocka_unit_test(pairs_are_nets),
+        cmocka_unit_test(single_numbers_are_stratified),    cmocka_unit_test(offsets_within_strata_are_independent),
+        cmocka_unit_test(smooth_functions_converge_faster), cmocka_unit_test(sequences_are_independent),
+        cmocka_unit_test(no_dimension_has_two_uses),        cmocka_unit_test(dimensions_are_independent),
+        cmocka_unit_test(numbers_depend_on_their_key_only), cmocka_unit_test(streams_are_uniform),
         cmocka_unit_test(no_two_streams_begin_alike),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

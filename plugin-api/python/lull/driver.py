@@ -31,8 +31,7 @@ CALL_S = 1.0
 
 def in_half(wave: int) -> bool:
     """Is this wave in half A? The parity of some bits of its number: simply taking every second one would halve a dimension
-    of a Sobol' sequence. Two successive waves 2k, 2k + 1 are always split. With waves of four samples these are the path
-    tracer's halves."""
+    of a Sobol' sequence. Two successive waves 2k, 2k + 1 are always split."""
     return bin(wave & 0x1F4A7C1B).count("1") % 2 == 0
 
 
