@@ -191,6 +191,31 @@ static void two_looks_stop(void **unused)
     end(&s);
 }
 
+/* The frame's edge is no edge to the denoiser: a block that ends there has the error that it has in a larger frame, whose
+ * pixels are its own mirrored on. */
+static void mirrored_beyond_the_frame(void **unused)
+{
+    (void)unused;
+    enum { BW = 117, BH = 105 };
+    static double small[2][BW * BH][3];
+    struct session s;
+    make(0.4, 0.1, 0.02);
+    setenv("OIDN_STUB", "box", 1);
+    begin(&s, BW, BH, "denoised", GIVEN, 0);
+    double alone = answer(&s, 0, 64).error;
+    end(&s);
+    memcpy(small[0], color, sizeof small[0]);
+    memcpy(small[1], half, sizeof small[1]);
+    for (int i = 0; i < PIXELS; i++) {
+        const int x = i % W, y = i / W, u = x < BW ? x : 2 * (BW - 1) - x, v = y < BH ? y : 2 * (BH - 1) - y;
+        memcpy(color[i], small[0][v * BW + u], sizeof color[i]);
+        memcpy(half[i], small[1][v * BW + u], sizeof half[i]);
+    }
+    begin(&s, W, H, "denoised", GIVEN, 0);
+    assert_true(alone > 0 && answer(&s, 0, 64).error == alone);
+    end(&s);
+}
+
 /* Stripes far below the noise, which the denoiser wipes away: the halves agree, only crossing them shows it. */
 static void stripes_below_the_noise(void **unused)
 {
@@ -477,13 +502,21 @@ int main(void)
     if (api_folder(criteria, sizeof criteria, API_CRITERIA) != 0 || api_folder(stub, sizeof stub, "../oidn-stub") != 0)
         return 1;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(two_looks_stop),  cmocka_unit_test(stripes_below_the_noise),
-        cmocka_unit_test(a_small_place),   cmocka_unit_test(a_speck),
-        cmocka_unit_test(an_edge),         cmocka_unit_test(the_blend_is_no_worse_than_the_noise),
-        cmocka_unit_test(thin_and_bright), cmocka_unit_test(late_light),
-        cmocka_unit_test(a_wide_frame),    cmocka_unit_test(hard_pixels),
-        cmocka_unit_test(sizes),           cmocka_unit_test(failing_denoisers),
-        cmocka_unit_test(no_library),      cmocka_unit_test(warns_once),
+        cmocka_unit_test(two_looks_stop),
+        cmocka_unit_test(mirrored_beyond_the_frame),
+        cmocka_unit_test(stripes_below_the_noise),
+        cmocka_unit_test(a_small_place),
+        cmocka_unit_test(a_speck),
+        cmocka_unit_test(an_edge),
+        cmocka_unit_test(the_blend_is_no_worse_than_the_noise),
+        cmocka_unit_test(thin_and_bright),
+        cmocka_unit_test(late_light),
+        cmocka_unit_test(a_wide_frame),
+        cmocka_unit_test(hard_pixels),
+        cmocka_unit_test(sizes),
+        cmocka_unit_test(failing_denoisers),
+        cmocka_unit_test(no_library),
+        cmocka_unit_test(warns_once),
         cmocka_unit_test(neighbours),
     };
     return cmocka_run_group_tests_name("denoised_criterion", tests, NULL, NULL);
