@@ -2,8 +2,9 @@
 
 Of every scene of the plan two independent references are rendered, and one render is looked at again and again as its samples grow
 (tests/bench/pt_looks.c): what is believed of each block, and the noisy, the denoised and the blended picture. Their visible errors
-against the two references, whose noise is taken out (`ggn visible --second`), are the truth. Stops are read from the looks: a block
-stops when a look at n and the next one at 1.25 n are both low enough. Times are processor seconds, of the denoiser's process too."""
+against the two references, whose noise is taken out (`ggn visible --second`), are the truth. Stops are where the criterion's
+own steps from look to look end, with errors between these looks as logarithms. Times are processor seconds, of the denoiser's process too."""
+import bisect
 import json
 import math
 import os
@@ -17,8 +18,8 @@ SCENES = ["scenes/%s.pbrt" % name for name in "demo rock-garden kitchen cornell-
     os.path.join("..", "shared", "scenes", name) for name in ("coffee-v3/scene.pbrt", "veach-mis-v4/veach-mis.pbrt",
                                                               "cornell-bunny-v4/cornell_bunny_conductor.pbrt")]
 SIZE, BLOCK, SEED, REFERENCES, PRICE_SPP = 256, 128, 1, (101, 102), 32
-LOOKS, AGAIN = (64, 128, 256, 512), 1.25
-LEVELS = sorted((32, 40) + LOOKS + tuple(int(AGAIN * n) for n in LOOKS))
+LEVELS = (32, 40, 64, 80, 128, 160, 256, 320, 512, 640)
+FIRST, AGAIN, LEAST_STEP, GROWTH = 64, 1.25, 2 ** 0.5, 2  # samples of the first look, and their ratios from look to look
 KINDS = ("noisy", "denoised", "blend")
 VISIBLE = 1.05  # beyond this an error counts as visible: the references' own noise scatters the truth by some per cent
 HEAD = ("scene", "blocks", "samples until nothing is seen: noisy / denoised / blend", "blend / noisy", "stopped, of these visibly off",
@@ -95,12 +96,23 @@ def until(looks, what, limit=1.0):
     return n0 * (n1 / n0) ** (math.log(e0) / math.log(e0 / e1))
 
 
+def between(looks, spp, what):
+    """looks[what] at so many samples, between two looks as logarithms."""
+    k = min(max(bisect.bisect_right([look["spp"] for look in looks], spp), 1), len(looks) - 1)
+    (n0, e0), (n1, e1) = ((look["spp"], max(look[what], 1e-3)) for look in looks[k - 1:k + 1])
+    return e0 * (e1 / e0) ** (math.log(spp / n0) / math.log(n1 / n0))
+
+
 def stop(looks, limit, what):
-    """The look at which a block stops by looks[what]; None: it goes on."""
-    at = {look["spp"]: look for look in looks}
-    for n in LOOKS:
-        if at[n][what] <= limit and at[int(AGAIN * n)][what] <= limit:
-            return at[int(AGAIN * n)]
+    """Samples at which a block stops by looks[what], and how many looks that takes, as ggn/plugin/denoised/denoised.c goes on; None:
+    not within the looks that there are."""
+    spp, low, count = FIRST, False, 0
+    while spp <= looks[-1]["spp"]:
+        error, was_low, count = between(looks, spp, what), low, count + 1
+        low = error <= limit
+        if low and was_low:
+            return spp, count
+        spp = int(math.ceil(spp * (AGAIN if low else min(max((error / limit) ** 2, LEAST_STEP), GROWTH))))
     return None
 
 
@@ -117,13 +129,12 @@ def block(looks, limit):
     needed = {kind: until(looks, "true_" + kind) for kind in KINDS}
     sample_s = looks[-1]["sample_s"]
     b = {"until": needed, "ratio": needed["blend"] / needed["noisy"], "observer": until(looks, "noisy", limit),
-         "halves": wrongly and wrongly["true_blend"]}
+         "halves": wrongly and between(looks, wrongly[0], "true_blend")}
     if ended:
-        asked = [n for n in LOOKS if AGAIN * n <= ended["spp"]]
-        looks_s = (len(asked) + 1) * ended["look_s"]
-        b.update(looks_s=looks_s, spp=ended["spp"], true=ended["true_blend"], believed=ended["error"], noisy=ended["true_noisy"],
-                 denoised_s=ended["spp"] * sample_s + looks_s,
-                 observer_s=b["observer"] * sample_s)
+        spp, count = ended
+        looks_s = count * statistics.mean(look["look_s"] for look in looks)
+        b.update(looks_s=looks_s, spp=spp, true=between(looks, spp, "true_blend"), believed=between(looks, spp, "error"),
+                 denoised_s=spp * sample_s + looks_s, observer_s=b["observer"] * sample_s, path_us=1e6 * sample_s / BLOCK ** 2)
     return b
 
 
@@ -149,7 +160,7 @@ def summary(rows, looks, limit):
             "mean_spp": mean, "uniform_spp": near, "uniform_denoised": uniform("denoised"), "uniform_blend": uniform("blend"),
             "uniform_noisy": uniform("noisy"), "time": sum(b["denoised_s"] for b in stopped) / sum(b["observer_s"] for b in stopped),
             "looks_share": sum(b["looks_s"] for b in stopped) / sum(b["denoised_s"] for b in stopped),
-            "stops": {n: sum(b["spp"] == int(AGAIN * n) for b in stopped) for n in LOOKS}}
+            "dear_time": statistics.median(b["denoised_s"] / b["observer_s"] for b in stopped if b["path_us"] > 1)}
 
 
 def scene_row(scene, looks, limit):
@@ -181,7 +192,8 @@ def text(rows, s):
         "1.05, the worst %.2f), denoised alone %.2f (%d dearer)" % (
             s["ratio"], s["dearer"], s["ratio_max"], s["denoised_ratio"], s["denoised_dearer"]),
         "where `denoised` stops, against where `observer` stops the noisy picture: median %.2f of the samples; all together %.2f of the "
-        "processor time, looks included, which are %.0f %% of it" % (s["stop_ratio"], s["time"], 100 * s["looks_share"]),
+        "processor time, looks included, which are %.0f %% of it; median of the blocks whose paths take more than 1 µs: %.2f of the "
+        "time" % (s["stop_ratio"], s["time"], 100 * s["looks_share"], s["dear_time"]),
         "believed against true over all looks: Spearman **%.2f**; from 64 samples on, believed / true has the median %.2f and is below "
         "1/%.2f in %.0f %% of the looks" % (s["spearman"], s["over"], VISIBLE, 100 * s["below"]),
         "the same number of samples everywhere (%d, where stopped blocks have %.0f in the mean): visibly off are %.0f %% of all blocks of the "

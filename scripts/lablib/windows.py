@@ -60,7 +60,7 @@ def ends(blocks, limit):
     rows = []
     for _, looks in blocks:
         at = [denoised.stop(looks, limit * 2 ** -shift, "said") for shift in SHIFTS]
-        rows.append([(True, e["spp"], e["true_blend"] > denoised.VISIBLE) if e else (False, AFTER, False) for e in at])
+        rows.append([(True, e[0], denoised.between(looks, e[0], "true_blend") > denoised.VISIBLE) if e else (False, AFTER, False) for e in at])
     return rows
 
 

@@ -44,7 +44,7 @@ int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form,
 {
     const size_t pixels = (size_t)form->width * (size_t)form->height;
     const size_t patches = ggn_visible_patches(form->width, form->height);
-    const size_t box = 3 * (size_t)form->box.width * (size_t)form->box.height, planes = 3 + 4 + 2 + 7;
+    const size_t box = 3 * (size_t)form->box.width * (size_t)form->box.height, planes = 3 + 4 + 2 + 8;
     const size_t doubles = patches + ggn_visibility_scratch(form->width);
     struct gd_block_view l = {0};
     if (box > PTRDIFF_MAX / 64 / sizeof(double) || form->area.x1 > INT32_MAX / 2 || form->area.y1 > INT32_MAX / 2)
@@ -60,7 +60,7 @@ int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form,
     l.rgb = at;
     at += 3 * pixels;
     float **const maps[] = {&l.light[0], &l.light[1], &l.light[2], &l.light[3], &l.lightness[0], &l.lightness[1], &l.edges,
-                            &l.slope,    &l.crossed,  &l.blurred,  &l.apart,    &l.scratch,      &l.alpha};
+                            &l.slope,    &l.crossed,  &l.blurred,  &l.apart,    &l.scratch,      &l.alpha,        &l.blind};
     for (size_t i = 0; i < sizeof maps / sizeof maps[0]; i++, at += pixels)
         *maps[i] = at;
     int rc = lull_oidn_open(library, &l.oidn, err);
@@ -180,16 +180,21 @@ int gd_block_view_read(struct gd_block_view *seen, const struct gd_form *form, c
     return differ;
 }
 
-/* The block's part of a box as a display shows it; its luminance and L*, [P]. */
-static void show(struct gd_block_view *seen, int which, struct lull_rect box, const struct lull_block *b,
+/* The block's part of a box as a display shows it; its luminance and L*, [P]. alpha, or NULL: of a denoised half, how much
+ * of the noisy one is mixed in. */
+static void show(struct gd_block_view *seen, int which, const float *alpha, struct lull_rect box, const struct lull_block *b,
                  const struct lull_kit *kit, float *light, float *lightness)
 {
     const size_t width = (size_t)(b->x1 - b->x0), pixels = (size_t)lull_kit_pixels(b), row = (size_t)(box.x1 - box.x0);
     for (size_t y = 0, at = 0; y < pixels / width; y++) {
-        const float *from = seen->box[which] + 3 * ((y + (size_t)(b->y0 - box.y0)) * row + (size_t)(b->x0 - box.x0));
-        for (size_t x = 0; x < width; x++, at++, from += 3) {
+        const size_t first = 3 * ((y + (size_t)(b->y0 - box.y0)) * row + (size_t)(b->x0 - box.x0));
+        for (size_t x = 0; x < width; x++, at++) {
+            float rgb[3];
+            memcpy(rgb, seen->box[which] + first + 3 * x, sizeof rgb);
+            if (alpha)
+                lull_blend(seen->box[which - DENOISED_A + HALF_A] + first + 3 * x, rgb, &alpha[at], 1, rgb);
             for (size_t c = 0; c < 3; c++)
-                seen->rgb[c * pixels + at] = gp_shown(kit, (double)from[c]);
+                seen->rgb[c * pixels + at] = gp_shown(kit, (double)rgb[c]);
             light[at] = (float)base_luminance((double)seen->rgb[at], (double)seen->rgb[pixels + at],
                                               (double)seen->rgb[2 * pixels + at]);
         }
@@ -276,7 +281,7 @@ static double sixth_moment(const struct gd_block_view *l, int width, int height,
         edges += strata[k].n > 0.0 ? sixth_of(&strata[k], 1.0) : 0.0;
     const double halves = whole.second / whole.n, shape = halves > 0.0 ? whole.sixth / whole.n / cube(halves) : 0.0;
     const double mean = whole.q / whole.n, doubt = standard_error(&whole);
-    const double square = fmax(fmax(mean + doubt, -mean - doubt), halves);
+    const double square = fmax(fmax(mean + 0.5 * doubt, -mean - doubt), halves);
     return fmax(fmax(GAUSSIAN, shape) * cube(square), fmax(tiles, edges) / whole.n);
 }
 
@@ -315,15 +320,20 @@ static float *pixel_of(struct gd_block_view *l, int which, struct lull_rect box,
     return l->box[which] + 3 * ((y + (size_t)(b->y0 - box.y0)) * (size_t)(box.x1 - box.x0) + x + (size_t)(b->x0 - box.x0));
 }
 
+static void despeckle(struct gd_block_view *l, struct lull_rect box, const struct lull_block *b, size_t pixels)
+{
+    for (size_t i = 0; i < pixels; i++)
+        lull_blend_despeckle(&l->apart[i], 1, pixel_of(l, DENOISED_A, box, b, i), pixel_of(l, DENOISED_B, box, b, i));
+}
+
 /* Each denoised half becomes that of the blend. */
 static void keep(struct gd_block_view *l, struct lull_rect box, const struct lull_block *b, size_t pixels)
 {
-    for (size_t i = 0; i < pixels; i++) {
-        float *const denoised[2] = {pixel_of(l, DENOISED_A, box, b, i), pixel_of(l, DENOISED_B, box, b, i)};
-        lull_blend_despeckle(&l->apart[i], 1, denoised[0], denoised[1]);
-        for (int k = 0; k < 2; k++)
-            lull_blend(pixel_of(l, HALF_A + k, box, b, i), denoised[k], &l->alpha[i], 1, denoised[k]);
-    }
+    for (size_t i = 0; i < pixels; i++)
+        for (int k = 0; k < 2; k++) {
+            float *denoised = pixel_of(l, DENOISED_A + k, box, b, i);
+            lull_blend(pixel_of(l, HALF_A + k, box, b, i), denoised, &l->alpha[i], 1, denoised);
+        }
 }
 
 /* How far apart the kept halves are, at the strength of the mean: L* of the mean less that of the darker half. A speck that
@@ -340,7 +350,7 @@ static void tell_apart(struct gd_block_view *l, struct lull_rect box, const stru
     }
     float *shown[2] = {l->lightness[0], l->lightness[1]};
     for (int k = 0; k < 2; k++)
-        show(l, DENOISED_A + k, box, b, kit, l->scratch, shown[k]);
+        show(l, DENOISED_A + k, NULL, box, b, kit, l->scratch, shown[k]);
     for (size_t i = 0; i < pixels; i++)
         l->apart[i] = l->lightness[0][i] - l->lightness[1][i];
 }
@@ -394,20 +404,25 @@ int gd_block_view_errors(struct gd_block_view *l, const struct gd_form *form, co
     if (denoise(l, kit))
         return l->err.code;
     for (size_t k = 0; k < 4; k++)
-        show(l, shown[k], box, b, kit, l->light[k], l->lightness[k % 2]);
+        show(l, shown[k], NULL, box, b, kit, l->light[k], l->lightness[k % 2]);
     ggn_visible_texture(l->lightness[0], l->lightness[1], width, height, l->rows, l->texture);
     struct lull_estimate_in in = {l->light[0], l->light[1], l->light[2], l->light[3], h / n};
     lull_estimate_pixels(&in, pixels, &estimate);
+    lull_blend_weights_blind(&estimate, width, height, l->rgb, l->blind);
     lull_blend_weights(&estimate, width, height, l->scratch, l->alpha, l->apart);
     for (size_t i = 0; i < pixels; i++) {
         l->slope[i] = (float)lull_lightness_slope(0.5 * ((double)l->light[2][i] + (double)l->light[3][i]));
         l->edges[i] = 0.5f * (l->lightness[0][i] + l->lightness[1][i]);
     }
     if (blend)
+        despeckle(l, box, b, pixels);
+    for (size_t k = 2; k < 4; k++)
+        show(l, shown[k], blend ? l->blind : NULL, box, b, kit, l->light[k], l->lightness[0]);
+    cross(l, width, height);
+    if (blend)
         keep(l, box, b, pixels);
     for (size_t k = 2; k < 4; k++)
-        show(l, shown[k], box, b, kit, l->light[k], l->lightness[0]);
-    cross(l, width, height);
+        show(l, shown[k], NULL, box, b, kit, l->light[k], l->lightness[0]);
     tell_apart(l, box, b, kit, pixels, split);
     errors->halves = ggn_visible_noise(l->apart, width, height, l->texture, l->rows, l->scratch);
     memcpy(l->apart, l->scratch, pixels * sizeof *l->apart);

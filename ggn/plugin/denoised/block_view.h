@@ -8,9 +8,11 @@
  * Both estimates are of what the eye is left with after the observer's blur, over what texture hides:
  *
  * - halves: how far P(A) and P(B) are apart. Bias, which they share, is not in it.
- * - crossed: how far each is from the other, noisy half (estimate.h's formula, P in the place of F). Bias is in it. The
- *   observer asks for the mean of sixth powers over each of its patches; the largest of three estimates counts:
- *   - the mean square with one standard error more, so that luck stops nothing, and never below that of the halves; errors
+ * - crossed: how far each is from the other, noisy half (estimate.h's formula, P in the place of F). Bias is in it. alpha is
+ *   that of the neighbourhood alone here (lull_blend_weights_blind): chosen by the pixel's own samples it would leave a
+ *   third of the mean square unseen. The observer asks for the mean of sixth powers over each of its patches; the largest of
+ *   three estimates counts:
+ *   - the mean square with half a standard error more, so that luck stops little, and never below that of the halves; errors
  *     as uneven as the halves' difference, and at least Gaussian (15 cubes of the mean square);
  *   - over tiles of 25 px, with two standard errors less: a small place where the denoiser fails, beyond doubt;
  *   - over the edges of each octave of strength, with one less: there denoisers err most.
@@ -47,11 +49,11 @@ struct gd_block_view {
     float *light[4];     /* [P]: displayed luminance of A, B and both denoised, later both kept */
     float *lightness[2]; /* [P]: L* of a pair */
     float *edges;        /* [P]: L* of the denoised picture */
-    float *slope, *crossed, *blurred, *apart, *scratch, *alpha; /* [P] */
-    double *texture;                                            /* [patches] */
-    double *rows;                                               /* scratch of model/visibility.h */
-    void *memory;                                               /* owns all of the above but oidn */
-    struct base_err err;                                        /* of the last call that failed */
+    float *slope, *crossed, *blurred, *apart, *scratch, *alpha, *blind; /* [P] */
+    double *texture;                                                    /* [patches] */
+    double *rows;                                                       /* scratch of model/visibility.h */
+    void *memory;                                                       /* owns all of the above but oidn */
+    struct base_err err;                                                /* of the last call that failed */
 };
 
 /* frame: checked. quality: of struct lull_oidn_form. */
