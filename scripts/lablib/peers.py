@@ -32,7 +32,7 @@ def options(parser):
     parser.add_argument("--size", type=int, default=128, help="side of the pictures (128)")
     parser.add_argument("--block", type=int, default=64, help="side of the blocks (64)")
     parser.add_argument("--seeds", type=int, default=3, help="of each scene; 0: only tell what is kept (3)")
-    parser.add_argument("--reference-spp", type=int, default=1024, metavar="N", help="of each of the two references of a renderer (1024)")
+    parser.add_argument("--reference-spp", type=int, default=2048, metavar="N", help="of each of the two references of a renderer (2048)")
     parser.add_argument("--blender", default=BPY if os.path.exists(BPY) else "blender", metavar="PROGRAM",
                         help="a Python with bpy, or blender, which is compared raw if it has no denoiser (bpy of build/hosts, if it is there)")
     parser.add_argument("--work", type=tool.path, default=os.path.join(tool.BUILD, "peers"), metavar="DIR",
