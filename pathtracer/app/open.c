@@ -184,7 +184,7 @@ static int write_settings(const struct pt_cli *cli, struct pt_open *o, struct ba
            used = (size_t)snprintf(o->settings, room,
                                    "scene-crc=%08x\nsize=%dx%d\ncrop=%d,%d,%d,%d\nblock=%dx%d\nspp-min=%llu\nspp-max=%"
                                    "llu\nuniform=%d\nmax-seam=%g\n"
-                                   "aov=%u\nseed=%u\nsampler=%d.%d\nintegrator=%d\nfilter=%d:%gx%g:%g\n"
+                                   "aov=%u\nseed=%u\nsampler=%d\nsampler-version=%d\nintegrator=%d\nfilter=%d:%gx%g:%g\n"
                                    "light-selection=%s\nmax-depth=%d\nrr-depth=%d\nclamp=%g\n",
                                    scene_crc, c->width, c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3],
                                    c->block_width, c->block_height, (unsigned long long)c->spp_min,

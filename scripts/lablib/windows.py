@@ -127,8 +127,10 @@ def measure(o, by_scene, octaves, numbers, fits):
 
 
 def worth(network, off, spp):
-    """The rule that was set before it was trained: half as many blocks off for the same samples, or nine tenths of the samples for as many."""
-    return (network["as_dear"] is not None and network["as_dear"] <= HALF * off) or network["as_safe"] <= CHEAPER * spp
+    """The rule that was set before it was trained: half as many blocks off for the same samples, or nine tenths of the samples for as many.
+    Where none is off there are no half as many."""
+    fewer = bool(off) and network["as_dear"] is not None and network["as_dear"] <= HALF * off
+    return fewer or network["as_safe"] <= CHEAPER * spp
 
 
 def verdict(ways):

@@ -49,9 +49,14 @@ asked() { scripts/lab explained "$tmp/pixels" --folds 2 --seeds 1 >"$tmp/out" 2>
 if /usr/bin/python3 -c 'import torch' 2>/dev/null; then
     asked && grep -Eq '^\| all, noisy and samples \| 1\.[0-9]+ \| -?0\.0' "$tmp/out" && grep -Eq '^\| network, mean .* \| 0\.[0-3][0-9] \| (0\.9|1\.0)' "$tmp/out"
     check "the network sees in scenes left out what numbers do not tell" $?
-    grep -Eq '^\| the estimate as it is \| 1\.[0-9]+ \| -?0\.00 \| 17 \| 4 \| 640 \| 4 \| 0\.96 \(' "$tmp/out" &&
+    grep -Eq '^\| the estimate as it is \| 1\.[0-9]+ \| -?0\.00 \| 20 \| 7 \| 492 \| 7 \| 0\.24 \(' "$tmp/out" &&
         grep -Eq '^\| network, mean .* \| 0 \| 0\.[1-3][0-9] \(' "$tmp/out"
     check "as a criterion the network that knows the truth stops no block that is off, and sooner" $?
+    PYTHONPATH=scripts python3 -c 'from lablib.windows import worth
+none, dear = {"as_dear": 0, "as_safe": 0.95}, {"as_dear": 2, "as_safe": 0.95}
+assert worth(none, 1, 1) and worth(dear, 4, 1) and worth({"as_dear": 9, "as_safe": 0.85}, 4, 1)
+assert not worth(none, 0, 1) and not worth(dear, 3, 1)' 2>"$tmp/err"
+    check "none off beside none off is no gain" $?
     PYTHONPATH=scripts /usr/bin/python3 - "$tmp" >"$tmp/out" 2>"$tmp/err" <<'END'
 import argparse, os, sys
 from lablib import torch_windows, windows
@@ -72,7 +77,7 @@ END
     asked && grep -q '^All 5 scenes, 20 blocks:' "$tmp/out" && ! grep -q '"a"' "$tmp"/pixels/network-*.json
     check "a scene without all its windows is left out, and the networks are new" $?
 else
-    for k in 1 2 3 4 5; do n=$((n + 1)) && echo "ok $n - a network sees the pixels # SKIP python3-torch is not installed"; done
+    for k in 1 2 3 4 5 6; do n=$((n + 1)) && echo "ok $n - a network sees the pixels # SKIP python3-torch is not installed"; done
 fi
 rm "$tmp"/[bc].high.json
 ! scripts/lab explained "$tmp" >"$tmp/out" 2>"$tmp/err" && [ "$(wc -l <"$tmp/err")" -eq 1 ] && grep -q "no looks of two scenes" "$tmp/err"
