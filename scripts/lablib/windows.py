@@ -145,8 +145,8 @@ def verdict(ways):
 def page(r):
     told = []
     for key, what in (("all", "All %d scenes, %d blocks"), ("page", "Of these the %d of docs/denoised.md, %d blocks")):
-        if key in r["sets"]:
-            s = r["sets"][key]
+        s = r["sets"].get(key)
+        if s and (key == "all" or s["scenes"] < r["sets"]["all"]["scenes"]):
             rows = [[w["name"], "%.2f" % w["rms"], "%.2f" % w["explained"], "%d" % w["stopped"], "%d" % w["off"], "%.0f" % w["spp"],
                      tables.figure(w["as_dear"], "%d"), "%.2f (%.2f–%.2f)" % (w["as_safe"], *w["spread"])] for w in s["ways"]]
             told.append("%s:\n\n%s\n%s" % (what % (s["scenes"], s["blocks"]), tables.table(HEAD, rows), verdict(s["ways"])))
