@@ -18,7 +18,12 @@ static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
 static int32_t least(int32_t a, int32_t b) { return a < b ? a : b; }
 
 /* A side with what is denoised around it, as far as the frame's blocks and their margin reach: 0 < side <= area. */
-static int32_t widened(int32_t side, int32_t area) { return least(side + GD_REACH + GD_HALO, area + 2 * LULL_OIDN_MARGIN); }
+static int32_t widened(int32_t side, int32_t area)
+{
+    const int64_t around = (int64_t)side + GD_REACH + GD_HALO, whole = (int64_t)area + 2 * LULL_OIDN_MARGIN;
+    const int64_t wide = around < whole ? around : whole;
+    return wide < INT32_MAX ? (int32_t)wide : INT32_MAX; /* there is no memory for it */
+}
 
 struct gd_form gd_form_of(const struct lull_frame *frame, enum lull_oidn_quality quality)
 {
