@@ -78,9 +78,10 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
         return rc;
     s->progress.seconds[row.phase] += base_clock_wall_s() - start;
     processor = base_clock_process_s() - processor;
-    rc = job_sum(s->plan->job, &processor, 1, sizeof processor);
+    job_sum(s->plan->job, &processor, 1, sizeof processor);
+    rc = job_failed(s->plan->job, err); /* which says what the other processes did */
     if (rc)
-        return base_fail(err, rc, "processor time");
+        return rc;
     s->progress.processor_s[row.phase] += processor;
     ggn_trainer_keep(s->trainer);
     row.lr = s->trainer->options.lr[phase->net];
