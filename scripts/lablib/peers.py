@@ -29,6 +29,7 @@ EXPORT = os.path.join(tool.ROOT, "scripts", "hosts", "pbrt_to_blend.py")
 def options(parser):
     parser.add_argument("--scenes", nargs="+", default=SCENES, metavar="SCENE",
                         help="names of scenes/, or files (%s)" % " ".join(SCENES))
+    parser.add_argument("--only", choices=("raw", "denoised"), help="one of the two tables; the other's figures stay (both)")
     parser.add_argument("--size", type=int, default=128, help="side of the pictures (128)")
     parser.add_argument("--block", type=int, default=64, help="side of the blocks (64)")
     parser.add_argument("--seeds", type=int, default=3, help="of each scene; 0: only tell what is kept (3)")
@@ -295,32 +296,40 @@ def head(results):
 
 
 def raw(results):
-    return "%s\n%s" % (head(results), compared(results["scenes"], RAW, ""))
+    r = results["raw"]
+    return "%s\n%s" % (head(r), compared(r["scenes"], RAW, ""))
 
 
 def denoised(results):
+    r = results["denoised"]
     ways = ["ours denoised", "host denoised", *DENOISED, *UNIFORMS[" denoised"],
             *("ours n=%d denoised" % n for n in UNIFORM)]
-    return "%s\n%s\n%s" % (head(results), share_table(results["scenes"], ways), compared(results["scenes"], DENOISED, " denoised"))
+    return "%s\n%s\n%s" % (head(r), share_table(r["scenes"], ways), compared(r["scenes"], DENOISED, " denoised"))
+
+
+PAGES, MEASURES = {"raw": raw, "denoised": denoised}, {"raw": Scene.measure_raw, "denoised": Scene.measure_denoised}
 
 
 def main(o):
     if not (os.path.exists(o.blender) or shutil.which(o.blender)):
         raise tool.Refused("no program %s: make test-hosts, or apt-get install blender" % o.blender)
     os.makedirs(o.work, exist_ok=True)
+    asked = [o.only] if o.only else list(PAGES)
     cycles = Cycles(o.blender)
     try:
         scenes = {scene.name: scene for scene in (Scene(o, name, cycles) for name in o.scenes)}
         for seed in range(1, o.seeds + 1):
-            for measure in (Scene.measure_raw, Scene.measure_denoised):
+            for what in asked:
                 for scene in scenes.values():
                     if scene.agree():
-                        measure(scene, seed)
+                        MEASURES[what](scene, seed)
     finally:
         cycles.close()
     results = {"measured": tool.measured(), "blender": cycles.version(),
                "options": {k: getattr(o, k) for k in ("size", "block", "reference_spp")},
                "scenes": {name: scene.found for name, scene in scenes.items() if "differ" in scene.found}}
-    print(raw(results), denoised(results), sep="\n")
+    for what in asked:
+        print(PAGES[what]({what: results}))
     if o.write:
-        tool.store(o.write, "peers", results, indent=None)
+        kept = tool.results(o.write, "peers")
+        tool.store(o.write, "peers", {what: results if what in asked else kept[what] for what in PAGES}, indent=None)
