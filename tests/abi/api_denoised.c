@@ -207,7 +207,7 @@ static void mirrored_beyond_the_frame(void **unused)
     memcpy(small[0], color, sizeof small[0]);
     memcpy(small[1], half, sizeof small[1]);
     for (int i = 0; i < PIXELS; i++) {
-        const int x = i % W, y = i / W, u = x < BW ? x : 2 * (BW - 1) - x, v = y < BH ? y : 2 * (BH - 1) - y;
+        const int x = i % W, y = i / W, u = x < BW ? x : 2 * (BW - 1) - x, v = y < BH ? y : abs(2 * (BH - 1) - y);
         memcpy(color[i], small[0][v * BW + u], sizeof color[i]);
         memcpy(half[i], small[1][v * BW + u], sizeof half[i]);
     }
