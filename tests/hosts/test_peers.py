@@ -36,7 +36,7 @@ def test_ratio_by_worst_block():
     assert [name for name, _ in peers.rows(scenes, "ours", peers.RAW)] == ["same"]
     results = {"options": {"size": 9, "block": 3, "reference_spp": 1}, "scenes": scenes, "blender": "0",
                "measured": {"date": "2020-01-02", "processor": "old", "commit": "0ld"}}
-    assert "Left out, as the references differ by more than 5 % somewhere: other (20 %)" in peers.raw(results)
+    assert "Left out, as the references differ by more than 5 % somewhere: other (20 %)" in peers.raw({"raw": results})
 
 
 def test_one_scene():
