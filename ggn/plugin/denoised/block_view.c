@@ -413,7 +413,8 @@ int gd_block_view_errors(struct gd_block_view *l, const struct gd_form *form, co
     ggn_visible_texture(l->lightness[0], l->lightness[1], width, height, l->rows, l->texture);
     struct lull_estimate_in in = {l->light[0], l->light[1], l->light[2], l->light[3], h / n};
     lull_estimate_pixels(&in, pixels, &estimate);
-    lull_blend_weights_blind(&estimate, width, height, l->rgb, l->blind);
+    if (blend)
+        lull_blend_weights_blind(&estimate, width, height, l->rgb, l->blind);
     lull_blend_weights(&estimate, width, height, l->scratch, l->alpha, l->apart);
     for (size_t i = 0; i < pixels; i++) {
         l->slope[i] = (float)lull_lightness_slope(0.5 * ((double)l->light[2][i] + (double)l->light[3][i]));
