@@ -308,10 +308,11 @@ static int cost_errors(struct job *j, struct base_err *err)
     return 0;
 }
 
-static int put_observer(struct job *j, const char *parameter, double visible, double growth, struct base_err *err)
+static int put_observer(struct job *j, int halves, const char *parameter, double visible, double growth,
+                        struct base_err *err)
 {
     struct ggn_method m;
-    int available, rc = ggn_method_observer(&m, &j->set, j->o->observer, 1, visible, growth, &available, err);
+    int available, rc = ggn_method_observer(&m, &j->set, j->o->observer, halves, visible, growth, &available, err);
     if (rc)
         return rc;
     if (available)
@@ -325,11 +326,12 @@ static int cost_observer(struct job *j, struct base_err *err)
     static const double growths[] = {1.05, 1.1, 1.25, 1.5, 2.0};
     int rc = 0;
     if (j->o->cadence > 0)
-        return put_observer(j, "growth", GGN_OBSERVER_VISIBLE, j->o->cadence, err);
-    for (size_t i = 0; i < COUNT(shares) && !rc; i++)
-        rc = put_observer(j, "visible", shares[i], GGN_OBSERVER_GROWTH, err);
+        return put_observer(j, 1, "growth", GGN_OBSERVER_VISIBLE, j->o->cadence, err);
+    for (int halves = 1; halves >= 0; halves--)
+        for (size_t i = 0; i < COUNT(shares) && !rc; i++)
+            rc = put_observer(j, halves, "visible", shares[i], GGN_OBSERVER_GROWTH, err);
     for (size_t i = 0; i < COUNT(growths) && !rc; i++)
-        rc = put_observer(j, "growth", GGN_OBSERVER_VISIBLE, growths[i], err);
+        rc = put_observer(j, 1, "growth", GGN_OBSERVER_VISIBLE, growths[i], err);
     return rc;
 }
 

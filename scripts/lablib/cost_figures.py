@@ -1,11 +1,12 @@
 """Figures and pictures of docs/cost.md from what `lab cost` measured (docs/results/cost.json)."""
 import math
+import re
 import statistics
 
 from lablib.plots import data, plot
 
-DRAWN = ("uniform", "variance", "halfbuf", "observer", "lull-2.ggn", "paper.ggn", "svd-entropy", "attributes", "noise-mask")
-COLOURS = dict(zip(DRAWN, ("#999999", "#8c564b", "#e377c2", "#d62728", "#1f77b4", "#9467bd", "#2ca02c", "#bcbd22", "#ff7f0e")))
+COLOURS = {"uniform": "#999999", "variance": "#8c564b", "halfbuf": "#e377c2", "observer": "#d62728", "lull": "#1f77b4", "paper.ggn": "#9467bd",
+           "svd-entropy": "#2ca02c", "attributes": "#bcbd22", "noise-mask": "#ff7f0e"}
 BLOCK = 200 * 200
 
 
@@ -22,6 +23,17 @@ def mean(values):
 def bare(criterion):
     """Without what it went without."""
     return criterion.replace(", no guard", "").replace(", no halves", "")
+
+
+def colour(criterion):
+    """Of those that are drawn; the shipped network's has no version. None: not drawn."""
+    return COLOURS.get(re.sub(r"^(lull)-\d+\.ggn$", r"\1", criterion))
+
+
+def drawn(points):
+    """The criteria of a picture, in the order of their colours."""
+    order = list(COLOURS.values())
+    return sorted({p[0] for p in points if colour(p[0])}, key=lambda c: order.index(colour(c)))
 
 
 def price_of(out, criterion):
@@ -65,8 +77,8 @@ def points_in(out, data):
 
 
 def is_own(out, criterion, dial, value):
-    """Of criteria whose defaults the renderer told: those; of models: their own."""
-    wanted = out["defaults"].get(criterion)
+    """Of criteria whose defaults the renderer told: those, with halves or without; of models: their own."""
+    wanted = out["defaults"].get(criterion.replace(", no halves", ""))
     return [dial, value] == wanted if wanted else dial == "own"
 
 
@@ -84,17 +96,17 @@ def over_scenes(point, key, how=median):
 def curves(points, x, y, dials=("visible", "threshold", "spp"), how=median):
     """gnuplot data blocks and their plot clauses: a line for each criterion over its dial, its default as a filled point."""
     blocks, clauses = [], []
-    for criterion in DRAWN:
+    for criterion in drawn(points):
         mine = [p for p in points if p[0] == criterion and p[1] in dials and p[3]]
         if not mine:
             continue
         name = "d%d" % len(blocks)
         blocks.append(data(name, [(over_scenes(p, x), over_scenes(p, y, how)) for p in mine]))
-        clauses.append("$%s using 1:2 with linespoints pt 6 ps 0.6 lw 2 lc '%s' title '%s'" % (name, COLOURS[criterion], criterion))
+        clauses.append("$%s using 1:2 with linespoints pt 6 ps 0.6 lw 2 lc '%s' title '%s'" % (name, colour(criterion), criterion))
         for p in points:
             if p[0] == criterion and is_default(p):
                 blocks.append(data("s%d" % len(blocks), [(over_scenes(p, x), over_scenes(p, y, how))]))
-                clauses.append("$s%d using 1:2 with points pt 7 ps 1.6 lc '%s' notitle" % (len(blocks) - 1, COLOURS[criterion]))
+                clauses.append("$s%d using 1:2 with points pt 7 ps 1.6 lc '%s' notitle" % (len(blocks) - 1, colour(criterion)))
     return "".join(blocks), clauses
 
 
@@ -145,12 +157,12 @@ def at_path_cost(p, us):
 
 def draw_paths(folder, points):
     steps = [0.02 * 1.6**i for i in range(20)]
-    share, total, defaults = "", "", [p for p in points if p[0] in DRAWN and is_default(p) and p[0] != "uniform"]
+    share, total, defaults = "", "", [p for p in points if colour(p[0]) and is_default(p) and p[0] != "uniform"]
     for n, p in enumerate(defaults):
         spent, samples = median([f["check_s"] for f in p[3].values()]), over_scenes(p, "samples")
         share += data("a%d" % n, [(us, spent / (spent + samples * BLOCK * us * 1e-6)) for us in steps])
         total += data("b%d" % n, [(us, at_path_cost(p, us)) for us in steps])
-    lines = lambda letter: ", ".join("$%s%d using 1:2 with lines lw 2 lc '%s' title '%s'" % (letter, n, COLOURS[p[0]], p[0])
+    lines = lambda letter: ", ".join("$%s%d using 1:2 with lines lw 2 lc '%s' title '%s'" % (letter, n, colour(p[0]), p[0])
                                      for n, p in enumerate(defaults))
     limit = next(p for p in points if p[0] == "limit")
     bound = median([f["samples"] / f["uniform_spp"] for f in limit[3].values() if f["blocks"] > 1])
@@ -221,7 +233,7 @@ def on_frontier(points, default):
     """Scenes on which no setting of another criterion is cheaper and as accurate in every column, of how many; and who is."""
     good, beaten = 0, {}
     for scene, f in default[3].items():
-        by = [p for p in points if p[0] not in ("limit", default[0]) and scene in p[3] and p[3][scene]["total_s"] < 0.99 * f["total_s"]
+        by = [p for p in points if bare(p[0]) not in ("limit", default[0]) and scene in p[3] and p[3][scene]["total_s"] < 0.99 * f["total_s"]
               and p[3][scene]["worst"] <= f["worst"] and p[3][scene]["noisy"] <= f["noisy"]]
         good += not by
         if by:

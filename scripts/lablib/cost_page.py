@@ -51,7 +51,7 @@ def measured(out):
 def frontier(out, name):
     """The limit, and of every criterion its default and some other settings."""
     mine, others = default_network(out), networks(out)
-    criteria = ("uniform", "fixed", "variance", "halfbuf", "variance, no guard", "halfbuf, no guard", "observer", mine, mine + ", no halves",
+    criteria = ("uniform", "fixed", "variance", "halfbuf", "variance, no guard", "halfbuf, no guard", "observer", "observer, no halves", mine, mine + ", no halves",
                 mine + " bf16", *others[1:], *BASELINES)
     points = points_of(out, name)
     named = lambda p: p[1] in ("visible", "threshold", "own", "spp") and p[2] in NAMED and not p[0].endswith(" bf16") and (p[0] != "fixed" or p[2] == 1024)
@@ -280,9 +280,9 @@ def final(p):
 
 
 def without_halves(out):
-    """Settings for hosts without half buffers: a network judges without noise picture and guard there."""
-    networks = set(out.get("networks", {}))
-    return lambda p: not p[0].startswith(("halfbuf", "observer")) and p[0].replace(" bf16", "") not in networks
+    """Settings for hosts without half buffers: `observer` looks twice there, a network judges without noise picture and guard."""
+    takes_halves = {"observer", *out.get("networks", {})}
+    return lambda p: not p[0].startswith("halfbuf") and p[0].replace(" bf16", "") not in takes_halves
 
 
 def with_halves(p):

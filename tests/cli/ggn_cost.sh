@@ -77,6 +77,16 @@ assert len(whole["25"]) == 4 and len(whole["80"]) == 1 and min(whole["25"]) < wh
 assert "25" not in known and known["80"] == whole["80"], known
 P
 check "other block sizes, joined ones of blocks still noisy at the end too" $?
+mkdir -p "$tmp/alone/train" && cp -R "$tmp/whole/train/room" "$tmp/alone/train"
+run -d "$tmp/alone" --split train --no-quality -o "$tmp/alone.json" && python3 - "$tmp/alone.json" >"$tmp/err" 2>&1 <<'P'
+import json, sys
+points = json.load(open(sys.argv[1]))["points"]
+spent = lambda name: [p["scenes"]["room"]["samples"] for p in points if p["criterion"] == name and p["dial"] == "visible"]
+seeing, blind = spent("observer"), spent("observer, no halves")
+assert len(seeing) == len(blind) == 11 and blind == sorted(blind) and blind[0] < blind[-1], (seeing, blind)
+assert seeing != blind and all(.5 < a / b < 2 for a, b in zip(seeing, blind)), (seeing, blind)
+P
+check "the observer without half buffers: named so, other stops, in the octave of those with them" $?
 echo 'other_part6;100;200;300' >"$tmp/thresholds.csv"
 run -d $data --split train --thresholds "$tmp/thresholds.csv"
 [ $rc = 2 ] && one_line && grep -q "thresholds.csv" "$tmp/err"
