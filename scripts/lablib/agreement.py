@@ -15,7 +15,7 @@ from lablib.recordings import link_views, manifest_of, people_views
 from lablib.tool import ggn
 
 BASELINES = ["attributes", "noise-mask"]  # those that are shipped
-SHARES = (0.25, 0.3, 0.35, 0.4, 0.5)
+SHARES = (0.25, 0.3, 0.35, 0.4, 0.45, 0.5)
 HEAD = ("AUC", "early (below 0.8)", "samples", "median \\|log2\\|", "bias", "within an octave", "ρ")
 NAMES = {"-spp": "−spp (looks at no pixel)", "constant (training median)": "one constant",
          "scene's mean (oracle)": "the view's mean (an oracle)"}
