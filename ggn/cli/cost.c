@@ -366,6 +366,21 @@ static void cost_network(struct job *j, struct ggn_method *m)
     m->guard = guard;
 }
 
+/* Where the law knows the noise between levels a residual model stops there, too; it has no gate and no guard. */
+static int cost_residual(struct job *j, struct ggn_method *m, const struct ggn_policy *policy, struct base_err *err)
+{
+    int rc = 0;
+    put_method(j, "own", m->cut, m);
+    for (size_t i = 0; i < COUNT(shares) && !rc && !(j->o->cadence > 0 || j->o->scores); i++) {
+        m->cut = shares[i];
+        rc = ggn_eval_trained_stop(m, &j->set, policy, j->o->observer, err);
+        if (!rc)
+            put_method(j, "visible", shares[i], m);
+    }
+    m->cut = policy->threshold;
+    return rc;
+}
+
 /* Beside the point that was just put: p of every window of the split, null where none was judged. */
 static void put_scores(struct job *j, const struct ggn_method *m)
 {
@@ -396,10 +411,13 @@ static int cost_models(struct job *j, struct base_threads *threads, struct base_
         if (j->o->no_noise_maps)
             ggn_policy_without_halves(&policy);
         if (!rc)
-            rc =
-                ggn_eval_trained(&m, &j->set, model, &policy, name, (enum ggn_precision)j->o->precision, NULL, threads, err);
+            rc = ggn_eval_trained(&m, &j->set, model, &policy, name, (enum ggn_precision)j->o->precision, j->o->observer,
+                                  threads, err);
         if (!rc) {
-            cost_network(j, &m);
+            if (m.correction)
+                rc = cost_residual(j, &m, &policy, err);
+            else
+                cost_network(j, &m);
             put_scores(j, &m);
             ggn_method_release(&m);
         }

@@ -11,6 +11,7 @@ void ggn_method_release(struct ggn_method *m)
 {
     free(m->score);
     free(m->verdict);
+    free(m->correction);
     free(m->own_guard);
     free(m->stop);
     free(m->asked);

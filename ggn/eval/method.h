@@ -19,6 +19,7 @@ struct ggn_method {
     double *score;       /* owns; [cases]; NaN: not judged there. NULL: fixed stops only */
     double *verdict;     /* owns; [cases]: the scores that stop a block, where those are not all (see data/replay.h); NULL:
                             score */
+    double *correction;  /* owns; [cases]: octaves of noise that a residual model adds to the law's; NULL: no such model */
     double *own_guard;   /* owns; NULL unless guard is it */
     const double *guard; /* own_guard or borrowed from the set; [cases]; the block is held back while it exceeds guard_limit;
                             NULL: none */

@@ -13,7 +13,6 @@ struct run {
     struct ggn_method *method;
     struct ggn_viewer *viewers; /* [workers] */
     const char *observer;
-    double *correction; /* [cases], of a residual model; owns */
 };
 
 /* log2 of the law's error: at cases as the set says, at the levels before them as they were measured. [n_levels] */
@@ -48,27 +47,25 @@ static int judge_by_law(const struct run *r, int index, struct ggn_viewer *viewe
             size_t k = b->first + (size_t)(i - skipped);
             r->method->score[k] = r->method->verdict[k] = seen[i].p;
             r->method->own_guard[k] = 0;
-            r->correction[k] = i > skipped && isnan(seen[i].p) ? r->correction[k - 1] : seen[i].correction;
+            r->method->correction[k] = i > skipped && isnan(seen[i].p) ? r->method->correction[k - 1] : seen[i].correction;
         }
     }
     free(law);
     return rc;
 }
 
-/* Where the blocks stop, between levels too. */
-static int stop_by_law(const struct run *r, struct base_err *err)
+int ggn_eval_trained_stop(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_policy *p,
+                          const char *observer, struct base_err *err)
 {
-    const struct ggn_policy *p = &r->rule.policy;
-    const double stop = exp2((log(p->threshold / (1 - p->threshold)) - p->shift) / p->scale);
+    const double stop = exp2((log(m->cut / (1 - m->cut)) - p->shift) / p->scale);
     struct ggn_observer o;
     int rc = 0;
 
-    for (int i = 0; i < r->set->n_blocks && !rc; i++) {
-        const struct ggn_eval_block *b = &r->set->blocks[i];
-        rc = ggn_method_observer_of(r->observer, r->set, b, &o, err);
+    for (int i = 0; i < s->n_blocks && !rc; i++) {
+        const struct ggn_eval_block *b = &s->blocks[i];
+        rc = ggn_method_observer_of(observer, s, b, &o, err);
         if (!rc)
-            r->method->stop[i] =
-                ggn_method_law_stop(&o, r->set, r->set->law, b, stop, r->correction, p->first_spp, p->ratio, NULL);
+            m->stop[i] = ggn_method_law_stop(&o, s, s->law, b, stop, m->correction, p->first_spp, p->ratio, NULL);
     }
     return rc;
 }
@@ -113,8 +110,8 @@ static int check_halves(const struct ggn_eval_set *s, const char *name, struct b
     return 0;
 }
 
-static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const struct ggn_policy *p,
-                       struct base_err *err)
+static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const char *name,
+                       const struct ggn_stop_rule *rule, struct base_err *err)
 {
     int rc = ggn_method_init(m, s, name, 1, err);
 
@@ -122,13 +119,14 @@ static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const
         return rc;
     m->verdict = malloc(s->n * sizeof *m->verdict);
     m->own_guard = malloc(s->n * sizeof *m->own_guard);
-    if (!m->verdict || !m->own_guard) {
+    m->correction = rule->reach > 0 ? calloc(s->n, sizeof *m->correction) : NULL;
+    if (!m->verdict || !m->own_guard || (rule->reach > 0 && !m->correction)) {
         ggn_method_release(m);
         return base_fail_nomem(err, name);
     }
     m->guard = m->own_guard;
-    m->cut = p->threshold;
-    m->passes = p->passes;
+    m->cut = rule->policy.threshold;
+    m->passes = rule->policy.passes;
     return 0;
 }
 
@@ -145,12 +143,11 @@ int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const s
     if (window < 2 || window > GGN_WINDOW_MAX)
         return base_fail(err, BASE_EINVAL, "%s: windows of %d images; evaluation takes 2 to %d", name, window,
                          GGN_WINDOW_MAX);
-    int rc = init_method(m, s, name, policy, err);
+    int rc = init_method(m, s, name, &r.rule, err);
     if (rc)
         return rc;
     r.viewers = calloc((size_t)workers, sizeof *r.viewers);
-    r.correction = calloc(s->n, sizeof *r.correction);
-    if (!r.viewers || !r.correction)
+    if (!r.viewers)
         rc = base_fail_nomem(err, name);
     for (; made < workers && !rc; made += !rc)
         rc = ggn_viewer_init(&r.viewers[made], model, precision, &s->images, err);
@@ -159,15 +156,14 @@ int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const s
     const struct ggn_eval_values made_by_block[] = {{m->score, sizeof *m->score, NULL},
                                                     {m->verdict, sizeof *m->verdict, NULL},
                                                     {m->own_guard, sizeof *m->own_guard, NULL},
-                                                    {r.correction, sizeof *r.correction, NULL}};
+                                                    {m->correction, sizeof *m->correction, NULL}};
     if (!rc)
-        rc = ggn_eval_each_block(s, threads, judge_block, &r, made_by_block, 4, err);
+        rc = ggn_eval_each_block(s, threads, judge_block, &r, made_by_block, m->correction ? 4 : 3, err);
     for (int i = 0; i < made; i++)
         ggn_viewer_release(&r.viewers[i]);
     free(r.viewers);
     if (!rc && r.rule.reach > 0)
-        rc = stop_by_law(&r, err);
-    free(r.correction);
+        rc = ggn_eval_trained_stop(m, s, policy, observer, err);
     if (!rc && r.rule.reach <= 0)
         ggn_method_run(m, s);
     else if (rc)

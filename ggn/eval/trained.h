@@ -15,5 +15,9 @@
 int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model,
                      const struct ggn_policy *policy, const char *name, enum ggn_precision precision, const char *observer,
                      struct base_threads *threads, struct base_err *err);
+/* Sets the stops of a residual model's method once more, for another m->cut; what ggn_method_run is to other methods.
+ * policy and observer: those that it was made with. */
+int ggn_eval_trained_stop(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_policy *policy,
+                          const char *observer, struct base_err *err);
 
 #endif

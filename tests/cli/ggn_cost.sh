@@ -78,7 +78,7 @@ assert "25" not in known and known["80"] == whole["80"], known
 P
 check "other block sizes, joined ones of blocks still noisy at the end too" $?
 mkdir -p "$tmp/alone/train" && cp -R "$tmp/whole/train/room" "$tmp/alone/train"
-run -d "$tmp/alone" --split train --no-quality -o "$tmp/alone.json" && python3 - "$tmp/alone.json" >"$tmp/err" 2>&1 <<'P'
+run -d "$tmp/alone" --split train --no-quality -m ggn/models/lull-3.ggn -o "$tmp/alone.json" && python3 - "$tmp/alone.json" >"$tmp/err" 2>&1 <<'P'
 import json, sys
 points = json.load(open(sys.argv[1]))["points"]
 spent = lambda name: [p["scenes"]["room"]["samples"] for p in points if p["criterion"] == name and p["dial"] == "visible"]
@@ -87,6 +87,16 @@ assert len(seeing) == len(blind) == 11 and blind == sorted(blind) and blind[0] <
 assert seeing != blind and all(.5 < a / b < 2 for a, b in zip(seeing, blind)), (seeing, blind)
 P
 check "the observer without half buffers: named so, other stops, in the octave of those with them" $?
+python3 - "$tmp/alone.json" >"$tmp/err" 2>&1 <<'P'
+import json, sys
+points = [p for p in json.load(open(sys.argv[1]))["points"] if p["criterion"] == "lull-3.ggn"]
+own = next(p for p in points if p["dial"] == "own")
+dial = {p["value"]: p["scenes"]["room"]["samples"] for p in points if p["dial"] == "visible"}
+assert dial[own["value"]] == own["scenes"]["room"]["samples"], (own, dial)
+spent = [dial[v] for v in sorted(dial)]
+assert len(spent) == 11 and spent == sorted(spent, reverse=True) and spent[0] > spent[-1], spent
+P
+check "a residual model stops between levels at every value of its dial, the shipped one's included" $?
 echo 'other_part6;100;200;300' >"$tmp/thresholds.csv"
 run -d $data --split train --thresholds "$tmp/thresholds.csv"
 [ $rc = 2 ] && one_line && grep -q "thresholds.csv" "$tmp/err"
