@@ -39,13 +39,17 @@ def networks(out):
     return [n for n in out["networks"] if not n.startswith("window")]
 
 
+def has_windows(out):
+    return any(n.startswith("window") for n in out["networks"])
+
+
 def measured(out):
     """When, at which commit; of steps that were measured apart each by itself; says so if the observer has changed since."""
     told = {}
     for step, m in out["measured"].items():
-        law = "" if m["level"] == tool.observer_law() else ", an earlier observer whose default was `--visible %g`" % m["visible"]
+        law = "" if math.isclose(m["level"], tool.observer_law(), rel_tol=1e-3) else ", an earlier observer whose default was `--visible %g`" % m["visible"]
         told.setdefault("%s at commit %s on %s%s" % (m["date"], m["commit"], m["processor"], law), []).append(step)
-    return "; ".join(text if len(told) == 1 else "%s: %s" % (", ".join(steps), text) for text, steps in told.items())
+    return ";\n".join(text if len(told) == 1 else "%s: %s" % (", ".join(steps), text) for text, steps in told.items())
 
 
 def frontier(out, name):
