@@ -55,8 +55,8 @@ def measured(out):
 def frontier(out, name):
     """The limit, and of every criterion its default and some other settings."""
     mine, others = default_network(out), networks(out)
-    criteria = ("uniform", "fixed", "variance", "halfbuf", "variance, no guard", "halfbuf, no guard", "observer", "observer, no halves", mine, mine + ", no halves",
-                mine + " bf16", *others[1:], *BASELINES)
+    criteria = ("uniform", "fixed", "variance", "halfbuf", "variance, no guard", "halfbuf, no guard", "observer", "observer, no halves",
+                mine, mine + ", no halves", mine + " bf16", *others[1:], *BASELINES)
     points = points_of(out, name)
     named = lambda p: p[1] in ("visible", "threshold", "own", "spp") and p[2] in NAMED and not p[0].endswith(" bf16") and (p[0] != "fixed" or p[2] == 1024)
     chosen = [p for p in points if p[0] == "limit"] + [p for c in criteria for p in points if p[0] == c and p[3] and (is_default(p) or named(p))]
