@@ -114,7 +114,7 @@ def draw(folder, r):
     lines = ["$run%d using 1:2 with linespoints lw 2 pt 7 ps 0.6 lc '%s' title '%s'" % (i, COLOURS[i % len(COLOURS)], run["name"]) for i, run in enumerate(r["runs"])]
     lines += ['%g with lines dt %d lc "#666666" title "%s"' % (r["judged"][name]["auc"], i + 2, shown)
               for i, (name, shown) in enumerate(beside(r))]
-    plots.plot(folder, "published-curve.png", (760, 460), data + "set logscale x\nset xrange [0.005:%g]\nset yrange [0.4:1.03]\nset grid\nset key bottom right\n"
+    plots.plot(folder, "published-curve.png", (760, 460), data + "set logscale x\nset xrange [0.005:%g]\nset yrange [0.4:1.03]\nset grid\nset key center right\n"
                "set xlabel 'processor hours'\nset ylabel 'AUC on validation windows'\nplot %s\n" % (2 * last, ", ".join(lines)))
 
 
