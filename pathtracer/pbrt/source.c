@@ -10,50 +10,75 @@
 
 static const size_t max_file_bytes = INT_MAX; /* so that a line number always fits */
 
-static int unpack(const char *path, char *packed, size_t packed_size, char **bytes, size_t *size, struct base_err *err)
+struct unpacked {
+    char *bytes; /* owns; one byte more than room */
+    size_t size, room;
+};
+
+/* From z->next_in to the end of its member. */
+static int unpack_member(const char *name, z_stream *z, struct unpacked *out, struct base_err *err)
 {
-    int rc = 0;
-    size_t room = packed_size < 1u << 20 ? 4u << 20 : packed_size * 4, n = 0;
-    char *out = malloc(room + 1);
-    z_stream z = {.next_in = (Bytef *)packed};
-    if (!out)
-        return base_fail_nomem(err, path);
-    if (inflateInit2(&z, 15 + 16) != Z_OK) { /* 16: gzip framing */
-        free(out);
-        return base_fail_nomem(err, path);
-    }
     for (int status = Z_OK; status != Z_STREAM_END;) {
-        if (n == room) {
-            char *bigger = room < max_file_bytes ? realloc(out, room * 2 + 1) : NULL;
-            if (!bigger) {
-                rc = base_fail(err, BASE_EINVAL, "%s: unpacks to more than %zu bytes", path, room);
-                break;
-            }
-            out = bigger;
-            room *= 2;
+        if (out->size == out->room) {
+            char *bigger = out->room < max_file_bytes ? realloc(out->bytes, out->room * 2 + 1) : NULL;
+            if (!bigger)
+                return base_fail(err, BASE_EINVAL, "%s: unpacks to more than %zu bytes", name, out->room);
+            out->bytes = bigger;
+            out->room *= 2;
         }
-        if (z.avail_in == 0) {
-            size_t left = packed_size - (size_t)((char *)z.next_in - packed);
-            z.avail_in = left < UINT_MAX ? (uInt)left : UINT_MAX;
-        }
-        size_t space = room - n < 1u << 30 ? room - n : 1u << 30;
-        z.next_out = (Bytef *)out + n;
-        z.avail_out = (uInt)space;
-        status = inflate(&z, Z_NO_FLUSH);
-        n += space - z.avail_out;
-        if (status != Z_OK && status != Z_STREAM_END) {
-            rc = base_fail(err, BASE_EINVAL, "%s: damaged or truncated gzip file", path);
-            break;
-        }
+        size_t space = out->room - out->size < 1u << 30 ? out->room - out->size : 1u << 30;
+        z->next_out = (Bytef *)out->bytes + out->size;
+        z->avail_out = (uInt)space;
+        status = inflate(z, Z_NO_FLUSH);
+        out->size += space - z->avail_out;
+        if (status != Z_OK && status != Z_STREAM_END)
+            return base_fail(err, BASE_EINVAL, "%s: damaged or truncated gzip file", name);
+    }
+    return 0;
+}
+
+/* Whether another member follows; zeros that fill up a block do not count. Anything else would be lost. */
+static int has_member(const char *name, const z_stream *z, struct base_err *err)
+{
+    const Bytef *at = z->next_in, *end = at + z->avail_in;
+    if (end - at >= 2 && at[0] == 0x1f && at[1] == 0x8b)
+        return 1;
+    while (at < end && *at == 0)
+        at++;
+    return at == end ? 0
+                     : base_fail(err, BASE_EINVAL,
+                                 "%s: %u bytes behind its last gzip member are no member (expected none, or zeros)", name,
+                                 z->avail_in);
+}
+
+/* The members of a gzip file are one text (RFC 1952, 2.2): bgzip, pigz and cat make such files. */
+int pt_source_unpack(const char *name, const char *packed, size_t packed_size, char **bytes, size_t *size,
+                     struct base_err *err)
+{
+    if (packed_size > max_file_bytes)
+        return base_fail(err, BASE_EINVAL, "%s: more than %zu bytes", name, max_file_bytes);
+    struct unpacked out = {.room = packed_size < 1u << 20 ? 4u << 20 : packed_size * 4};
+    z_stream z = {.next_in = (Bytef *)(uintptr_t)packed, .avail_in = (uInt)packed_size};
+    out.bytes = malloc(out.room + 1);
+    if (!out.bytes || inflateInit2(&z, 15 + 16) != Z_OK) { /* 16: gzip framing */
+        free(out.bytes);
+        return base_fail_nomem(err, name);
+    }
+    int rc = 1; /* another member */
+    while (rc > 0) {
+        rc = unpack_member(name, &z, &out, err);
+        if (!rc)
+            rc = has_member(name, &z, err);
+        inflateReset(&z);
     }
     inflateEnd(&z);
     if (rc) {
-        free(out);
+        free(out.bytes);
         return rc;
     }
-    out[n] = '\0';
-    *bytes = out;
-    *size = n;
+    out.bytes[out.size] = '\0';
+    *bytes = out.bytes;
+    *size = out.size;
     return 0;
 }
 
@@ -76,7 +101,7 @@ static int read_file(void *data, const char *path, char **bytes, size_t *size, s
         }
         return rc;
     }
-    rc = unpack(path, raw, n, bytes, size, err);
+    rc = pt_source_unpack(path, raw, n, bytes, size, err);
     free(raw);
     return rc;
 }

@@ -22,6 +22,11 @@ struct pt_source {
  * (borrowed; may be NULL). */
 struct pt_source pt_source_files(struct base_inputs *inputs);
 
+/* What a gzip file holds, all of its members after each other; as pt_source.read. BASE_EINVAL when one is damaged, or when
+ * something else follows the last. */
+int pt_source_unpack(const char *name, const char *packed, size_t packed_size, char **bytes, size_t *size,
+                     struct base_err *err);
+
 /* A file system of one file, `path` with text[0, size), that it borrows; every other path does not exist. */
 struct pt_source_single {
     const char *path, *text;

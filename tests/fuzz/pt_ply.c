@@ -1,10 +1,11 @@
-/* PLY: any bytes either give a mesh whose indices are in range and whose points are finite, or one line. */
+/* PLY, packed or not: any bytes either give a mesh whose indices are in range and whose points are finite, or one line. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "pbrt/ply.h"
+#include "pbrt/source.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -12,7 +13,17 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     struct pt_ply ply;
     struct base_err err = {0};
-    if (pt_ply_parse("f.ply", (const char *)data, size, &ply, &err) != 0) {
+    char *unpacked = NULL;
+    const char *bytes = (const char *)data;
+    int rc = 0;
+    if (size >= 2 && data[0] == 0x1f && data[1] == 0x8b) {
+        rc = pt_source_unpack("f.ply.gz", bytes, size, &unpacked, &size, &err);
+        bytes = unpacked;
+    }
+    if (!rc)
+        rc = pt_ply_parse("f.ply", bytes, size, &ply, &err);
+    free(unpacked);
+    if (rc) {
         if (err.text[0] == '\0')
             abort();
         return 0;

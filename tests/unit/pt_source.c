@@ -46,6 +46,77 @@ static void packed_files(void **state)
     free(text);
 }
 
+/* Appends text[0, n) as a gzip file of its own. */
+static size_t add_member(unsigned char *packed, size_t at, size_t room, const char *text, size_t n)
+{
+    z_stream z = {
+        .next_in = (Bytef *)(uintptr_t)text, .avail_in = (uInt)n, .next_out = packed + at, .avail_out = (uInt)(room - at)};
+    assert_int_equal(deflateInit2(&z, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY), Z_OK);
+    assert_int_equal(deflate(&z, Z_FINISH), Z_STREAM_END);
+    deflateEnd(&z);
+    return room - z.avail_out;
+}
+
+static int unpack(const unsigned char *packed, size_t n, char **bytes, size_t *size, struct base_err *err)
+{
+    *bytes = NULL;
+    return pt_source_unpack("a.gz", (const char *)packed, n, bytes, size, err);
+}
+
+static const char scene[] = "Shape \"sphere\" \"float radius\" [ 1.25 ] # the border of a member may be anywhere\n";
+
+/* Wherever the text is cut into members, also empty ones as bgzip's last, it is the same text. */
+static void members_are_one_text(void **state)
+{
+    (void)state;
+    enum { N = sizeof scene - 1 };
+    unsigned char packed[64 * N];
+    char *bytes;
+    size_t size, n = 0;
+    struct base_err err = {0};
+    for (size_t cut = 0; cut <= N; cut++)
+        for (size_t zeros = 0; zeros < 600; zeros += 512) {
+            memset(packed, 0, sizeof packed);
+            n = add_member(packed, 0, sizeof packed, scene, cut);
+            n = add_member(packed, n, sizeof packed, scene + cut, N - cut);
+            n = add_member(packed, n, sizeof packed, "", 0);
+            assert_int_equal(unpack(packed, n + zeros, &bytes, &size, &err), 0);
+            assert_int_equal(size, N);
+            assert_memory_equal(bytes, scene, N + 1);
+            free(bytes);
+        }
+    n = 0;
+    for (size_t i = 0; i < N; i++)
+        n = add_member(packed, n, sizeof packed, scene + i, 1);
+    assert_int_equal(unpack(packed, n, &bytes, &size, &err), 0);
+    assert_int_equal(size, N);
+    assert_memory_equal(bytes, scene, N);
+    free(bytes);
+}
+
+/* A file that ends within a member, and bytes that are none: refused, because they would be lost. */
+static void members_that_are_none(void **state)
+{
+    (void)state;
+    unsigned char packed[1024];
+    char *bytes;
+    size_t size, first = add_member(packed, 0, sizeof packed, scene, 20);
+    size_t n = add_member(packed, first, sizeof packed, scene + 20, 30);
+    struct base_err err = {0};
+    for (size_t cut = 1; cut < n; cut++) {
+        int whole = cut == first;
+        assert_int_equal(unpack(packed, cut, &bytes, &size, &err), whole ? 0 : BASE_EINVAL);
+        assert_int_equal(bytes != NULL, whole);
+        free(bytes);
+    }
+    packed[n - 8] ^= 1; /* of the checksum */
+    assert_int_equal(unpack(packed, n, &bytes, &size, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "a.gz: damaged or truncated gzip file");
+    memcpy(packed + first, "\0\0garbage", 9);
+    assert_int_equal(unpack(packed, first + 9, &bytes, &size, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "a.gz: 9 bytes behind its last gzip member are no member (expected none, or zeros)");
+}
+
 static void what_is_no_file(void **state)
 {
     (void)state;
@@ -60,6 +131,7 @@ static void what_is_no_file(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(packed_files), cmocka_unit_test(what_is_no_file)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(packed_files), cmocka_unit_test(members_are_one_text),
+                                       cmocka_unit_test(members_that_are_none), cmocka_unit_test(what_is_no_file)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
