@@ -13,25 +13,26 @@ static int read_spd_file(struct pt_builder *b, const struct pt_param *param, con
     char path[2048];
     char *bytes = NULL;
     size_t size = 0, room = 0, n = 0;
+    int line = 1;
     double *numbers = NULL;
     struct base_err err = {0};
     pt_builder_path(b, name, path, sizeof path);
     if (b->source->read(b->source->data, path, &bytes, &size, &err) != 0)
         return pt_diag_fail(&b->diag, param->loc, "spectrum \"%s\" is neither a known name nor a readable file", name);
-    for (char *at = bytes, *end = bytes + size; at < end && !b->diag.rc;) {
+    for (const char *at = bytes, *end = bytes + size; at < end && !b->diag.rc;) {
         if (*at == '#') {
             while (at < end && *at != '\n')
                 at++;
         } else if (strchr(" \t\r\n,", *at)) {
-            at++;
+            line += *at++ == '\n';
         } else {
-            char *start = at;
+            const char *start = at;
             while (at < end && *at != '#' && !strchr(" \t\r\n,", *at))
                 at++;
             if (!pt_grow((void **)&numbers, &room, n, sizeof *numbers))
                 pt_diag_nomem(&b->diag, "spectrum");
             else if (!pt_number_parse(start, (size_t)(at - start), &numbers[n++]))
-                pt_diag_fail(&b->diag, param->loc, "%s: \"%.*s\" (expected a number)", path,
+                pt_diag_fail(&b->diag, param->loc, "%s:%d: \"%.*s\" (expected a number)", path, line,
                              at - start < 30 ? (int)(at - start) : 30, start);
         }
     }

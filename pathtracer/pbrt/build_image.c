@@ -54,7 +54,8 @@ static void set_crop(struct pt_builder *b, struct pt_params *p, const int file_s
     d->crop[2] = at[1];
     d->crop[3] = at[3];
     if (at[0] >= at[1] || at[2] >= at[3])
-        pt_diag_fail(&b->diag, p->loc, "the crop window holds no pixel (expected x0 < x1 and y0 < y1 in it)");
+        pt_diag_fail(&b->diag, pt_params_loc(p, bounds ? "pixelbounds" : "cropwindow"),
+                     "the crop window holds no pixel (expected x0 < x1 and y0 < y1 in it)");
 }
 
 static void build_film(struct pt_builder *b)
@@ -69,7 +70,8 @@ static void build_film(struct pt_builder *b)
     d->width = b->options->width > 0 ? b->options->width : file_size[0];
     d->height = b->options->height > 0 ? b->options->height : file_size[1];
     if ((double)d->width * d->height > max_pixels)
-        pt_diag_fail(&b->diag, p->loc, "%d x %d pixels (expected at most 2^28 in all)", d->width, d->height);
+        pt_diag_fail(&b->diag, pt_params_loc(p, "xresolution"), "%d x %d pixels (expected at most 2^28 in all)", d->width,
+                     d->height);
     set_crop(b, p, file_size);
     snprintf(d->film_path, sizeof d->film_path, "%s", pt_params_string(p, "filename", ""));
     double exposure = pt_params_float_in(p, "exposuretime", 1, 0, 1e6), iso = pt_params_float_in(p, "iso", 100, 0, 1e9);
@@ -242,7 +244,8 @@ static void build_camera(struct pt_builder *b)
     b->shutter[0] = pt_params_float(p, "shutteropen", 0);
     b->shutter[1] = pt_params_float(p, "shutterclose", 1);
     if (!(b->shutter[1] >= b->shutter[0]))
-        pt_diag_fail(&b->diag, p->loc, "the shutter closes at %g, before it opens at %g", b->shutter[1], b->shutter[0]);
+        pt_diag_fail(&b->diag, pt_params_loc(p, pt_params_find(p, "shutterclose") ? "shutterclose" : "shutteropen"),
+                     "the shutter closes at %g, before it opens at %g", b->shutter[1], b->shutter[0]);
     place_camera(b, p, c);
     c->medium = b->camera_medium;
     if (c->lens_radius > 0)

@@ -80,7 +80,7 @@ static void make_spot(struct context *c)
     pt_params_point(c->p, "from", from);
     pt_params_point(c->p, "to", to);
     place(c->b, &c->ctm, from, &c->light->position);
-    aim(c->b, c->p->loc, &c->ctm, from, to, &c->light->direction);
+    aim(c->b, pt_params_loc(c->p, pt_params_find(c->p, "to") ? "to" : "from"), &c->ctm, from, to, &c->light->direction);
     c->light->cos_total = (float)cos_total;
     c->light->cos_start = (float)cos_start;
     pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
@@ -95,7 +95,7 @@ static void make_distant(struct context *c)
         c->light->emission = v3_scale(c->light->emission, (float)illuminance);
     pt_params_point(c->p, "from", from);
     pt_params_point(c->p, "to", to);
-    aim(c->b, c->p->loc, &c->ctm, from, to, &c->light->direction);
+    aim(c->b, pt_params_loc(c->p, pt_params_find(c->p, "to") ? "to" : "from"), &c->ctm, from, to, &c->light->direction);
     pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
 }
 
@@ -197,7 +197,7 @@ static void make_infinite(struct context *c)
         pt_diag_warn(&c->b->diag, loc, "environment map of %d x %d pixels is taken as latitude and longitude", map->width,
                      map->height);
     if (illuminance > 0)
-        pt_diag_warn(&c->b->diag, p->loc, "illuminance of an image light is ignored");
+        pt_diag_warn(&c->b->diag, pt_params_loc(p, "illuminance"), "illuminance of an image light is ignored");
     light_space(c);
 }
 

@@ -38,7 +38,11 @@ void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallba
     if (!v3_rule || !m->remap_roughness)
         return;
     if (m->roughness_u.texture || m->roughness_v.texture) {
-        pt_diag_warn(&b->diag, p->loc, "textured roughness is remapped by pbrt-v4's rule");
+        pt_diag_warn(&b->diag,
+                     pt_params_loc(p, m->roughness_u.texture && pt_params_find(p, "uroughness")   ? "uroughness"
+                                      : m->roughness_v.texture && pt_params_find(p, "vroughness") ? "vroughness"
+                                                                                                  : "roughness"),
+                     "textured roughness is remapped by pbrt-v4's rule");
         return;
     }
     /* v3 keeps 0 as a smooth surface. */
@@ -114,7 +118,8 @@ static void read_model(struct pt_making *c, const struct pt_bsdf_model *model)
             break;
         case PT_READ_UNSUPPORTED:
             if (pt_params_find(c->p, r->name) && pt_params_float(c->p, r->name, 0) != 0)
-                pt_diag_warn(&c->b->diag, c->p->loc, "%s of a %s material is ignored", r->name, model->words);
+                pt_diag_warn(&c->b->diag, pt_params_loc(c->p, r->name), "%s of a %s material is ignored", r->name,
+                             model->words);
             break;
         default: pt_params_ignore(c->p, r->name);
         }
@@ -214,7 +219,7 @@ int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const 
     struct pt_making c = {b, s, p, kind, &m, &info};
     pt_params_ignore(p, "type");
     if (!build_v4(&c) && !pt_build_material_v3(&c)) {
-        pt_diag_fail(&b->diag, p->loc,
+        pt_diag_fail(&b->diag, pt_params_loc(p, "type"),
                      "unknown material \"%s\" (expected diffuse, coateddiffuse, conductor, dielectric, "
                      "mix …)",
                      kind);

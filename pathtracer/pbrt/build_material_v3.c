@@ -22,7 +22,7 @@ static void make_matte(struct pt_making *c)
     c->m->reflectance = pt_build_reflectance(c, "Kd", 0.5f);
     struct pt_input sigma = pt_build_float_input(c->b, c->p, "sigma", 0);
     if (sigma.texture || sigma.value.x != 0)
-        pt_diag_warn(&c->b->diag, c->p->loc, "sigma of a matte material is ignored: plain diffuse");
+        pt_diag_warn(&c->b->diag, pt_params_loc(c->p, "sigma"), "sigma of a matte material is ignored: plain diffuse");
 }
 
 /* Ks of these v3 models is the strength of the coat; the coat here is glass of index 1.5 (as pbrt-v4's own upgrade does). */
@@ -62,7 +62,8 @@ static void make_uber(struct pt_making *c)
         c->m->roughness_u = c->m->roughness_v = pt_input_constant(0, 0, 0);
     } else {
         if (!is_black(kr) || !is_black(kt))
-            pt_diag_warn(&c->b->diag, c->p->loc, "Kr and Kt of an uber material with Kd are ignored");
+            pt_diag_warn(&c->b->diag, pt_params_loc(c->p, is_black(kr) ? "Kt" : "Kr"),
+                         "Kr and Kt of an uber material with Kd are ignored");
         c->m->reflectance = kd;
         if (!is_black(ks) || !is_black(kr))
             clear_coat(c);
@@ -100,7 +101,8 @@ static void make_glass(struct pt_making *c)
     pt_build_roughness(c->b, c->p, 0, 1, c->m);
     c->m->eta = (float)index_of(c, 1.5);
     if (kr.texture || kt.texture || v3_luminance(kr.value) < 0.999f || v3_luminance(kt.value) < 0.999f)
-        pt_diag_warn(&c->b->diag, c->p->loc, "Kr and Kt of glass are taken as 1");
+        pt_diag_warn(&c->b->diag, pt_params_loc(c->p, pt_params_find(c->p, "Kr") ? "Kr" : "Kt"),
+                     "Kr and Kt of glass are taken as 1");
 }
 
 static void make_translucent(struct pt_making *c)
@@ -111,7 +113,7 @@ static void make_translucent(struct pt_making *c)
     c->m->transmittance = pt_input_product(c->b, kd, pt_build_reflectance(c, "transmit", 0.5f));
     pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
     if (!is_black(ks))
-        pt_diag_warn(&c->b->diag, c->p->loc, "Ks of a translucent material is ignored");
+        pt_diag_warn(&c->b->diag, pt_params_loc(c->p, "Ks"), "Ks of a translucent material is ignored");
 }
 
 /* v3 gives the share of the first material, v4 that of the second. */

@@ -89,7 +89,8 @@ static int place_grid(struct pt_builder *b, const struct pt_state *s, struct pt_
     pt_params_point(p, "p1", p1);
     pt_builder_at_shutter(b, s->ctm, at);
     if (!(p0[0] != p1[0] && p0[1] != p1[1] && p0[2] != p1[2]))
-        return pt_diag_fail(&b->diag, p->loc, "the box of a grid medium is empty (expected p0 and p1 apart in all axes)");
+        return pt_diag_fail(&b->diag, pt_params_loc(p, pt_params_find(p, "p1") ? "p1" : "p0"),
+                            "the box of a grid medium is empty (expected p0 and p1 apart in all axes)");
     struct pt_xform box = pt_xform_translate(p0[0], p0[1], p0[2]);
     struct pt_xform size = pt_xform_scale(p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]);
     box = pt_xform_mul(&box, &size);
@@ -143,9 +144,10 @@ int pt_build_medium(struct pt_builder *b, const struct pt_state *s, const char *
     int is_grid = strcmp(type, "uniformgrid") == 0 || strcmp(type, "heterogeneous") == 0;
     int stand_in = strcmp(type, "rgbgrid") == 0 || strcmp(type, "cloud") == 0 || strcmp(type, "nanovdb") == 0;
     if (!is_grid && !stand_in && strcmp(type, "homogeneous") != 0)
-        return pt_diag_fail(&b->diag, p->loc, "unknown medium type \"%s\" (expected homogeneous or uniformgrid)", type);
+        return pt_diag_fail(&b->diag, pt_params_loc(p, "type"),
+                            "unknown medium type \"%s\" (expected homogeneous or uniformgrid)", type);
     if (stand_in) {
-        pt_diag_warn(&b->diag, p->loc, "medium type \"%s\" is replaced by empty space", type);
+        pt_diag_warn(&b->diag, pt_params_loc(p, "type"), "medium type \"%s\" is replaced by empty space", type);
         for (size_t i = 0; i < p->count; i++)
             p->items[i].used = 1;
     } else {

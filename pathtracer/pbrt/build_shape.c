@@ -170,7 +170,8 @@ static int store_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_
         return pt_diag_nomem(&b->diag, "a mesh");
     vertices = (struct pt_vertex *)(((uintptr_t)vertices + sizeof *vertices - 1) & ~(uintptr_t)(sizeof *vertices - 1));
     if (!store_positions(soup, t, vertices))
-        return pt_diag_fail(&b->diag, p->loc, "a vertex is not finite after its transform");
+        return pt_diag_fail(&b->diag, pt_params_loc(p, soup->pd ? "P" : "filename"),
+                            "a vertex is not finite after its transform");
     if (!pt_xform_invert(t, &inverse))
         return pt_diag_fail(&b->diag, p->loc, "singular transform of a shape");
     if (has_n)
@@ -335,7 +336,8 @@ static int make_sphere(struct pt_builder *b, const struct pt_state *s, struct pt
     double r = pt_params_float_in(p, "radius", 1, 1e-30, 1e30);
     double z0 = fmax(pt_params_float(p, "zmin", -r), -r), z1 = fmin(pt_params_float(p, "zmax", r), r);
     if (!(z0 < z1))
-        return pt_diag_fail(&b->diag, p->loc, "zmin %g is not below zmax %g", z0, z1);
+        return pt_diag_fail(&b->diag, pt_params_loc(p, pt_params_find(p, "zmin") ? "zmin" : "zmax"),
+                            "zmin %g is not below zmax %g", z0, z1);
     struct pt_quadric q = {.kind = PT_QUADRIC_SPHERE, .radius = (float)r, .z_min = (float)z0, .z_max = (float)z1};
     return add_quadric(b, s, p, &q);
 }
@@ -345,7 +347,7 @@ static int make_disk(struct pt_builder *b, const struct pt_state *s, struct pt_p
     double r = pt_params_float_in(p, "radius", 1, 1e-30, 1e30), h = pt_params_float(p, "height", 0);
     double inner = pt_params_float_in(p, "innerradius", 0, 0, 1e30);
     if (!(inner < r))
-        return pt_diag_fail(&b->diag, p->loc, "innerradius %g is not below radius %g", inner, r);
+        return pt_diag_fail(&b->diag, pt_params_loc(p, "innerradius"), "innerradius %g is not below radius %g", inner, r);
     struct pt_quadric q = {
         .kind = PT_QUADRIC_DISK, .radius = (float)r, .inner_radius = (float)inner, .z_min = (float)h, .z_max = (float)h};
     return add_quadric(b, s, p, &q);
@@ -356,7 +358,8 @@ static int make_cylinder(struct pt_builder *b, const struct pt_state *s, struct 
     double r = pt_params_float_in(p, "radius", 1, 1e-30, 1e30);
     double z0 = pt_params_float(p, "zmin", -1), z1 = pt_params_float(p, "zmax", 1);
     if (z0 == z1)
-        return pt_diag_fail(&b->diag, p->loc, "zmin and zmax are both %g", z0);
+        return pt_diag_fail(&b->diag, pt_params_loc(p, pt_params_find(p, "zmin") ? "zmin" : "zmax"),
+                            "zmin and zmax are both %g", z0);
     struct pt_quadric q = {
         .kind = PT_QUADRIC_CYLINDER, .radius = (float)r, .z_min = (float)fmin(z0, z1), .z_max = (float)fmax(z0, z1)};
     return add_quadric(b, s, p, &q);

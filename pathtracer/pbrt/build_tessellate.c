@@ -110,7 +110,7 @@ int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_
         return b->diag.rc;
     if (!P || (!indices && vertices != 4) || (indices && count % 4 != 0) || (uv && uv_count != vertices) ||
         (N && n_count != vertices))
-        return pt_diag_fail(&b->diag, p->loc,
+        return pt_diag_fail(&b->diag, pt_params_loc(p, "P"),
                             "a bilinearmesh needs \"point3 P\", four indices per patch, uv and N per vertex");
     if (!indices) {
         indices = identity;
@@ -219,10 +219,11 @@ int pt_build_curve(struct pt_builder *b, const struct pt_state *s, struct pt_par
     if (b->diag.rc)
         return b->diag.rc;
     if (!spline && strcmp(basis, "bezier") != 0)
-        return pt_diag_fail(&b->diag, p->loc, "unknown curve basis \"%.40s\" (expected bezier or bspline)", basis);
+        return pt_diag_fail(&b->diag, pt_params_loc(p, "basis"),
+                            "unknown curve basis \"%.40s\" (expected bezier or bspline)", basis);
     if (!P || count < corners || (count - corners) % step != 0)
-        return pt_diag_fail(&b->diag, p->loc, "a curve of degree %d needs %zu points and %zu more per segment", degree,
-                            corners, step);
+        return pt_diag_fail(&b->diag, pt_params_loc(p, "P"),
+                            "a curve of degree %d needs %zu points and %zu more per segment", degree, corners, step);
     pt_diag_warn(&b->diag, p->loc, "curves are rendered as tubes of %d sides", (int)CURVE_SIDES);
     size_t segments = (count - corners) / step + 1;
     for (size_t i = 0; i < segments && ok; i++) {

@@ -278,7 +278,8 @@ static void make_checkerboard(struct context *c, struct pt_texture *t)
     t->in[1] = input(c, "tex2", 0);
     read_mapping(c, t);
     if (pt_params_int_in(c->p, "dimension", 2, 2, 3) == 3)
-        pt_diag_warn(&c->b->diag, c->p->loc, "a checkerboard of dimension 3 is drawn on the shape's uv instead");
+        pt_diag_warn(&c->b->diag, pt_params_loc(c->p, "dimension"),
+                     "a checkerboard of dimension 3 is drawn on the shape's uv instead");
     pt_params_ignore(c->p, "aamode");
 }
 

@@ -135,11 +135,11 @@ static struct pt_token read_token(struct pt_lexer *lexer)
 
 struct pt_token pt_lexer_next(struct pt_lexer *lexer)
 {
-    if (lexer->has_ahead) {
-        lexer->has_ahead = 0;
-        return lexer->ahead;
-    }
-    return read_token(lexer);
+    struct pt_token t = lexer->has_ahead ? lexer->ahead : read_token(lexer);
+    lexer->has_ahead = 0;
+    lexer->before = lexer->taken;
+    lexer->taken = t.loc;
+    return t;
 }
 
 struct pt_token pt_lexer_peek(struct pt_lexer *lexer)
@@ -149,6 +149,17 @@ struct pt_token pt_lexer_peek(struct pt_lexer *lexer)
         lexer->has_ahead = 1;
     }
     return lexer->ahead;
+}
+
+int pt_lexer_has_ended(const struct pt_lexer *lexer, const struct pt_token *token)
+{
+    return token->kind == PT_TOKEN_END || token->kind == PT_TOKEN_FILE_END ||
+           (token->kind == PT_TOKEN_WORD && lexer->is_directive && lexer->is_directive(token));
+}
+
+struct pt_loc pt_lexer_fault(const struct pt_lexer *lexer, const struct pt_token *token)
+{
+    return pt_lexer_has_ended(lexer, token) && lexer->before.file ? lexer->before : token->loc;
 }
 
 void pt_lexer_release(struct pt_lexer *lexer)

@@ -47,6 +47,8 @@ struct pt_lexer {
     int depth;
     struct pt_token ahead; /* looked at, not yet taken */
     int has_ahead;
+    struct pt_loc taken, before;                       /* of the token taken last and of the one before it */
+    int (*is_directive)(const struct pt_token *token); /* NULL: none is */
 };
 
 /* Opens `path` on top of the stack; `from` is where it is asked for. Refuses loops and more than PT_LEXER_DEPTH levels. */
@@ -55,6 +57,11 @@ int pt_lexer_include(struct pt_lexer *lexer, const char *path, struct pt_loc fro
 struct pt_token pt_lexer_next(struct pt_lexer *lexer);
 /* Looks at it. */
 struct pt_token pt_lexer_peek(struct pt_lexer *lexer);
+/* Whether `token` begins something else, so that what is being read is not all there. */
+int pt_lexer_has_ended(const struct pt_lexer *lexer, const struct pt_token *token);
+/* Where the fault is that the token taken last brought to light: in front of it if something is missing there, which may be
+ * in another file. */
+struct pt_loc pt_lexer_fault(const struct pt_lexer *lexer, const struct pt_token *token);
 void pt_lexer_release(struct pt_lexer *lexer);
 
 #endif

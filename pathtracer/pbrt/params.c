@@ -108,32 +108,44 @@ static int clip(size_t length) { return length < 40 ? (int)length : 40; }
 
 /* --- reading ---------------------------------------------------------------------------------------------------------- */
 
-/* `"type name"` to type and name. */
+struct declaration { /* offsets in the token's text */
+    size_t type, type_end, name, name_end;
+    int kind; /* enum pt_param_type; -1: unknown */
+};
+
+/* `"type name"` */
+static struct declaration split_declaration(const struct pt_token *t)
+{
+    struct declaration d = {.kind = -1, .name_end = t->length};
+    while (d.type < t->length && (t->text[d.type] == ' ' || t->text[d.type] == '\t'))
+        d.type++;
+    for (d.type_end = d.type; d.type_end < t->length && t->text[d.type_end] != ' ' && t->text[d.type_end] != '\t';)
+        d.type_end++;
+    d.name = d.type_end;
+    while (d.name < d.name_end && (t->text[d.name] == ' ' || t->text[d.name] == '\t'))
+        d.name++;
+    while (d.name_end > d.name && (t->text[d.name_end - 1] == ' ' || t->text[d.name_end - 1] == '\t'))
+        d.name_end--;
+    const size_t length = d.type_end - d.type;
+    for (size_t i = 0; i < sizeof type_names / sizeof type_names[0]; i++)
+        if (strlen(type_names[i].name) == length && memcmp(type_names[i].name, t->text + d.type, length) == 0)
+            d.kind = type_names[i].type;
+    return d;
+}
+
 static int read_declaration(struct pt_params *params, const struct pt_token *t, struct pt_param *out)
 {
-    size_t at = 0, type_end;
-    while (at < t->length && (t->text[at] == ' ' || t->text[at] == '\t'))
-        at++;
-    for (type_end = at; type_end < t->length && t->text[type_end] != ' ' && t->text[type_end] != '\t';)
-        type_end++;
-    size_t name = type_end, end = t->length;
-    while (name < end && (t->text[name] == ' ' || t->text[name] == '\t'))
-        name++;
-    while (end > name && (t->text[end - 1] == ' ' || t->text[end - 1] == '\t'))
-        end--;
-    if (name == end)
+    const struct declaration d = split_declaration(t);
+    if (d.name == d.name_end)
         return pt_diag_fail(params->diag, t->loc, "parameter \"%.*s\" (expected \"type name\")", clip(t->length), t->text);
-    out->type = -1;
-    for (size_t i = 0; i < sizeof type_names / sizeof type_names[0]; i++)
-        if (strlen(type_names[i].name) == type_end - at && memcmp(type_names[i].name, t->text + at, type_end - at) == 0)
-            out->type = type_names[i].type;
-    if (out->type < 0)
+    if (d.kind < 0)
         return pt_diag_fail(params->diag, t->loc,
                             "unknown parameter type \"%.*s\" (expected integer, float, point2, vector2, point3, vector3, "
                             "normal, bool, string, texture, rgb, spectrum or blackbody)",
-                            clip(type_end - at), t->text + at);
+                            clip(d.type_end - d.type), t->text + d.type);
+    out->type = d.kind;
     out->loc = t->loc;
-    out->name = pt_params_keep(params, t->text + name, end - name);
+    out->name = pt_params_keep(params, t->text + d.name, d.name_end - d.name);
     return params->diag->rc;
 }
 
@@ -187,19 +199,28 @@ static int add_value(struct pt_params *params, struct pt_param *p, const struct 
     return add_number(params, p, value);
 }
 
+/* Whether the values of `p` end before `t`: something else begins, of parameters without text also the next one. */
+static int values_end(const struct pt_lexer *lexer, const struct pt_param *p, const struct pt_token *t)
+{
+    if (t->kind != PT_TOKEN_STRING || wants_text(p->type))
+        return pt_lexer_has_ended(lexer, t);
+    const struct declaration d = split_declaration(t);
+    return d.kind >= 0 && d.name < d.name_end;
+}
+
 static int read_values(struct pt_params *params, struct pt_lexer *lexer, struct pt_param *p)
 {
     struct pt_token t = pt_lexer_next(lexer);
+    if (t.kind == PT_TOKEN_CLOSE || values_end(lexer, p, &t))
+        return pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has no value", pt_param_name(params, p));
     p->first = wants_text(p->type) ? params->string_count : params->number_count;
     if (t.kind == PT_TOKEN_WORD || t.kind == PT_TOKEN_STRING) {
         if (t.kind == PT_TOKEN_STRING)
             p->first = p->type == PT_PARAM_BOOL ? p->first : params->string_count;
         return add_value(params, p, &t);
     }
-    if (t.kind != PT_TOKEN_OPEN)
-        return t.kind == PT_TOKEN_BAD
-                   ? params->diag->rc
-                   : pt_diag_fail(params->diag, t.loc, "parameter \"%s\" has no value", pt_param_name(params, p));
+    if (t.kind == PT_TOKEN_BAD)
+        return params->diag->rc;
     struct pt_loc open = t.loc;
     if (pt_lexer_peek(lexer).kind == PT_TOKEN_STRING && p->type == PT_PARAM_SPECTRUM)
         p->first = params->string_count;
@@ -209,7 +230,7 @@ static int read_values(struct pt_params *params, struct pt_lexer *lexer, struct 
             return 0;
         if (t.kind == PT_TOKEN_BAD)
             return params->diag->rc;
-        if (t.kind != PT_TOKEN_WORD && t.kind != PT_TOKEN_STRING)
+        if (t.kind == PT_TOKEN_OPEN || values_end(lexer, p, &t))
             return pt_diag_fail(params->diag, open, "values of \"%s\" have no closing ]", pt_param_name(params, p));
         int rc = add_value(params, p, &t);
         if (rc)
@@ -296,6 +317,12 @@ void pt_params_check_used(struct pt_params *params)
         else
             pt_diag_fail(params->diag, p->loc, "unknown parameter \"%s\" of \"%s\"", name, pt_params_kind(params));
     }
+}
+
+struct pt_loc pt_params_loc(const struct pt_params *params, const char *name)
+{
+    const struct pt_param *p = pt_params_find(params, name);
+    return p ? p->loc : params->loc;
 }
 
 struct pt_param *pt_params_find(const struct pt_params *params, const char *name)

@@ -72,6 +72,8 @@ void pt_params_check_used(struct pt_params *params);
 
 /* The parameter called `name`, or NULL; does not mark it. */
 struct pt_param *pt_params_find(const struct pt_params *params, const char *name);
+/* Its place; that of the directive when absent. */
+struct pt_loc pt_params_loc(const struct pt_params *params, const char *name);
 const char *pt_param_name(const struct pt_params *params, const struct pt_param *param);
 /* Marks as used what is known and has no effect here. Names are separated by blanks. */
 void pt_params_ignore(struct pt_params *params, const char *names);

@@ -18,13 +18,13 @@ int pt_parser_read_string(struct parser *p, const char *what, char *out, size_t 
     if (bracket)
         t = pt_lexer_next(&p->lexer);
     if (t.kind != PT_TOKEN_STRING)
-        return pt_diag_fail(&p->b->diag, t.loc, "expected a quoted %s", what);
+        return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "expected a quoted %s", what);
     if (t.length >= room)
         return pt_diag_fail(&p->b->diag, t.loc, "%s of %zu characters (expected less than %zu)", what, t.length, room);
     memcpy(out, t.text, t.length);
     out[t.length] = '\0';
     if (bracket && (t = pt_lexer_next(&p->lexer)).kind != PT_TOKEN_CLOSE)
-        return pt_diag_fail(&p->b->diag, t.loc, "expected ] after the %s", what);
+        return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "expected ] after the %s", what);
     return p->b->diag.rc;
 }
 
@@ -37,6 +37,9 @@ int pt_parser_read_numbers(struct parser *p, const char *directive_name, double 
         struct pt_token t = pt_lexer_next(&p->lexer);
         if (t.kind == PT_TOKEN_BAD)
             return p->b->diag.rc;
+        if (pt_lexer_has_ended(&p->lexer, &t))
+            return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "%s has %d numbers (expected %d)",
+                                directive_name, i, count);
         if (t.kind != PT_TOKEN_WORD || !pt_number_parse(t.text, t.length, &out[i]))
             return pt_diag_fail(&p->b->diag, t.loc, "%s: \"%.*s\" (expected %d numbers)", directive_name,
                                 t.length < 40 ? (int)t.length : 40, t.text, count);
@@ -44,7 +47,8 @@ int pt_parser_read_numbers(struct parser *p, const char *directive_name, double 
     if (bracket) {
         struct pt_token t = pt_lexer_next(&p->lexer);
         if (t.kind != PT_TOKEN_CLOSE)
-            return pt_diag_fail(&p->b->diag, t.loc, "%s: expected ] after %d numbers", directive_name, count);
+            return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "%s: expected ] after %d numbers",
+                                directive_name, count);
     }
     return 0;
 }
@@ -88,8 +92,10 @@ static const struct frame *innermost(const struct parser *p)
 
 static int fail_open(struct parser *p, struct pt_loc loc, const char *name)
 {
-    return pt_diag_fail(&p->b->diag, loc, "%s where the %s of line %d is still open", name, begin_name(innermost(p)->kind),
-                        innermost(p)->loc.line);
+    const struct frame *top = innermost(p);
+    const int elsewhere = strcmp(top->loc.file, loc.file) != 0;
+    return pt_diag_fail(&p->b->diag, loc, "%s where the %s of %s%s%d is still open", name, begin_name(top->kind),
+                        elsewhere ? top->loc.file : "line ", elsewhere ? ":" : "", top->loc.line);
 }
 
 static int pop(struct parser *p, char kind, struct pt_loc loc, const char *end_name)
@@ -423,6 +429,11 @@ static const struct directive *find_directive(const struct directive *list, cons
     return NULL;
 }
 
+static int is_directive(const struct pt_token *t)
+{
+    return find_directive(directives, t) || find_directive(pt_transform_directives, t);
+}
+
 static int run_directive(struct parser *p, const struct pt_token *t)
 {
     const struct directive *d = find_directive(directives, t);
@@ -482,6 +493,7 @@ int pt_pbrt_read(struct pt_builder *b, const char *path)
     p->lexer.source = b->source;
     p->lexer.diag = &b->diag;
     p->lexer.arena = &b->scene->arena;
+    p->lexer.is_directive = is_directive;
     p->frames.size = sizeof(struct frame);
     p->systems.size = sizeof(struct pt_xform[2]);
     p->attributes.size = sizeof(struct pt_params *);

@@ -122,7 +122,7 @@ static int do_active_transform(struct parser *p, struct pt_loc loc)
     else if (t.length == 3 && memcmp(t.text, "All", 3) == 0)
         p->state.active = 3;
     else
-        return pt_diag_fail(&p->b->diag, t.loc, "ActiveTransform needs StartTime, EndTime or All");
+        return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "ActiveTransform needs StartTime, EndTime or All");
     return 0;
 }
 

@@ -255,7 +255,8 @@ int pt_build_loop_subdiv(struct pt_builder *b, const struct pt_state *s, struct 
     if (!P || !indices || corners == 0 || corners % 3 != 0)
         return pt_diag_fail(&b->diag, p->loc, "a loopsubdiv needs \"point3 P\" and three \"integer indices\" per triangle");
     if (corners / 3 > max_triangles >> (2 * levels))
-        return pt_diag_fail(&b->diag, p->loc, "%zu triangles subdivided %d times are too many", corners / 3, levels);
+        return pt_diag_fail(&b->diag, pt_params_loc(p, "levels"), "%zu triangles subdivided %d times are too many",
+                            corners / 3, levels);
     m = (struct mesh){vertices, corners / 3, malloc(vertices * 3 * sizeof *m.p), malloc(corners * sizeof *m.v)};
     if (!m.p || !m.v) {
         pt_diag_nomem(&b->diag, "a subdivision surface");
