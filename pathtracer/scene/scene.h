@@ -207,9 +207,12 @@ struct pt_light_tree {
 
 /* 2D piecewise-constant distribution over an environment image as cumulative sums from 0 to 1; derived. */
 struct pt_env_distribution {
-    int32_t width, height;
-    const float *rows;    /* [height + 1] */
-    const float *columns; /* [height][width + 1] */
+    int32_t width, height;           /* in cells */
+    int32_t cell_width, cell_height; /* pixels of a cell; those of the last column and row may have fewer */
+    double per_importance; /* 0: all pixels of a cell are as likely. Else pixels are chosen by importance, and this is
+                                        their density over the unit square for each unit of luminance · weight of the row */
+    const float *rows;     /* [height + 1] */
+    const float *columns;  /* [height][width + 1] */
     /* where to start looking in a cumulative sum of n cells for u: at guide[floor(u · n)] (Chen & Asau 1974) */
     const uint16_t *row_guide;    /* [height] */
     const uint16_t *column_guide; /* [height][width] */

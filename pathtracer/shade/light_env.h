@@ -15,7 +15,7 @@ float pt_light_env_density(const struct pt_scene *scene, const struct pt_light *
  * all of them if the environment is constant, which is selected for that only. */
 int pt_light_env_sample(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 p, float u0, float u1,
                         struct pt_light_sample *out);
-/* Alias table of the image. */
+/* The distribution from which the image is sampled, in the scene's arena; 0 when out of memory. */
 int pt_light_env_build(struct pt_scene *scene, const struct pt_light *light, struct pt_env_distribution *out);
 /* Mean luminance over the sphere. */
 float pt_light_env_mean(const struct pt_scene *scene, const struct pt_light *light);

@@ -483,6 +483,140 @@ static void tables_are_as_fine_as_the_image_asks(void **state)
     }
 }
 
+/* --- skies whose size no table divides ------------------------------------------------------------------------------------ */
+
+/* A sky of light of all strengths, black in a quarter of it, with a sun of one pixel that has half of all light. */
+static void uneven_sky(struct pt_scene *s, int32_t mapping, int32_t w, int32_t h)
+{
+    float *px = pt_arena_alloc(&s->arena, (size_t)(3 * w * h), sizeof *px);
+    assert_non_null(px);
+    struct pt_rng rng = pt_rng_make(5);
+    for (int i = 0; i < w * h; i++) {
+        float u = pt_rng_float(&rng), l = i % w < w / 4 ? 0.0f : 0.1f + u * u;
+        px[3 * i] = l;
+        px[3 * i + 1] = l * pt_rng_float(&rng);
+        px[3 * i + 2] = l * pt_rng_float(&rng);
+    }
+    for (int k = 0; k < 3; k++)
+        px[3 * (h / 3 * w + w / 2 + (w > 2)) + k] = 0.4f * (float)(w * h);
+    s->images[s->image_count++] = (struct pt_image_map){w, h, 3, PT_PIXEL_FLOAT, 1.0f, px};
+    struct pt_light light = {.kind = PT_LIGHT_ENV_IMAGE,
+                             .shape = -1,
+                             .mapping = mapping,
+                             .emission = {1, 1, 1},
+                             .from_render = {{0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0, 0}}};
+    test_add_light(s, &light);
+}
+
+/* The direction of a place (s, t) of a latitude–longitude map. */
+static pt_vec3 latlong_direction(const struct pt_light *light, double s, double t)
+{
+    pt_vec3 l = v3((float)(sin(PI * t) * cos(2 * PI * s)), (float)(sin(PI * t) * sin(2 * PI * s)), (float)cos(PI * t));
+    return pt_mat34_normal(&light->from_render, l); /* a rotation: its transpose is its inverse */
+}
+
+/* Over the pixels of a latitude–longitude map, each as large as it is: the density integrates to 1, and is positive where there is
+ * light. *light gets the integral of luminance. */
+static double integral_of_density(const struct pt_scene *scene, double *luminance)
+{
+    const struct pt_light *light = &scene->lights[0];
+    const struct pt_image_map *map = &scene->images[0];
+    double integral = 0.0;
+    *luminance = 0.0;
+    for (int y = 0; y < map->height; y++) {
+        double solid = 2 * PI / map->width * (cos(PI * y / map->height) - cos(PI * (y + 1) / map->height));
+        double t = (y + 0.5) / map->height, square = 2 * PI * PI * sin(PI * t) / map->width / map->height;
+        for (int x = 0; x < map->width; x++) {
+            pt_vec3 w = latlong_direction(light, (x + 0.5) / map->width, t);
+            float pdf = pt_light_env_density(scene, light, v3(0, 0, 0), w);
+            float l = v3_luminance(pt_light_env_eval(scene, light, w));
+            if (l > 0.0f && !(pdf > 0.0f))
+                fail_msg("%d x %d: no density at pixel %d, %d", (int)map->width, (int)map->height, x, y);
+            integral += (double)pdf * square;
+            *luminance += (double)l * solid;
+        }
+    }
+    return integral;
+}
+
+/* Of samples: their mean against the integral `want`, and what their weights scatter. */
+static void check_sky_samples(const struct pt_scene *scene, double want, double most_squared_weight)
+{
+    enum { N = 20000 };
+    const struct pt_light *light = &scene->lights[0];
+    const struct pt_image_map *map = &scene->images[0];
+    const pt_vec3 p = v3(0.2f, 0.1f, -0.3f);
+    struct pt_rng rng = pt_rng_make(3);
+    double sum = 0.0, sum2 = 0.0;
+    int agree = 0;
+    for (int i = 0; i < N; i++) {
+        struct pt_light_sample s;
+        float u0 = pt_rng_float(&rng), u1 = pt_rng_float(&rng);
+        if (!pt_light_env_sample(scene, light, p, u0, u1, &s)) {
+            agree++;
+            continue;
+        }
+        double weight = (double)(v3_luminance(v3(s.pixel[0], s.pixel[1], s.pixel[2])) * s.inv_pdf_solid);
+        sum += weight / N;
+        sum2 += weight * weight / N;
+        agree += fabsf(pt_light_env_density(scene, light, p, s.wi) * s.inv_pdf_solid - 1.0f) < 1e-2f;
+    }
+    double error = sqrt(fmax(0.0, sum2 - sum * sum) / N);
+    if (fabs(sum - want) > 5.0 * error + 1e-5 * want)
+        fail_msg("%d x %d: %g ± %g by sampling, %g by integration", (int)map->width, (int)map->height, sum, error, want);
+    if (sum2 / (sum * sum) > most_squared_weight)
+        fail_msg("%d x %d: squared weight %g", (int)map->width, (int)map->height, sum2 / (sum * sum));
+    assert_true(agree > 0.98 * N); /* at the very rim of a pixel rounding may find the next one */
+}
+
+/* Sizes that 128, 256, 512 and 1024 do not divide, along either axis. */
+static const int odd_sizes[][2] = {{129, 65},  {131, 77},  {200, 100}, {255, 127}, {257, 1},   {300, 150}, {333, 40},
+                                   {515, 9},   {700, 350}, {1023, 5},  {1025, 3},  {1100, 60}, {1500, 50}, {2047, 7},
+                                   {2049, 11}, {3000, 12}, {5000, 6},  {3, 1025},  {5, 1500},  {7, 2500},  {1026, 1027}};
+enum { ODD_SIZES = sizeof odd_sizes / sizeof *odd_sizes };
+/* What a table may leave within its cells (TABLE_SQUARED_WEIGHT), times ∫ 2 sin² / (∫ sin)² = 4/3 of the solid angle within the row of
+ * a pole at most; the scatter of the estimate itself. */
+static const double SKY_SQUARED_WEIGHT = 1.3 * 4 / 3 * 1.05;
+
+static void skies_of_any_size(void **state)
+{
+    (void)state;
+    for (int i = 0; i < ODD_SIZES; i++) {
+        const int w = odd_sizes[i][0], h = odd_sizes[i][1];
+        struct pt_scene scene;
+        double luminance;
+        test_scene_begin(&scene);
+        uneven_sky(&scene, PT_ENV_LATLONG, w, h);
+        test_scene_finish(&scene);
+        double integral = integral_of_density(&scene, &luminance);
+        if (!(fabs(integral - 1.0) < 1e-4)) /* floats of the cumulative sums */
+            fail_msg("%d x %d: the density integrates to %.6f", w, h, integral);
+        check_sky_samples(&scene, luminance, SKY_SQUARED_WEIGHT);
+        add_portal(&scene);
+        check_sky_samples(&scene, luminance, INFINITY);
+        test_scene_end(&scene);
+    }
+}
+
+/* Every pixel of an equal-area map has the same solid angle. */
+static void equal_area_skies_of_any_size(void **state)
+{
+    (void)state;
+    for (int i = 0; i < ODD_SIZES; i++) {
+        const int w = odd_sizes[i][0], h = odd_sizes[i][1];
+        struct pt_scene scene;
+        test_scene_begin(&scene);
+        uneven_sky(&scene, PT_ENV_EQUAL_AREA, w, h);
+        test_scene_finish(&scene);
+        double luminance = 0.0;
+        const float *px = scene.images[0].pixels;
+        for (int k = 0; k < w * h; k++)
+            luminance += 4 * PI / (w * h) * (double)v3_luminance(v3(px[3 * k], px[3 * k + 1], px[3 * k + 2]));
+        check_sky_samples(&scene, luminance, SKY_SQUARED_WEIGHT);
+        test_scene_end(&scene);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -505,6 +639,8 @@ int main(void)
         cmocka_unit_test(normals_say_which_side_emits),
         cmocka_unit_test(skies_are_looked_up_where_they_are),
         cmocka_unit_test(tables_are_as_fine_as_the_image_asks),
+        cmocka_unit_test(skies_of_any_size),
+        cmocka_unit_test(equal_area_skies_of_any_size),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
