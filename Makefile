@@ -4,13 +4,17 @@
 # its folder: that is how the dependency arrows of CONTRIBUTING.md are enforced (an illegal include does not compile).
 #
 #   MODE=release|debug|asan|tsan   objects and results of each mode live apart (release: build/, others: build/MODE/)
-#   DESTDIR PREFIX CC CXX CFLAGS LDFLAGS are honoured; CFLAGS and LDFLAGS are appended to the project's own.
+#   DESTDIR PREFIX LIBDIR          where `make install` puts things; LIBDIR (lib) is a folder below PREFIX or a whole path
+#   CC CXX AR, CPPFLAGS CFLAGS CXXFLAGS LDFLAGS   are honoured; flags come after our own, CXXFLAGS are CFLAGS if not given
+#   EMBREE=3|4                     of both, if both are installed
 
 MODE    ?= release
 PREFIX  ?= /usr/local
+LIBDIR  ?= lib
 DESTDIR ?=
 CC      := $(if $(filter default,$(origin CC)),gcc,$(CC))
 CXX     := $(if $(filter default,$(origin CXX)),g++,$(CXX))
+AR      := $(if $(filter default,$(origin AR)),$(if $(filter gcc%,$(CC)),gcc-ar,ar),$(AR))# gcc-ar knows objects of -flto
 PKG     := pkg-config
 
 ifeq ($(filter $(MODE),release debug asan tsan),)
@@ -30,22 +34,29 @@ WARNC := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
 NUM   := -ffp-contract=off -fno-math-errno
 OPT_release := -O3 -g
 OPT_debug   := -O0 -g3
-# With -Werror: `make test` builds everything so, and a warning fails it; what users build does not break with another compiler.
+# With -Werror: `make test` builds everything so, and a warning fails it; what users build does not break with another
+# compiler.
 OPT_asan    := -O1 -g1 -Werror -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
 OPT_tsan    := -O1 -g -fsanitize=thread
 SAN_asan    := -fsanitize=address,undefined
 SAN_tsan    := -fsanitize=thread
 COMMON  := $(OPT_$(MODE)) -fPIC -fvisibility=hidden -pthread -MMD -MP $(NUM)
-CFLAGS_ALL   = -std=c17 -D_POSIX_C_SOURCE=200809L $(COMMON) $(WARNC) $(CFLAGS)
-CXXFLAGS_ALL = -std=c++17 $(COMMON) $(WARN) $(CFLAGS)
+CXXFLAGS     ?= $(CFLAGS)
+CFLAGS_ALL   = -std=c17 -D_POSIX_C_SOURCE=200809L $(COMMON) $(WARNC) $(CPPFLAGS) $(CFLAGS)
+CXXFLAGS_ALL = -std=c++17 $(COMMON) $(WARN) $(CPPFLAGS) $(CXXFLAGS)
 LDFLAGS_ALL  = -pthread $(SAN_$(MODE)) $(LDFLAGS)
 
 # --- libraries -----------------------------------------------------------------------------------------------------------
 EXR_CFLAGS  := $(shell $(PKG) --cflags OpenEXR 2>/dev/null)
-BLAS_CFLAGS := $(shell $(PKG) --cflags openblas 2>/dev/null)
+EXR_LIBS    := $(or $(filter -L% -lOpenEXRCore%,$(shell $(PKG) --libs OpenEXR 2>/dev/null)),-lOpenEXRCore)
+BLAS_CFLAGS := $(shell $(PKG) --cflags openblas lapacke 2>/dev/null)
+# Embree has no .pc file: the compiler says which headers it finds.
+EMBREE := $(or $(EMBREE),$(firstword $(foreach v,4 3,$(shell \
+    $(CC) $(CPPFLAGS) $(CFLAGS) -E -include embree$(v)/rtcore.h -x c /dev/null >/dev/null 2>&1 && echo $(v)))),4)
 BASE_LIBS := -lcjson -lpng -lz -lm
-PT_LIBS  := -lembree3 -lOpenEXRCore-3_1 -lcjson -lpng -lz -ldl -lm
-IMAGE_LIBS := -lOpenImageIO -lOpenImageIO_Util -lstdc++# hundreds of libraries: the programs load them when they read an image
+PT_LIBS  := -lembree$(EMBREE) $(EXR_LIBS) -lcjson -lpng -lz -ldl -lm
+# Hundreds of libraries: the programs load them when they read an image.
+IMAGE_LIBS := -lOpenImageIO -lOpenImageIO_Util -lstdc++
 # MPI is optional and in a shared object of its own, so that programs run where it is not: MPI= leaves it out.
 MPI_PKG := $(firstword $(foreach p,ompi-c mpich,$(shell $(PKG) --exists $(p) 2>/dev/null && echo $(p))))
 MPI     ?= $(if $(MPI_PKG),1)
@@ -56,24 +67,30 @@ GGN_LIBS := -lopenblas -llapacke -lsvm -lcjson -lpng -lz -ldl -lm
 
 # --- include paths: the dependency arrows --------------------------------------------------------------------------------
 API := -Iplugin-api/include
-BASE := -Iplugin-api# "base/…", "job/…", "picture/…", "sequence/…" and "denoise/…": what all programs stand on; no part of the ABI
+# "base/…", "job/…", "picture/…", "sequence/…" and "denoise/…": what all programs stand on; no part of the ABI
+BASE := -Iplugin-api
+BASE_FOLDERS := base job picture sequence denoise
+# INC_PROGRAM_FOLDER is for a folder, INC_PROGRAM for the rest of the program; INC_tests_PREFIX for the tests of that prefix.
 INC_plugin-api         := $(API)
-INC_plugin-api_base    := $(BASE)
+$(foreach f,$(BASE_FOLDERS),$(eval INC_plugin-api_$(f) := $(BASE)))
 INC_plugin-api_mpi     := $(BASE) $(MPI_CFLAGS)# the only folder that knows MPI
 INC_plugin-api_tools   := $(API) $(BASE)
+INC_plugin-api_report  := $(API) $(BASE)
 INC_plugin-api_host    := $(API) $(BASE)
 INC_pathtracer         := -Ipathtracer $(BASE) $(EXR_CFLAGS)
-INC_pathtracer_host    := $(INC_pathtracer) $(API)# pathtracer/render and pathtracer/app: the only hosts of criteria
+INC_pathtracer_geom    := $(INC_pathtracer) -DPT_EMBREE=$(EMBREE)# the only folder that knows Embree
+INC_pathtracer_render  := $(INC_pathtracer) $(API)# with app/ the only hosts of criteria
+INC_pathtracer_app     := $(INC_pathtracer_render)
 INC_ggn                := -Iggn $(BASE) $(BLAS_CFLAGS)
-INC_ggn_plugin         := $(INC_ggn) $(API)# ggn/plugin: the only folder of ggn that knows the ABI
-INC_tests_pt           := -Itests -Itests/support $(INC_pathtracer_host)
+INC_ggn_plugin         := $(INC_ggn) $(API)# the only folder of ggn that knows the ABI
+INC_tests              := -Itests -Itests/support $(API)
+INC_tests_pt           := -Itests -Itests/support $(INC_pathtracer_render)
 INC_tests_ggn          := -Itests -Itests/support $(INC_ggn_plugin)
 INC_tests_base         := -Itests -Itests/support $(BASE)
-INC_tests_api          := -Itests -Itests/support $(API)
-INC_tests_host         := $(INC_tests_api) $(BASE)# api_host_: the host library from inside
+INC_tests_api_host     := $(INC_tests) $(BASE)# the host library from inside
 
 # --- sources -------------------------------------------------------------------------------------------------------------
-BASE_SRC    := $(wildcard plugin-api/base/*.c plugin-api/job/*.c plugin-api/picture/*.c plugin-api/sequence/*.c plugin-api/denoise/*.c)
+BASE_SRC    := $(wildcard $(BASE_FOLDERS:%=plugin-api/%/*.c))
 IMAGES_SRC  := plugin-api/picture/oiio.cpp# in a shared object of its own; fuzz targets and benchmarks link it
 LOADER_SRC  := $(wildcard plugin-api/src/*.c)
 HOST_SRC    := $(wildcard plugin-api/host/*.c)
@@ -90,8 +107,9 @@ GGN_PLUGIN  := $(filter-out $(GGN_ENTRIES),$(wildcard ggn/plugin/*.c ggn/plugin/
 STUDY_MAIN  := ggn/study/main.c
 STUDY_SRC   := $(filter-out $(STUDY_MAIN),$(wildcard ggn/study/*.c))# the only users of STUDY_LIBS
 GGN_CLI     := $(wildcard ggn/cli/*.c)
-# Tests name what they test by prefix: pt_ (path tracer), ggn_, api_ (plugin-api), base_ (plugin-api/base, sequence, denoise).
-TEST_SRC    := $(wildcard tests/unit/*.c tests/grad/*.c tests/golden/*.c tests/stat/*.c tests/abi/*.c tests/hard/*.c tests/oom/*.c)
+# Tests name what they test by prefix: pt_ (path tracer), ggn_, api_ (plugin-api), base_ (BASE_FOLDERS).
+TEST_FOLDERS := unit grad golden stat abi hard oom
+TEST_SRC    := $(wildcard $(TEST_FOLDERS:%=tests/%/*.c))
 # The subset that also runs under ASan+UBSan in `make test`.
 SANE_SRC    := $(wildcard tests/unit/*.c tests/abi/*.c tests/oom/*.c)
 # Hosts that are not installed are skipped; `make test-hosts` installs them first.
@@ -101,8 +119,9 @@ FUZZ_SRC    := $(filter-out tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
 
 o = $(addprefix $(OBJ)/,$(addsuffix .o,$(1)) $(addsuffix .double.o,$(filter $(GGN_TWICE),$(1))))
 BASE_OBJ    := $(call o,$(BASE_SRC))
-# The path tracer is linked with the host library's objects: it starts without a search for the library, wherever it is moved.
-PT_CORE_OBJ := $(call o,$(PT_SRC) $(HOST_SRC)) $(BASE_OBJ)
+# The path tracer is linked with the host library's objects: wherever it is moved, it finds the library.
+HOST_OBJ    := $(call o,$(HOST_SRC))
+PT_CORE_OBJ := $(call o,$(PT_SRC)) $(HOST_OBJ) $(BASE_OBJ)
 PT_OBJ      := $(PT_CORE_OBJ) $(call o,$(IMAGES_SRC))
 LOADER_OBJ  := $(call o,$(LOADER_SRC))
 GGN_CORE_OBJ := $(call o,$(GGN_SRC)) $(BASE_OBJ)
@@ -110,13 +129,14 @@ GGN_OBJ     := $(GGN_CORE_OBJ) $(call o,$(IMAGES_SRC))
 GGN_PLUGIN_OBJ := $(call o,$(GGN_PLUGIN))
 STUDY_OBJ   := $(call o,$(STUDY_SRC))
 
-PROGRAMS := $(if $(PT_MAIN),$(BIN)/lull-render) $(if $(GGN_CLI),$(BIN)/ggn) $(BIN)/lull-study $(BIN)/lull-report $(if $(TOOL_SRC),$(BIN)/lull-check)
+PROGRAMS := $(addprefix $(BIN)/,lull-render ggn lull-study lull-report lull-check)
 MPI_MODULE := $(if $(MPI),$(OUT)/lib/lull/modules/lull-mpi.so)# loaded only by processes that a launcher has started
 # The host library for renderers (lull/host.h): the file has the major version in its name, programs link the other.
 HOST_LIB := $(OUT)/lib/liblull-host.so.1
 EXAMPLES := $(BIN)/host-example
 DENOISER := $(OUT)/lib/lull/modules/lull-denoiser# a program that denoise/oidn.h runs
-MODULES  := $(DENOISER) $(MPI_MODULE) $(OUT)/lib/lull/modules/lull-images.so
+IMAGES   := $(OUT)/lib/lull/modules/lull-images.so
+MODULES  := $(DENOISER) $(MPI_MODULE) $(IMAGES)
 CRITERIA := $(EXAMPLE_SRC:plugin-api/examples/%.c=$(LIB)/%.so) $(GGN_ENTRIES:ggn/plugin/entry_%.c=$(LIB)/%.so)
 TESTS    := $(patsubst tests/%.c,$(OUT)/tests/%,$(TEST_SRC))
 SANE     := $(patsubst tests/%.c,build/asan/tests/%,$(SANE_SRC))
@@ -124,20 +144,25 @@ REPLAY   := $(patsubst tests/fuzz/%.c,$(OUT)/fuzz/replay-%,$(FUZZ_SRC))
 FUZZERS  := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test bench cost asan tsan fuzz mutants host-model hdr-check abi-check install uninstall deb wheel blender man compdb clean help setup tests test-tools replay train-demo test-study test-hosts test-packages test-clang
+.PHONY: all setup tests test-tools replay demo train-demo test test-clang test-study test-hosts test-packages asan tsan \
+    fuzz mutants host-model hdr-check abi-check bench cost install uninstall deb wheel blender man compdb clean help
 .SECONDARY:
 
 all: $(PROGRAMS) $(CRITERIA) $(MODULES) $(HOST_LIB) $(EXAMPLES) ## build the programs and the criteria
 
 # --- compiling: one rule, flags by folder --------------------------------------------------------------------------------
-inc = $(or $(strip \
-  $(if $(filter plugin-api/%,$(1)),$(if $(filter plugin-api/base/% plugin-api/job/% plugin-api/picture/% plugin-api/sequence/% plugin-api/denoise/%,$(1)),$(INC_plugin-api_base),$(if $(filter plugin-api/tools/% plugin-api/report/%,$(1)),$(INC_plugin-api_tools),$(if $(filter plugin-api/host/%,$(1)),$(INC_plugin-api_host),$(if $(filter plugin-api/mpi/%,$(1)),$(INC_plugin-api_mpi),$(INC_plugin-api)))))) \
-  $(if $(filter pathtracer/%,$(1)),$(if $(filter pathtracer/app/% pathtracer/render/%,$(1)),$(INC_pathtracer_host),$(INC_pathtracer))) \
-  $(if $(filter ggn/%,$(1)),$(if $(filter ggn/plugin/%,$(1)),$(INC_ggn_plugin),$(INC_ggn))) \
-  $(if $(filter tests/%,$(1)),$(if $(filter pt_%,$(notdir $(1))),$(INC_tests_pt),$(if $(filter ggn_%,$(notdir $(1))),$(INC_tests_ggn),$(if $(filter base_%,$(notdir $(1))),$(INC_tests_base),$(if $(filter api_host_%,$(notdir $(1))),$(INC_tests_host),$(INC_tests_api))))))),)
+# parts: the words of FOLDER/FOLDER/…/NAME; keys: by what its flags are found, the nearest first.
+parts = $(subst /, ,$(1))
+prefix = $(wordlist 1,$(1),$(subst _, ,$(basename $(notdir $(2)))))
+keys = $(if $(filter tests/%,$(1)),tests_$(subst $() ,_,$(call prefix,2,$(1))) tests_$(call prefix,1,$(1)) tests, \
+    $(subst $() ,_,$(wordlist 1,2,$(call parts,$(1)))) $(firstword $(call parts,$(1))))
+inc = $(INC_$(firstword $(foreach k,$(call keys,$(1)),$(if $(INC_$(k)),$(k)))))
 # Kernels for one instruction set carry it in their name (x_avx2.c, x_avx512.c); they are reached by run-time dispatch only.
 ifneq ($(filter x86_64%,$(shell $(CC) -dumpmachine)),)
-isa = $(if $(filter %_avx2.c,$(1)),-mavx2 -mfma)$(if $(filter %_avx512.c,$(1)),-mavx512f -mavx512vl -mavx512bw -mavx512dq -mfma -mprefer-vector-width=512)$(if $(filter %_avx512bf16.c,$(1)),-mavx512f -mavx512vl -mavx512bw -mavx512dq -mavx512bf16 -mfma)
+ISA_avx2       := -mavx2 -mfma
+ISA_avx512     := -mavx512f -mavx512vl -mavx512bw -mavx512dq -mfma -mprefer-vector-width=512
+ISA_avx512bf16 := -mavx512f -mavx512vl -mavx512bw -mavx512dq -mavx512bf16 -mfma
+isa = $(ISA_$(lastword $(subst _, ,$(basename $(1)))))
 endif
 
 # Loops that are to become vectors may compute what a branch would have skipped: no flag of the processor is ever read.
@@ -161,33 +186,35 @@ $(OBJ)/%.cpp.o: %.cpp
 	@echo "  CXX  $<"
 	@$(CXX) $(CXXFLAGS_ALL) $(call inc,$<) -c $< -o $@
 
-# Programs are linked by the second linker of Debian's binutils in a tenth of the time; it exports _end and others, so no plugin is.
+# Programs are linked by the second linker of Debian's binutils in a tenth of the time; it exports _end and others, so no
+# plugin is.
 LINKER := $(if $(shell command -v ld.gold),-fuse-ld=gold)
 link = @mkdir -p $(@D); echo "  LD   $@"; $(CC) $(LINKER)
 so   = @mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--version-script=plugin-api/plugin.map -Wl,-z,defs
 
-$(BIN)/lull-render: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(OUT)/lib/lull/modules/lull-images.so
+$(BIN)/lull-render: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(IMAGES)
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
-$(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_CORE_OBJ) | $(OUT)/lib/lull/modules/lull-images.so
+$(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_CORE_OBJ) | $(IMAGES)
 	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
 # Of the rest of ggn the study takes what it names, and no network is among it.
-$(BIN)/lull-study: $(call o,$(STUDY_MAIN)) $(STUDY_OBJ) $(OBJ)/ggn.a | $(OUT)/lib/lull/modules/lull-images.so
+$(BIN)/lull-study: $(call o,$(STUDY_MAIN)) $(STUDY_OBJ) $(OBJ)/ggn.a | $(IMAGES)
 	$(link) $^ $(LDFLAGS_ALL) -Wl,--as-needed $(STUDY_LIBS) $(GGN_LIBS) -o $@
 # Of what both programs stand on the checker takes what it names.
 $(OBJ)/base.a: $(BASE_OBJ)
 	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
 $(BIN)/lull-check: $(call o,$(TOOL_SRC)) $(LOADER_OBJ) $(OBJ)/base.a
 	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
-$(BIN)/lull-report: $(call o,$(wildcard plugin-api/report/*.c) $(HOST_SRC)) $(LOADER_OBJ) $(OBJ)/base.a | $(OUT)/lib/lull/modules/lull-images.so
+REPORT_SRC := $(wildcard plugin-api/report/*.c)
+$(BIN)/lull-report: $(call o,$(REPORT_SRC)) $(HOST_OBJ) $(LOADER_OBJ) $(OBJ)/base.a | $(IMAGES)
 	$(link) $^ $(LDFLAGS_ALL) $(BASE_LIBS) -ldl -o $@
-$(OUT)/lib/lull/modules/lull-images.so: $(call o,$(IMAGES_SRC)) $(OBJ)/base.a
+$(IMAGES): $(call o,$(IMAGES_SRC)) $(OBJ)/base.a
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(IMAGE_LIBS) -lz -lm -o $@
 $(DENOISER): $(call o,$(wildcard plugin-api/denoise/program/*.c)) $(OBJ)/base.a
 	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
 $(OUT)/lib/lull/modules/lull-mpi.so: $(call o,$(MPI_SRC)) $(OBJ)/base.a
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(MPI_LIBS) -lm -o $@
-# As the wheel and the Blender extension carry them: for systems that have the C library and zlib, and without symbols. Debian has no
-# archives of cJSON and libpng that fit into a shared object, so they lie beside.
+# As the wheel and the Blender extension carry them: for systems that have the C library and zlib, and without symbols.
+# Debian has no archives of cJSON and libpng that fit into a shared object, so they lie beside.
 BUNDLE := $(OUT)/bundle/lib
 CARRIED := denoised fixed ggn halfbuf observer variance
 BESIDE := $(BUNDLE)/libcjson.so.1 $(BUNDLE)/libpng16.so.16
@@ -203,33 +230,37 @@ $(BESIDE): $(BUNDLE)/%:
 	@mkdir -p $(@D); strip -o $@ "$$($(CC) -print-file-name=$*)"
 $(BUNDLE)/%: $(OUT)/lib/%
 	@mkdir -p $(@D); strip -o $@ $<
-$(HOST_LIB) $(BUNDLE)/liblull-host.so.1: $(call o,$(HOST_SRC)) $(LOADER_OBJ) $(OBJ)/base.a plugin-api/host.map
+$(HOST_LIB) $(BUNDLE)/liblull-host.so.1: $(HOST_OBJ) $(LOADER_OBJ) $(OBJ)/base.a plugin-api/host.map
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--version-script=plugin-api/host.map -Wl,-z,defs -Wl,-soname,$(@F) \
 	    -Wl,--as-needed $(filter %.o %.a,$^) $(LDFLAGS_ALL) $(BASE_LIBS) -ldl -o $@
 	@ln -sf $(@F) $(@:.1=)
 # As a renderer would build it: the public headers and the library, nothing else.
 $(BIN)/host-example: plugin-api/examples/host.cpp $(wildcard plugin-api/include/lull/*.h) | $(HOST_LIB)
-	@mkdir -p $(@D); echo "  CXX  $@"; $(CXX) -std=c++11 $(WARN) $(OPT_$(MODE)) $(SAN_$(MODE)) $(CFLAGS) $(API) $< -L$(OUT)/lib \
-	    -Wl,-rpath,'$$ORIGIN/../lib' $(LDFLAGS) -llull-host -o $@
+	@mkdir -p $(@D); echo "  CXX  $@"; $(CXX) -std=c++11 $(WARN) $(OPT_$(MODE)) $(SAN_$(MODE)) $(CPPFLAGS) $(CXXFLAGS) \
+	    $(API) $< -L$(OUT)/lib -Wl,-rpath,'$$ORIGIN/../lib' $(LDFLAGS) -llull-host -o $@
 # Of the networks the criteria take what they name: no image is read there, and no image library loaded.
 $(OBJ)/ggn.a: $(GGN_CORE_OBJ)
 	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
 $(OBJ)/ggn-plugin.a: $(GGN_PLUGIN_OBJ)
 	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
 # Each with what its criteria name and the libraries that those need: observer.so the mathematical one, ggn.so no BLAS.
-$(GGN_ENTRIES:ggn/plugin/entry_%.c=$(LIB)/%.so): $(LIB)/%.so: $(OBJ)/ggn/plugin/entry_%.c.o $(OBJ)/ggn-plugin.a $(OBJ)/ggn.a plugin-api/plugin.map
+GGN_CRITERIA := $(GGN_ENTRIES:ggn/plugin/entry_%.c=$(LIB)/%.so)
+$(GGN_CRITERIA): $(OBJ)/ggn-plugin.a $(OBJ)/ggn.a plugin-api/plugin.map
+$(GGN_CRITERIA): $(LIB)/%.so: $(OBJ)/ggn/plugin/entry_%.c.o
 	$(so) $(filter %.o %.a,$^) $(LDFLAGS_ALL) -Wl,--as-needed $(GGN_LIBS) -o $@
 $(LIB)/denoised.so: | $(DENOISER)
 $(LIB)/%.so: $(OBJ)/plugin-api/examples/%.c.o plugin-api/plugin.map
 	$(so) $(filter %.o,$^) $(LDFLAGS_ALL) -lm -o $@
 
 # --- tests ---------------------------------------------------------------------------------------------------------------
-# tests/support/*.c is linked into every test of its prefix (pt_*.c, ggn_*.c; base_*.c into theirs too) or into all (no prefix).
-SUPPORT_pt  := $(call o,$(filter-out tests/support/ggn_% tests/support/api_%,$(wildcard tests/support/*.c)))
-SUPPORT_ggn := $(call o,$(filter-out tests/support/pt_% tests/support/api_%,$(wildcard tests/support/*.c)))
-SUPPORT_api := $(call o,$(filter-out tests/support/pt_% tests/support/ggn_% tests/support/base_% tests/support/api_%,$(wildcard tests/support/*.c)))
-SUPPORT_host := $(SUPPORT_api) $(call o,$(wildcard tests/support/api_host_*.c))
-SUPPORT_base := $(call o,$(wildcard tests/support/base_*.c) tests/support/open_files.c tests/support/foreign.c)
+# tests/support/*.c is linked into every test of its prefix (pt_*.c, ggn_*.c; base_*.c into theirs too) or into all (none).
+SUPPORT := $(wildcard tests/support/*.c)
+support_but = $(call o,$(filter-out $(1:%=tests/support/%_%),$(SUPPORT)))
+SUPPORT_pt  := $(call support_but,ggn api)
+SUPPORT_ggn := $(call support_but,pt api)
+SUPPORT_api := $(call support_but,pt ggn base api)
+SUPPORT_host := $(SUPPORT_api) $(call o,$(filter tests/support/api_host_%,$(SUPPORT)))
+SUPPORT_base := $(call o,$(filter tests/support/base_% %/open_files.c %/foreign.c,$(SUPPORT)))
 define test_rules
 $(OUT)/tests/$(1)/pt_%: $(OBJ)/tests/$(1)/pt_%.c.o $(PT_CORE_OBJ) $(LOADER_OBJ) $(SUPPORT_pt)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(PT_LIBS) -lcmocka -o $$@
@@ -241,12 +272,12 @@ $(OUT)/tests/$(1)/ggn_plugin%: $(OBJ)/tests/$(1)/ggn_plugin%.c.o $(GGN_PLUGIN_OB
 	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/api_%: $(OBJ)/tests/$(1)/api_%.c.o $(LOADER_OBJ) $(SUPPORT_api)
 	$$(link) $$^ $$(LDFLAGS_ALL) -ldl -lm -lcmocka -o $$@
-$(OUT)/tests/$(1)/api_host%: $(OBJ)/tests/$(1)/api_host%.c.o $(call o,$(HOST_SRC)) $(LOADER_OBJ) $(OBJ)/base.a $(SUPPORT_host)
+$(OUT)/tests/$(1)/api_host%: $(OBJ)/tests/$(1)/api_host%.c.o $(HOST_OBJ) $(LOADER_OBJ) $(OBJ)/base.a $(SUPPORT_host)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(BASE_LIBS) -ldl -lcmocka -o $$@
 $(OUT)/tests/$(1)/base_%: $(OBJ)/tests/$(1)/base_%.c.o $(BASE_OBJ) $(SUPPORT_base)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(BASE_LIBS) -lcmocka -o $$@
 endef
-$(foreach d,unit grad golden stat abi hard oom,$(eval $(call test_rules,$(d))))
+$(foreach d,$(TEST_FOLDERS),$(eval $(call test_rules,$(d))))
 $(OUT)/tests/abi/api_oom: $(OBJ)/plugin-api/tools/alloc_probe.c.o
 # They load their modules from where a program's lie.
 $(TESTS) $(SANE): | $(OUT)/tests/lib
@@ -307,14 +338,14 @@ test-hosts: setup ## install Blender, Mitsuba and bpy as far as they can be had,
 	@scripts/hosts/setup
 	@BUILD=build tests/run $(HOST_TEST)
 
-test-packages: all $(OIDN_STUB) ## make, install, use and remove what people install: make install, Debian packages, wheel, Blender add-on
+test-packages: all $(OIDN_STUB) ## make, install, use and remove what people install
 	@BUILD=build JOBS=1 tests/run $(wildcard tests/packages/*.sh)
 
 asan tsan: ## run the unit and ABI tests under the sanitizer
 	@$(MAKE) --no-print-directory MODE=$@ all tests
-	@BUILD=build/$@ tests/run --$@ $(patsubst tests/%.c,build/$@/tests/%,$(SANE_SRC)) $(if $(filter tsan,$@),$(wildcard tests/tsan/*.sh))
+	@BUILD=build/$@ tests/run --$@ $(SANE_SRC:tests/%.c=build/$@/tests/%) $(if $(filter tsan,$@),$(wildcard tests/tsan/*.sh))
 
-test-study: setup ## the page of lull-study in Chromium, simulated participants, load; installs what it can, skips the rest with a reason
+test-study: setup ## the page of lull-study in Chromium, simulated participants, load, as far as it can be installed
 	@$(MAKE) --no-print-directory $(BIN)/lull-study
 	@BUILD=build tests/run $(filter-out %/node.sh,$(wildcard tests/study/*.sh))
 
@@ -335,56 +366,75 @@ build/fuzz/ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(GGN_OBJ)
 mutants: ## plant single-line faults and see that the tests notice (hours; resumes)
 	@scripts/mutants $(MUTANTS_FLAGS) $(TEST_SRC) $(SCRIPT_TEST)
 
-host-model: $(BIN)/lull-render $(CRITERIA) ## 1,000 runs that are interrupted, killed or out of disk, against a model of what must be there
+host-model: $(BIN)/lull-render $(CRITERIA) ## 1,000 runs that are interrupted, killed or out of disk, against a model
 	@tests/model/host.py $(MODEL_FLAGS)
 
 # Every header compiles alone; the ABI header also as C99 and C++11.
 HEADERS := $(shell find pathtracer ggn plugin-api tests -name '*.h' 2>/dev/null)
-hdr-check: ## each header compiles alone (the ABI's as C99 and C++11), no include goes up, no long function or line, layout by clang-format 14, …
+LOOK := -fsyntax-only
+C_LOOK = $(CC) -std=c17 -D_POSIX_C_SOURCE=200809L $(WARNC) -Wno-unused-const-variable
+PUBLIC := $(addprefix plugin-api/include/lull/,criterion.h criterion_kit.h host.h)
+hdr-check: ## each header compiles alone, no include goes up, no long function or line, layout by clang-format 14
 	@scripts/check-floors
-	@$(foreach h,$(HEADERS),echo "extern int unused;" | $(CC) -std=c17 -D_POSIX_C_SOURCE=200809L $(WARNC) -Wno-unused-const-variable $(call inc,$(h)) $(call isa,$(h:.h=.c)) \
-	    -include $(h) -x c -fsyntax-only - &&) true
-	@$(foreach h,criterion.h criterion_kit.h host.h,$(CC) -std=c99 $(WARNC) $(API) -x c -fsyntax-only plugin-api/include/lull/$(h) &&) true
-	@$(foreach h,criterion.h criterion_kit.h host.h,$(CXX) -std=c++11 $(WARN) $(API) -x c++ -fsyntax-only plugin-api/include/lull/$(h) &&) true
-	@! clang-format --version 2>/dev/null | grep -q 'version 14' || clang-format --dry-run -Werror $$(git ls-files '*.[ch]' '*.cpp')
-abi-check: $(OUT)/tests/abi/api_layout ## the layouts of the ABI and the host library are the frozen ones (plugin-api/*layout-1.txt)
+	@$(foreach h,$(HEADERS), \
+	    echo "extern int unused;" | $(C_LOOK) $(call inc,$(h)) $(call isa,$(h)) -include $(h) -x c $(LOOK) - &&) true
+	@$(foreach h,$(PUBLIC),$(CC) -std=c99 $(WARNC) $(API) -x c $(LOOK) $(h) &&) true
+	@$(foreach h,$(PUBLIC),$(CXX) -std=c++11 $(WARN) $(API) -x c++ $(LOOK) $(h) &&) true
+	@! clang-format --version 2>/dev/null | grep -q 'version 14' || \
+	    clang-format --dry-run -Werror $$(git ls-files '*.[ch]' '*.cpp')
+abi-check: $(OUT)/tests/abi/api_layout ## the layouts of the ABI and the host library are the frozen ones
 	@$<
 
 # --- running -------------------------------------------------------------------------------------------------------------
 demo: setup ## install what is missing, build, render a scene with per-block stopping
 	@$(MAKE) --no-print-directory all
 	@scripts/demo
-bench: all $(BENCHES) ## measure speed as ratios, interleaved, against the peers that are installed; the table in docs/speed.md
+bench: all $(BENCHES) ## measure speed as ratios, interleaved, against the peers that are installed (docs/speed.md)
 	@scripts/lab bench --write
 cost: all ## measure what accuracy costs each criterion, from recordings in data/ (docs/cost.md)
 	@scripts/lab cost
 train-demo: all ## train a tiny model on a tiny bundled data set and show that it learns
 	@scripts/train-demo
 
-# FOLDER:MODE:FILE of everything that install puts below PREFIX and uninstall takes away; links stay links.
+# FOLDER:MODE:FILE of everything that install puts in place and uninstall takes away; links stay links.
+libdir := $(if $(filter /%,$(LIBDIR)),$(LIBDIR),$(PREFIX)/$(LIBDIR))
+share := $(PREFIX)/share
 put = $(foreach f,$(3),$(1):$(2):$(f))
-INSTALLED = $(call put,bin,755,$(PROGRAMS)) $(call put,lib/lull,755,$(CRITERIA)) $(call put,lib/lull/modules,755,$(MODULES)) \
-    $(call put,lib,755,$(HOST_LIB) $(HOST_LIB:.1=)) $(call put,lib/pkgconfig,644,$(PC_FILES)) \
-    $(call put,include/lull,644,$(wildcard plugin-api/include/lull/*.h)) \
-    $(call put,share/man/man1,644,$(wildcard docs/man/*.1)) $(call put,share/man/man7,644,$(wildcard docs/man/*.7)) \
-    $(call put,share/bash-completion/completions,644,$(wildcard scripts/packages/completions/*)) \
-    $(call put,share/lull,644,$(wildcard ggn/models/*.ggn)) $(call put,share/lull/study,644,$(wildcard ggn/study/page/*.*)) \
-    $(call put,share/lull/study/vendor,644,$(wildcard ggn/study/page/vendor/*))
-OWN_FOLDERS := lib/lull/modules lib/lull include/lull share/lull/study/vendor share/lull/study share/lull
+INSTALLED = $(call put,$(PREFIX)/bin,755,$(PROGRAMS)) \
+    $(call put,$(PREFIX)/include/lull,644,$(wildcard plugin-api/include/lull/*.h)) \
+    $(call put,$(libdir),755,$(HOST_LIB) $(HOST_LIB:.1=)) $(call put,$(libdir)/pkgconfig,644,$(PC_FILES)) \
+    $(call put,$(libdir)/cmake/lull,644,$(CMAKE_FILES)) \
+    $(call put,$(libdir)/lull,755,$(CRITERIA)) $(call put,$(libdir)/lull/modules,755,$(MODULES)) \
+    $(call put,$(share)/man/man1,644,$(wildcard docs/man/*.1)) $(call put,$(share)/man/man7,644,$(wildcard docs/man/*.7)) \
+    $(call put,$(share)/bash-completion/completions,644,$(wildcard scripts/packages/completions/*)) \
+    $(call put,$(share)/lull,644,$(wildcard ggn/models/*.ggn)) \
+    $(call put,$(share)/lull/study,644,$(wildcard ggn/study/page/*.*)) \
+    $(call put,$(share)/lull/study/vendor,644,$(wildcard ggn/study/page/vendor/*))
+OWN_FOLDERS = $(libdir)/lull/modules $(libdir)/lull $(libdir)/cmake/lull $(PREFIX)/include/lull \
+    $(share)/lull/study/vendor $(share)/lull/study $(share)/lull
+# Where LIBDIR is elsewhere, this link: programs find their criteria and modules in ../lib/lull.
+OWN_LINK = $(filter-out $(libdir)/lull,$(PREFIX)/lib/lull)
 PC_FILES := $(OUT)/lull-criterion.pc $(OUT)/lull-host.pc
-.PHONY: $(PC_FILES)
-$(PC_FILES): $(OUT)/%.pc: plugin-api/%.pc.in
-	@mkdir -p $(@D); sed 's|@PREFIX@|$(PREFIX)|g' $< >$@
+CMAKE_FILES := $(OUT)/lull-config.cmake $(OUT)/lull-config-version.cmake
+VERSION = $(shell sed -n 's/^version = "\(.*\)"/\1/p' plugin-api/python/pyproject.toml)
+.PHONY: $(PC_FILES) $(CMAKE_FILES)
+$(PC_FILES) $(CMAKE_FILES): $(OUT)/%: plugin-api/%.in
+	@mkdir -p $(@D)
+	@sed -e 's|@PREFIX@|$(PREFIX)|g' -e 's|@LIBDIR@|$(patsubst $(PREFIX)/%,$${prefix}/%,$(libdir))|g' \
+	    -e 's|@VERSION@|$(VERSION)|g' \
+	    -e "s|@UP@|$$(realpath -ms --relative-to=$(libdir)/cmake/lull $(PREFIX))|g" $< >$@
 
-install: all $(PC_FILES) ## install under $(DESTDIR)$(PREFIX): programs, criteria, host library, headers, models, man pages, completions
+install: all $(PC_FILES) $(CMAKE_FILES) ## install programs, libraries, headers, models, pages under $(DESTDIR)$(PREFIX)
 	@for i in $(INSTALLED); do \
-	    folder=$(DESTDIR)$(PREFIX)/$${i%%:*} file=$${i##*:} mode=$${i#*:}; \
+	    folder=$(DESTDIR)$${i%%:*} file=$${i##*:} mode=$${i#*:}; \
 	    install -d $$folder || exit 1; \
 	    if [ -h $$file ]; then cp -P $$file $$folder; else install -m $${mode%%:*} $$file $$folder; fi || exit 1; done
+	@$(if $(OWN_LINK),install -d $(DESTDIR)$(PREFIX)/lib && ln -srfn $(DESTDIR)$(libdir)/lull $(DESTDIR)$(OWN_LINK))
 	@echo "  installed $(words $(INSTALLED)) files under $(DESTDIR)$(PREFIX)"
 uninstall: ## remove what install put under $(DESTDIR)$(PREFIX)
-	@for i in $(INSTALLED); do rm -f $(DESTDIR)$(PREFIX)/$${i%%:*}/$${i##*/} || exit 1; done
-	@for f in $(OWN_FOLDERS); do [ ! -d $(DESTDIR)$(PREFIX)/$$f ] || rmdir --ignore-fail-on-non-empty $(DESTDIR)$(PREFIX)/$$f; done
+	@for i in $(INSTALLED); do rm -f $(DESTDIR)$${i%%:*}/$${i##*/} || exit 1; done
+	@$(if $(OWN_LINK),[ ! -h $(DESTDIR)$(OWN_LINK) ] || rm $(DESTDIR)$(OWN_LINK))
+	@for f in $(OWN_FOLDERS); do [ ! -d $(DESTDIR)$$f ] || rmdir --ignore-fail-on-non-empty $(DESTDIR)$$f; done
 
 wheel: $(BUNDLED) ## make the Python package with host library, criteria and model in build/wheel
 	@scripts/packages/bundle wheel $(BUNDLED)
@@ -396,17 +446,16 @@ deb: all ## make the Debian packages lull, liblull-host1 and lull-dev in build/d
 man: all ## write docs/man/*.1 from --help and docs/man/*.h2m (needs help2man)
 	@docs/man/write
 
+# What `make -n` would compile, for editors; the program of a wheel or a test is built by the same rule.
 compdb: ## write compile_commands.json
-	@{ echo '['; sep=; for f in $(BASE_SRC) $(PT_SRC) $(IMAGES_SRC) $(PT_MAIN) $(GGN_SRC) $(GGN_PLUGIN) $(GGN_ENTRIES) $(STUDY_SRC) $(STUDY_MAIN) $(GGN_CLI) $(HOST_SRC) $(LOADER_SRC) $(EXAMPLE_SRC) $(TOOL_SRC) $(MPI_SRC); do \
-	  printf '%s' "$$sep"; $(MAKE) --no-print-directory -s compdb-one F=$$f; sep=,; done; echo ']'; } > compile_commands.json
-.PHONY: compdb-one
-compdb-one:
-	@echo '{"directory":"$(CURDIR)","file":"$(F)","command":"$(if $(filter %.cpp,$(F)),$(CXX) $(CXXFLAGS_ALL),$(CC) $(CFLAGS_ALL)) $(call inc,$(F)) $(call isa,$(F)) -c $(F)"}'
+	@mkdir -p build && $(MAKE) --no-print-directory -n -B all tests | sed -n -e 's/["\\]/\\&/g' \
+	    -e 's|^.* -c \([^ ]*\) -o \([^ ]*\)$$|{"directory":"$(CURDIR)","file":"\1","output":"\2","command":"&"},|p' | \
+	    sed -e '1s/^/[/' -e '$$s/,$$/]/' >build/compdb.part && mv build/compdb.part compile_commands.json
 
 clean: ## remove build/
 	rm -rf build compile_commands.json
 
 help: ## this list
-	@grep -hE '^[a-z][a-z -]*:.*## ' Makefile | sed -E 's/^([a-z -]+):[^#]*## /\1\t/' | awk -F'\t' '{printf "  %-12s %s\n", $$1, $$2}'
+	@sed -nE 's/^([a-z][a-z -]*):[^#]*## /\1\t/p' Makefile | awk -F'\t' '{ printf "  %-12s %s\n", $$1, $$2 }'
 
 -include $(shell find $(OBJ) -name '*.d' 2>/dev/null)

@@ -9,9 +9,9 @@
 
 int gp_model_find(const char *name, const char *variable, char *path, size_t room)
 {
-    /* build/lib/lull and build/MODE/lib/lull lie three and four folders below the tree's root */
-    static const char *const places[] = {".", "../share/lull", "../../share/lull", "../../../ggn/models",
-                                         "../../../../ggn/models"};
+    /* a prefix has us in lib/lull or lib/TRIPLET/lull; the tree in build/lib/lull and build/MODE/lib/lull */
+    static const char *const places[] = {
+        ".", "../share/lull", "../../share/lull", "../../../share/lull", "../../../ggn/models", "../../../../ggn/models"};
     static const char anchor = 0; /* an address inside this shared object */
     const char *named = variable ? getenv(variable) : NULL;
     char folder[4096] = ".";
@@ -32,7 +32,7 @@ int gp_model_find(const char *name, const char *variable, char *path, size_t roo
             return 1;
     }
     snprintf(path, room,
-             "no %s beside %.200s, in ../share/lull, ../../share/lull or the source tree's ggn/models; give model=FILE%s%s",
-             name, info.dli_fname ? info.dli_fname : "the criterion", variable ? " or set " : "", variable ? variable : "");
+             "no %s beside %.200s, in share/lull of its prefix or the source tree's ggn/models; give model=FILE%s%s", name,
+             info.dli_fname ? info.dli_fname : "the criterion", variable ? " or set " : "", variable ? variable : "");
     return 0;
 }

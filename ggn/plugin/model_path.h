@@ -4,10 +4,9 @@
 
 #include <stddef.h>
 
-/* The first of these that exists goes into path: the one that the environment
- * variable names (NULL: none); a file of this name beside the shared object; ../share/lull and ../../share/lull
- * from there (an installed tree); ggn/models of the source tree that it was built in. Without any, returns 0 and path holds
- * the list of places for the message. */
+/* The first of these that exists goes into path: the one that the environment variable names (NULL: none); a file of this
+ * name beside the shared object; share/lull of the prefix that it is installed in; ggn/models of the source tree that it was
+ * built in. Without any, returns 0 and path holds the list of places for the message. */
 int gp_model_find(const char *name, const char *variable, char *path, size_t room);
 
 #endif

@@ -35,7 +35,7 @@ t "an unknown criterion is one line" sh -c "! $example nobody $tmp/x.png 2>$tmp/
 # As it is installed: header, library, pkg-config.
 mkdir -p "$tmp/usr/lib/pkgconfig" "$tmp/usr/include/lull"
 cp "$lib" "$tmp/usr/lib" && ln -s liblull-host.so.1 "$tmp/usr/lib/liblull-host.so" && cp plugin-api/include/lull/*.h "$tmp/usr/include/lull"
-sed "s|@PREFIX@|$tmp/usr|g" plugin-api/lull-host.pc.in >"$tmp/usr/lib/pkgconfig/lull-host.pc"
+sed "s|@PREFIX@|$tmp/usr|g; s|@LIBDIR@|$tmp/usr/lib|g" plugin-api/lull-host.pc.in >"$tmp/usr/lib/pkgconfig/lull-host.pc"
 san=
 nm -D "$lib" | grep -q __asan_init && san=-fsanitize=address,undefined
 t "builds against an installed copy" sh -c "PKG_CONFIG_PATH=$tmp/usr/lib/pkgconfig && export PKG_CONFIG_PATH &&

@@ -493,7 +493,7 @@ static void refusals(void **state)
     assert_int_equal(gp_model_find("no-such.ggn", "GGN_TEST_MODEL", found, sizeof found), 0);
     assert_int_equal(strncmp(found, "no no-such.ggn beside ", 22), 0);
     const char *places =
-        ", in ../share/lull, ../../share/lull or the source tree's ggn/models; give model=FILE or set GGN_TEST_MODEL";
+        ", in share/lull of its prefix or the source tree's ggn/models; give model=FILE or set GGN_TEST_MODEL";
     assert_string_equal(found + strlen(found) - strlen(places), places);
     assert_int_equal(gp_model_find("no-such.ggn", NULL, found, sizeof found), 0);
     assert_string_equal(found + strlen(found) - 16, " give model=FILE");

@@ -40,7 +40,8 @@ def main() -> int:
     for info in found:
         ready = _trial(f"{info.path}:{info.id}", denoiser)
         print(f"criterion   {info.id:<12}{info.version:<5}{ready}  ({info.path})")
-    folders = {(Path(info.path).parent / at).resolve() for info in found for at in (".", "../../share/lull", "../../../ggn/models")}
+    places = (".", "../../share/lull", "../../../share/lull", "../../../ggn/models")
+    folders = {(Path(info.path).parent / at).resolve() for info in found for at in places}
     for path in sorted(path for folder in folders for path in folder.glob("*.ggn")):
         print(f"model       {path}")
     print(f"denoiser    {denoiser}")

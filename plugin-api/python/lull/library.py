@@ -9,6 +9,7 @@ import importlib.util
 import os
 import shutil
 import sys
+import sysconfig
 import warnings
 from pathlib import Path
 from typing import Any, Iterable, NamedTuple, Optional
@@ -57,13 +58,14 @@ class Info(NamedTuple):
 
 def search_path() -> list[str]:
     """Where the library is looked for: above the folders of LULL_PLUGIN_PATH, in the package itself (a wheel has it there),
-    in ../lib beside a `lull-render` on PATH, in the build tree that this package lies in, in the usual prefixes."""
+    in the prefix of a `lull-render` on PATH, in the build tree that this package lies in, in the usual prefixes."""
     folders = [Path(f).resolve().parent for f in os.environ.get("LULL_PLUGIN_PATH", "").split(os.pathsep) if f]
     folders += [CARRIED]
     program = shutil.which("lull-render")
-    folders += [Path(program).resolve().parents[1] / "lib"] if program else []
+    libdirs = ["lib", "lib64", *(f"lib/{triplet}" for triplet in [sysconfig.get_config_var("MULTIARCH")] if triplet)]
+    folders += [Path(program).resolve().parents[1] / libdir for libdir in libdirs] if program else []
     folders += [Path(__file__).resolve().parents[3] / "build" / "lib"]
-    folders += [prefix / "lib" for prefix in (Path(sys.prefix), Path("/usr/local"), Path("/usr"))]
+    folders += [prefix / libdir for prefix in (Path(sys.prefix), Path("/usr/local"), Path("/usr")) for libdir in libdirs]
     return list(dict.fromkeys(map(str, folders)))
 
 
