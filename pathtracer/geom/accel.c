@@ -1,11 +1,11 @@
 #include "geom/accel.h"
 
-#include <embree3/rtcore.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "geom/embree.h"
 #include "geom/quadric.h"
 
 struct pt_accel {
@@ -38,8 +38,11 @@ union lane {
     uint32_t u;
 };
 enum { ORG_X, ORG_Y, ORG_Z, TNEAR, DIR_X, DIR_Y, DIR_Z, TIME, TFAR, MASK, RAY_ID, FLAGS, RAY_FIELDS };
-enum { NG_X = RAY_FIELDS, NG_Y, NG_Z, HIT_U, HIT_V, PRIM_ID, GEOM_ID, INST_ID, FIELDS };
-_Static_assert(sizeof(struct RTCRayHit16) == 16 * FIELDS * sizeof(union lane), "Embree has several levels of instances");
+enum { NG_X = RAY_FIELDS, NG_Y, NG_Z, HIT_U, HIT_V, PRIM_ID, GEOM_ID, INST_ID, OUR_FIELDS };
+/* Embree 4 has one more, for instances that are arrays. */
+enum { FIELDS = sizeof(struct RTCRayHit16) / (16 * sizeof(union lane)) };
+_Static_assert(RTC_MAX_INSTANCE_LEVEL_COUNT == 1 && (int)FIELDS >= (int)OUR_FIELDS,
+               "Embree has several levels of instances");
 
 /* Ray i of n. */
 static int quadric_query(const struct pt_quadric *q, const union lane *rays, unsigned n, unsigned i, float *t,
@@ -319,13 +322,11 @@ static inline void name_shape(const struct pt_scene *scene, unsigned geometry, u
 
 int pt_accel_intersect(const struct pt_scene *scene, const struct pt_ray *ray, struct pt_hit *hit)
 {
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
     struct RTCRayHit rh;
     rh.ray = make_ray(ray);
     rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(scene->accel->world, &context, &rh);
+    pt_embree_intersect1(scene->accel->world, &rh);
     hit->t = rh.ray.tfar;
     hit->u = rh.hit.u;
     hit->v = rh.hit.v;
@@ -337,17 +338,14 @@ int pt_accel_intersect(const struct pt_scene *scene, const struct pt_ray *ray, s
 
 int pt_accel_occluded(const struct pt_scene *scene, const struct pt_ray *ray)
 {
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
     struct RTCRay r = make_ray(ray);
-    rtcOccluded1(scene->accel->world, &context, &r);
+    pt_embree_occluded1(scene->accel->world, &r);
     return r.tfar < 0.0f;
 }
 
 struct packet {
     _Alignas(64) union lane lanes[FIELDS * 16];
     _Alignas(64) int valid[16];
-    struct RTCIntersectContext context;
 };
 
 static inline void put_ray(const struct pt_ray *from, union lane *lanes, int n, int i)
@@ -366,20 +364,18 @@ static inline void put_ray(const struct pt_ray *from, union lane *lanes, int n, 
 }
 
 /* How many of `count` rays go together next, each in a lane of n. */
-static inline int packet_begin(struct packet *p, int count, int n, int coherent)
+static inline int packet_begin(struct packet *p, int count, int n)
 {
     count = count < n ? count : n;
-    rtcInitIntersectContext(&p->context);
-    p->context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
     for (int i = 0; i < n; i++)
         p->valid[i] = i < count ? -1 : 0;
     return count;
 }
 
 /* The first rays of a list of `count`, as many as go together. Lanes without one hold a ray all the same. */
-static inline int packet_fill(struct packet *p, const struct pt_ray *const *rays, int count, int n, int coherent)
+static inline int packet_fill(struct packet *p, const struct pt_ray *const *rays, int count, int n)
 {
-    count = packet_begin(p, count, n, coherent);
+    count = packet_begin(p, count, n);
     for (int i = 0; i < n; i++)
         put_ray(rays[i < count ? i : 0], p->lanes, n, i);
     return count;
@@ -409,10 +405,9 @@ static inline __attribute__((always_inline)) void put_lanes(struct packet *p, co
     }
 }
 
-static inline int packet_fill_lanes(struct packet *p, const struct pt_ray_lanes *rays, int first, int count, int n,
-                                    int coherent)
+static inline int packet_fill_lanes(struct packet *p, const struct pt_ray_lanes *rays, int first, int count, int n)
 {
-    count = packet_begin(p, count - first, n, coherent);
+    count = packet_begin(p, count - first, n);
     if (n == 16)
         put_lanes(p, rays, first, count, 16);
     else if (n == 8)
@@ -428,28 +423,16 @@ static inline struct pt_ray lane_ray(const struct pt_ray_lanes *rays, int i)
                            v3(rays->direction[0][i], rays->direction[1][i], rays->direction[2][i]), 0.0f, rays->t_max, 0.0f};
 }
 
-static void packet_intersect(const struct pt_scene *scene, struct packet *p, int n)
+static void packet_intersect(const struct pt_scene *scene, struct packet *p, int n, int coherent)
 {
-    RTCScene world = scene->accel->world;
     for (int i = 0; i < n; i++)
         p->lanes[GEOM_ID * n + i].u = p->lanes[INST_ID * n + i].u = RTC_INVALID_GEOMETRY_ID;
-    if (n == 16)
-        rtcIntersect16(p->valid, world, &p->context, (struct RTCRayHit16 *)p->lanes);
-    else if (n == 8)
-        rtcIntersect8(p->valid, world, &p->context, (struct RTCRayHit8 *)p->lanes);
-    else
-        rtcIntersect4(p->valid, world, &p->context, (struct RTCRayHit4 *)p->lanes);
+    pt_embree_intersect(scene->accel->world, n, p->valid, p->lanes, coherent);
 }
 
 static void packet_occluded(const struct pt_scene *scene, struct packet *p, int n)
 {
-    RTCScene world = scene->accel->world;
-    if (n == 16)
-        rtcOccluded16(p->valid, world, &p->context, (struct RTCRay16 *)p->lanes);
-    else if (n == 8)
-        rtcOccluded8(p->valid, world, &p->context, (struct RTCRay8 *)p->lanes);
-    else
-        rtcOccluded4(p->valid, world, &p->context, (struct RTCRay4 *)p->lanes);
+    pt_embree_occluded(scene->accel->world, n, p->valid, p->lanes);
 }
 
 /* What ray i of n has met. */
@@ -469,8 +452,8 @@ void pt_accel_intersect_many(const struct pt_scene *scene, const struct pt_ray *
     struct packet p;
     int n = scene->accel->packet;
     while (count > 1 && n > 1) {
-        int filled = packet_fill(&p, rays, count, n, coherent);
-        packet_intersect(scene, &p, n);
+        int filled = packet_fill(&p, rays, count, n);
+        packet_intersect(scene, &p, n, coherent);
         for (int i = 0; i < filled; i++)
             take_hit(scene, &p, n, i, hits[i]);
         count -= filled;
@@ -487,8 +470,8 @@ void pt_accel_intersect_lanes(const struct pt_scene *scene, const struct pt_ray_
     struct packet p;
     int n = scene->accel->packet, done = 0;
     while (count - done > 1 && n > 1) {
-        int filled = packet_fill_lanes(&p, rays, done, count, n, coherent);
-        packet_intersect(scene, &p, n);
+        int filled = packet_fill_lanes(&p, rays, done, count, n);
+        packet_intersect(scene, &p, n, coherent);
         for (int i = 0; i < filled; i++)
             take_hit(scene, &p, n, i, &hits[done + i]);
         done += filled;
@@ -504,7 +487,7 @@ void pt_accel_occluded_many(const struct pt_scene *scene, const struct pt_ray *c
     struct packet p;
     int n = scene->accel->packet;
     while (count > 1 && n > 1) {
-        int filled = packet_fill(&p, rays, count, n, 0);
+        int filled = packet_fill(&p, rays, count, n);
         packet_occluded(scene, &p, n);
         for (int i = 0; i < filled; i++)
             occluded[i] = p.lanes[TFAR * n + i].f < 0.0f;
@@ -521,7 +504,7 @@ void pt_accel_occluded_lanes(const struct pt_scene *scene, const struct pt_ray_l
     struct packet p;
     int n = scene->accel->packet, done = 0;
     while (count - done > 1 && n > 1) {
-        int filled = packet_fill_lanes(&p, rays, done, count, n, 0);
+        int filled = packet_fill_lanes(&p, rays, done, count, n);
         packet_occluded(scene, &p, n);
         for (int i = 0; i < filled; i++)
             occluded[done + i] = p.lanes[TFAR * n + i].f < 0.0f;

@@ -9,13 +9,14 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include <embree3/rtcore.h>
-
 static int held_devices;
 
-__attribute__((visibility("default"))) RTCDevice rtcNewDevice(const char *config)
+/* As Embree 3 and 4 declare it, whose device is a pointer. */
+__attribute__((visibility("default"))) void *rtcNewDevice(const char *config);
+
+void *rtcNewDevice(const char *config)
 {
-    RTCDevice (*embree)(const char *config);
+    void *(*embree)(const char *config);
     const char *isa = getenv("EMBREE_ISA");
     char held[64];
     *(void **)&embree = dlsym(RTLD_NEXT, "rtcNewDevice");

@@ -1,0 +1,64 @@
+#ifndef PT_GEOM_EMBREE_H
+#define PT_GEOM_EMBREE_H
+/*
+ * Embree 3 or 4, for accel.c only: PT_EMBREE, which the Makefile says, is the one that is included, and these functions are
+ * what the two are asked differently. Rays are the caller's, one or a packet of n = 4, 8 or 16 in Embree's order, of which
+ * those take part that are -1 in valid[n]. Any number of threads may ask a committed scene.
+ */
+#if PT_EMBREE == 4
+#include <embree4/rtcore.h>
+
+/* The arguments of a query, by which Embree 4 is told what 3 had in the context. */
+#define PT_EMBREE_ARGUMENTS(kind, coherent) \
+    struct RTCRayQueryContext context; \
+    struct RTC##kind##Arguments query; \
+    rtcInitRayQueryContext(&context); \
+    rtcInit##kind##Arguments(&query); \
+    query.context = &context; \
+    query.flags = (coherent) ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT
+#define PT_EMBREE_ASK(function, rays, ...) function(__VA_ARGS__, rays, &query)
+#else
+#include <embree3/rtcore.h>
+
+#define PT_EMBREE_ARGUMENTS(kind, coherent) \
+    struct RTCIntersectContext query; \
+    rtcInitIntersectContext(&query); \
+    query.flags = (coherent) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT
+#define PT_EMBREE_ASK(function, rays, ...) function(__VA_ARGS__, &query, rays)
+#endif
+
+static inline void pt_embree_intersect1(RTCScene scene, struct RTCRayHit *ray)
+{
+    PT_EMBREE_ARGUMENTS(Intersect, 0);
+    PT_EMBREE_ASK(rtcIntersect1, ray, scene);
+}
+
+static inline void pt_embree_occluded1(RTCScene scene, struct RTCRay *ray)
+{
+    PT_EMBREE_ARGUMENTS(Occluded, 0);
+    PT_EMBREE_ASK(rtcOccluded1, ray, scene);
+}
+
+/* Neighbours that are `coherent` go the same way through the scene. */
+static inline void pt_embree_intersect(RTCScene scene, int n, const int *valid, void *rays, int coherent)
+{
+    PT_EMBREE_ARGUMENTS(Intersect, coherent);
+    if (n == 16)
+        PT_EMBREE_ASK(rtcIntersect16, (struct RTCRayHit16 *)rays, valid, scene);
+    else if (n == 8)
+        PT_EMBREE_ASK(rtcIntersect8, (struct RTCRayHit8 *)rays, valid, scene);
+    else
+        PT_EMBREE_ASK(rtcIntersect4, (struct RTCRayHit4 *)rays, valid, scene);
+}
+
+static inline void pt_embree_occluded(RTCScene scene, int n, const int *valid, void *rays)
+{
+    PT_EMBREE_ARGUMENTS(Occluded, 0);
+    if (n == 16)
+        PT_EMBREE_ASK(rtcOccluded16, (struct RTCRay16 *)rays, valid, scene);
+    else if (n == 8)
+        PT_EMBREE_ASK(rtcOccluded8, (struct RTCRay8 *)rays, valid, scene);
+    else
+        PT_EMBREE_ASK(rtcOccluded4, (struct RTCRay4 *)rays, valid, scene);
+}
+#endif
