@@ -67,11 +67,12 @@ static void patch_means(double *columns, int width, int rows, double *means)
     for (int k = 0; k < parts(width); k++) {
         int begin = part_begin(width, k), end = part_begin(width, k + 1);
         double sum = 0.0;
-        for (int x = begin; x < end; x++)
+        for (int x = begin; x < end; x++) {
             sum += columns[x];
+            columns[x] = 0.0;
+        }
         means[k] = sum / ((double)(end - begin) * rows);
     }
-    memset(columns, 0, (size_t)width * sizeof *columns);
 }
 
 size_t ggn_visibility_scratch(int width) { return (SUMS + 1) * ((size_t)width + 2 * RADIUS) + (size_t)parts(width); }

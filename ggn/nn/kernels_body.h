@@ -450,6 +450,8 @@ static void up_grad(real *restrict dx, const real *restrict dy, int add, int h, 
 {
     const real q = (real)0.25, t = (real)0.75;
     real column[2 * GGN_MAX_SIDE];
+    if (w < 1) /* never; gcc 14 takes the column for unset otherwise */
+        return;
 
     for (int r = 0; r < h; r++, dx += row_x) {
         const real *restrict b = dy + 2L * r * row_y, *restrict c = b + row_y;

@@ -11,6 +11,8 @@ enum { N_TAPS = 2 * GGN_SSIM_RADIUS + 1, N_MAPS = 9, BORDER = 16 };
 
 static const double C1 = 1e-4, C2 = 9e-4, SIGMA = 1.5;
 
+enum { BATCH = 64 }; /* planes whose sums are kept at a time */
+
 struct ggn_ssim {
     const struct ggn_kernels *kernels;
     struct base_threads *threads;
@@ -23,8 +25,8 @@ struct ggn_ssim {
     const real *const *x, *const *y;
     real *const *dx;
     int in_row;
-    double grad_scale; /* per pixel */
-    double *plane_sum; /* [n] */
+    double grad_scale;       /* per pixel */
+    double plane_sum[BATCH]; /* of the planes that are at work */
 };
 
 /* The published window is an 11×11 array of single-precision products whose sum is 1 − 7e-8. Since σ² = E[x²] − μ² is a
@@ -140,7 +142,7 @@ static double ssim_row(const struct ggn_ssim *s, int worker, long at)
 
 static void ssim_plane(void *data, long i, int worker)
 {
-    const struct ggn_ssim *s = data;
+    struct ggn_ssim *s = data;
     real *mx = map_of(s, worker, X), *my = map_of(s, worker, Y), *exx = map_of(s, worker, XX), *eyy = map_of(s, worker, YY);
     real *exy = map_of(s, worker, XY);
     double total = 0;
@@ -183,12 +185,10 @@ static void ssim_plane(void *data, long i, int worker)
 double ggn_ssim_mean(struct ggn_ssim *s, const real *const *x, const real *const *y, real *const *dx, int n, int row,
                      double grad_scale)
 {
-    enum { BATCH = 64 }; /* planes whose sums are kept at a time */
-    double sums[BATCH], total = 0, pixels = (double)n * s->h * s->w;
+    double total = 0, pixels = (double)n * s->h * s->w;
 
     s->in_row = row;
     s->grad_scale = grad_scale / pixels;
-    s->plane_sum = sums;
     for (int first = 0; first < n; first += BATCH) {
         int count = n - first < BATCH ? n - first : BATCH;
         s->x = x + first;
@@ -200,7 +200,7 @@ double ggn_ssim_mean(struct ggn_ssim *s, const real *const *x, const real *const
             for (int i = 0; i < count; i++)
                 ssim_plane(s, i, 0);
         for (int i = 0; i < count; i++)
-            total += sums[i];
+            total += s->plane_sum[i];
     }
     return total / pixels;
 }
