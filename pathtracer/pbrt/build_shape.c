@@ -47,12 +47,11 @@ static struct placement place(struct pt_builder *b, const struct pt_state *s, co
 }
 
 /* What every shape has: material, alpha, media, side, light. */
-static struct pt_shape common(struct pt_builder *b, const struct pt_state *s, struct pt_params *p,
-                              const struct placement *pl)
+static struct pt_shape common(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
 {
     struct pt_shape shape = {.light = -1, .medium_in = s->medium_in, .medium_out = s->medium_out};
     shape.material = s->material >= 0 ? s->material : pt_build_default_material(b);
-    shape.flip_normal = (s->reverse_orientation != 0) != (pt_xform_det(&pl->xform) < 0);
+    shape.flip_normal = s->reverse_orientation != 0;
     shape.alpha = pt_build_float_input(b, p, "alpha", 1);
     if (!shape.alpha.texture && shape.alpha.value.x == 1 && shape.material >= 0) {
         const struct pt_material_info *info = &((struct pt_material_info *)b->material_infos.items)[shape.material];
@@ -200,10 +199,13 @@ int pt_build_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_para
     for (size_t k = 0; k < 3; k++)
         probe[k] = value(soup->pd, soup->pf, k);
     struct placement pl = place(b, s, p, probe);
-    struct pt_shape shape = common(b, s, p, &pl);
+    struct pt_shape shape = common(b, s, p);
     if (b->diag.rc || store_mesh(b, s, p, soup, &pl.xform, &mesh) != 0)
         return b->diag.rc;
     shape.kind = PT_SHAPE_MESH;
+    /* corners that a mirroring transform has moved go round the other way; a quadric's normal it carries along */
+    if (pt_xform_det(&pl.xform) < 0)
+        shape.flip_normal = !shape.flip_normal;
     shape.data = pt_list_add(b, &b->meshes, &mesh);
     return add_shape(b, s, p, &pl, &shape, s->area.on && s->area.power > 0 ? mesh_area(&mesh) : 0);
 }
@@ -317,7 +319,7 @@ static int add_quadric(struct pt_builder *b, const struct pt_state *s, struct pt
     const double probe[3] = {0, 0, 0};
     struct pt_xform inverse;
     struct placement pl = place(b, s, p, probe);
-    struct pt_shape shape = common(b, s, p, &pl);
+    struct pt_shape shape = common(b, s, p);
     if (!pt_xform_invert(&pl.xform, &inverse))
         return pt_diag_fail(&b->diag, p->loc, "singular transform of a shape");
     q->phi_max = (float)(pt_params_float_in(p, "phimax", 360, 1e-3, 360) * pi / 180);
