@@ -6,6 +6,7 @@
 
 #include "pbrt/build.h"
 #include "pbrt/ply.h"
+#include "shade/light_area.h"
 
 static const double pi = 3.14159265358979323846;
 
@@ -306,14 +307,6 @@ static int make_ply_mesh(struct pt_builder *b, const struct pt_state *s, struct 
 
 /* --- quadrics ---------------------------------------------------------------------------------------------------------- */
 
-static double quadric_area(const struct pt_quadric *q, const struct pt_xform *t)
-{
-    double r = (double)q->radius, phi = (double)q->phi_max, height = (double)q->z_max - (double)q->z_min;
-    double inner = (double)q->inner_radius;
-    double own = q->kind == PT_QUADRIC_DISK ? 0.5 * phi * (r * r - inner * inner) : phi * r * height;
-    return own * pow(fabs(pt_xform_det(t)), 2.0 / 3.0); /* exact for uniform scales */
-}
-
 static int add_quadric(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, struct pt_quadric *q)
 {
     const double probe[3] = {0, 0, 0};
@@ -330,7 +323,7 @@ static int add_quadric(struct pt_builder *b, const struct pt_state *s, struct pt
     shape.kind = PT_SHAPE_QUADRIC;
     shape.data = pt_list_add(b, &b->quadrics, q);
     pt_builder_effect(b, PT_FX_QUADRIC, p->loc);
-    return add_shape(b, s, p, &pl, &shape, quadric_area(q, &pl.xform));
+    return add_shape(b, s, p, &pl, &shape, s->area.on && s->area.power > 0 ? pt_light_quadric_area(q) : 0);
 }
 
 static int make_sphere(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)

@@ -4,6 +4,17 @@
 
 #include "geom/quadric.h"
 
+/* The factor by which a similarity scales lengths; 0 when the transform is none. */
+static float similarity(const struct pt_mat34 *t)
+{
+    const float *m = t->m;
+    pt_vec3 x = v3(m[0], m[4], m[8]), y = v3(m[1], m[5], m[9]), z = v3(m[2], m[6], m[10]);
+    float xx = v3_dot(x, x), tolerance = 1e-4f * xx;
+    int similar = fabsf(v3_dot(y, y) - xx) < tolerance && fabsf(v3_dot(z, z) - xx) < tolerance &&
+                  fabsf(v3_dot(x, y)) < tolerance && fabsf(v3_dot(x, z)) < tolerance && fabsf(v3_dot(y, z)) < tolerance;
+    return similar ? sqrtf(xx) : 0.0f;
+}
+
 /* A whole sphere under a similarity has its centre and radius in render space; else the radius is 0. */
 static float whole_sphere(const struct pt_quadric *q, pt_vec3 *centre)
 {
@@ -11,16 +22,15 @@ static float whole_sphere(const struct pt_quadric *q, pt_vec3 *centre)
     *centre = v3(m[3], m[7], m[11]);
     if (q->kind != PT_QUADRIC_SPHERE || q->z_min > -q->radius || q->z_max < q->radius || q->phi_max < 2.0f * PT_PI - 1e-4f)
         return 0.0f;
-    pt_vec3 x = v3(m[0], m[4], m[8]), y = v3(m[1], m[5], m[9]), z = v3(m[2], m[6], m[10]);
-    float xx = v3_dot(x, x), tolerance = 1e-4f * xx;
-    int similar = fabsf(v3_dot(y, y) - xx) < tolerance && fabsf(v3_dot(z, z) - xx) < tolerance &&
-                  fabsf(v3_dot(x, y)) < tolerance && fabsf(v3_dot(x, z)) < tolerance && fabsf(v3_dot(y, z)) < tolerance;
-    return similar ? q->radius * sqrtf(xx) : 0.0f;
+    return q->radius * similarity(&q->to_render);
 }
 
 /* A point of the sphere itself counts as inside: its own rounding must not decide which way it is lit, and from outside only
  * the near half is sampled, which for an inner side is the point itself. */
 #define ON_SPHERE 0.99999f
+
+/* Steps in which the area of a stretched quadric is summed up: within 1e-4 of it however flat or long the transform makes it. */
+enum { AREA_STEPS = 256 };
 
 /* 1 - cos of the half angle of the cone that the sphere fills, 0 when seen from inside. Without cancellation:
  * 1 - cos θ = sin² θ / (1 + cos θ). */
@@ -68,17 +78,35 @@ static pt_vec3 point_on(const struct pt_quadric *q, float u0, float u1, pt_vec3 
     return v3(rho * c, rho * s, z);
 }
 
-float pt_light_quadric_area(const struct pt_quadric *q)
+/* Mean of the area scale over a sphere or a cylinder, or what is left of it, weighted by area: the midpoint rule over φ and, as the
+ * integrand is smooth in it, the polar angle θ. */
+static double mean_area_scale(const struct pt_quadric *q)
 {
-    /* exact for similarities and disks; an estimate by six normals otherwise, used for selection only */
-    static const pt_vec3 axes[3] = {{1.0f, 0.0f, 0.0f}, {0.0f, 1.0f, 0.0f}, {0.0f, 0.0f, 1.0f}};
+    float z0 = fmaxf(-1.0f, q->z_min / q->radius), z1 = fminf(1.0f, q->z_max / q->radius);
+    float sin_theta[AREA_STEPS] = {1.0f}, cos_theta[AREA_STEPS] = {0.0f};
+    int n = q->kind == PT_QUADRIC_SPHERE ? AREA_STEPS : 1;
+    for (int k = 0; k < n && n > 1; k++) {
+        float theta = acosf(z1) + (acosf(z0) - acosf(z1)) * ((float)k + 0.5f) / AREA_STEPS;
+        sin_theta[k] = sinf(theta);
+        cos_theta[k] = cosf(theta);
+    }
+    double sum = 0.0, weights = 0.0;
+    for (int i = 0; i < AREA_STEPS; i++) {
+        float phi = q->phi_max * ((float)i + 0.5f) / AREA_STEPS, c = cosf(phi), s = sinf(phi);
+        for (int k = 0; k < n; k++) {
+            sum += (double)(sin_theta[k] * area_scale(q, v3(sin_theta[k] * c, sin_theta[k] * s, cos_theta[k])));
+            weights += (double)sin_theta[k];
+        }
+    }
+    return sum / weights;
+}
+
+double pt_light_quadric_area(const struct pt_quadric *q)
+{
+    double own = (double)area_of(q), scale = (double)similarity(&q->to_render);
     if (q->kind == PT_QUADRIC_DISK)
-        return area_of(q) * area_scale(q, axes[2]);
-    int n = q->kind == PT_QUADRIC_CYLINDER ? 2 : 3;
-    float scale = 0.0f;
-    for (int i = 0; i < n; i++)
-        scale += area_scale(q, axes[i]) / (float)n;
-    return area_of(q) * scale;
+        return own * (double)area_scale(q, v3(0.0f, 0.0f, 1.0f));
+    return own * (scale > 0.0 ? scale * scale : mean_area_scale(q));
 }
 
 static int finish(const struct pt_light *light, const struct pt_shape *shape, pt_vec3 p_ref, pt_vec3 p, pt_vec3 n_out,

@@ -6,8 +6,8 @@
 #include "geom/offset.h"
 #include "shade/light_tree.h"
 
-/* Area in render space. */
-float pt_light_quadric_area(const struct pt_quadric *q);
+/* Area in render space, within 1e-4 of it. */
+double pt_light_quadric_area(const struct pt_quadric *q);
 
 /* Out of line: quadrics are rare as lights. 0 when the point cannot be lit. */
 int pt_light_quadric_sample(const struct pt_scene *scene, const struct pt_emitter *e, pt_vec3 p_ref, float u0, float u1,

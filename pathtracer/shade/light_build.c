@@ -100,7 +100,7 @@ static void fill(struct pt_scene *scene, double *weights)
             if (e->primitive >= 0)
                 area = triangle_emitter(scene, shape, k, e);
             else if (shape)
-                area = (double)pt_light_quadric_area(&scene->quadrics[shape->data]);
+                area = pt_light_quadric_area(&scene->quadrics[shape->data]);
             weights[n] = power_of(scene, light, area);
         }
     }

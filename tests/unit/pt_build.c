@@ -130,6 +130,51 @@ static void lights(void **state)
     pt_scene_destroy(s);
 }
 
+/* A lamp of area A and power P has the radiance P/(π A), whatever transform made that area. */
+static void power_of_stretched_lamps(void **state)
+{
+    (void)state;
+    const double pi = 3.14159265358979323846, e2 = sqrt(0.75), e10 = sqrt(0.99);
+    /* c = 0.1: ∫ sqrt(c² + (1 - c²) z²) dz from -0.2 to 0.5, of the zone of a spheroid */
+    const double f1 = sqrt(0.01 + 0.99 * 0.25), f0 = sqrt(0.01 + 0.99 * 0.04);
+    const double zone = 0.5 * (0.5 * f1 + 0.2 * f0) + 0.01 / (2 * e10) * (asinh(0.5 * e10 / 0.1) + asinh(0.2 * e10 / 0.1));
+    const double ellipse =
+        9.688448220547676; /* the perimeter of one with the half axes 2 and 1 (Abramowitz & Stegun, 17.3.30) */
+    const struct {
+        const char *shape;
+        double area;
+    } cases[] = {
+        {"Scale 3 3 3 Shape \"disk\"", 9 * pi},
+        {"Scale 2 1 1 Shape \"disk\"", 2 * pi},
+        {"Scale 1 1 5 Shape \"disk\"", pi},
+        {"Scale 1 1 -.01 Shape \"disk\"", pi},
+        {"Scale 2 3 .1 Shape \"disk\" \"float phimax\" 90 \"float innerradius\" .5", 6 * pi / 4 * 0.75},
+        {"Scale -2 2 2 Shape \"sphere\"", 16 * pi},
+        {"Scale 2 1 1 Shape \"sphere\"", 2 * pi * (1 + 2 / e2 * asin(e2))},
+        {"Rotate 30 1 2 3 Scale 2 1 1 Rotate 50 3 2 1 Shape \"sphere\"", 2 * pi * (1 + 2 / e2 * asin(e2))},
+        {"Scale 1 1 .1 Shape \"sphere\"", 2 * pi * (1 + 0.01 / e10 * atanh(e10))},
+        {"Scale 1 1 .1 Shape \"sphere\" \"float phimax\" 90 \"float zmin\" 0", 2 * pi * (1 + 0.01 / e10 * atanh(e10)) / 8},
+        {"Scale 1 1 .1 Shape \"sphere\" \"float phimax\" 90 \"float zmin\" -.2 \"float zmax\" .5", pi / 2 * zone},
+        {"Scale 3 3 .3 Shape \"sphere\" \"float radius\" 2 \"float zmin\" -.4 \"float zmax\" 1", 36 * 2 * pi * zone},
+        {"Scale 1 1 .00001 Shape \"sphere\"", 2 * pi},
+        {"Scale 1 1 100000 Shape \"sphere\"", 1e5 * pi * pi},
+        {"Scale 1 1 3 Shape \"cylinder\"", 12 * pi},
+        {"Scale 1 1 -3 Shape \"cylinder\" \"float phimax\" 60 \"float zmin\" -.25", pi * 1.25},
+        {"Scale 2 1 1 Shape \"cylinder\"", 2 * ellipse},
+        {"Scale 2 1 5 Shape \"cylinder\" \"float phimax\" 90 \"float radius\" 3", 9 * 10 * ellipse / 12},
+        {"Scale 1 .00001 1 Shape \"cylinder\"", 8},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[400];
+        snprintf(text, sizeof text, "AreaLightSource \"diffuse\" \"float power\" 100 %s", cases[i].shape);
+        struct pt_scene *s = world_scene(text);
+        double got = (double)s->lights[0].emission.x, want = 100 / (pi * cases[i].area);
+        if (!(fabs(got / want - 1) < 1e-4)) /* what light_area.h promises */
+            fail_msg("%s: %.6g, not %.6g", cases[i].shape, got, want);
+        pt_scene_destroy(s);
+    }
+}
+
 static void materials_of_both_versions(void **state)
 {
     (void)state;
@@ -349,6 +394,7 @@ int main(void)
                                        cmocka_unit_test(far_from_the_origin),
                                        cmocka_unit_test(orientation),
                                        cmocka_unit_test(lights),
+                                       cmocka_unit_test(power_of_stretched_lamps),
                                        cmocka_unit_test(materials_of_both_versions),
                                        cmocka_unit_test(textures),
                                        cmocka_unit_test(media),

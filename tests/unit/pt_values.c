@@ -355,7 +355,7 @@ static void tell_quadrics(void)
         pt_vec3 lower, upper;
         pt_quadric_bounds(&q, &lower, &upper);
         words("quadric %d area", k);
-        number(pt_light_quadric_area(&q));
+        number((float)pt_light_quadric_area(&q));
         vector(lower);
         vector(upper);
         words("\n poles");
