@@ -124,6 +124,14 @@ static const struct lull_criterion *find_id(lull_entry_fn entry, uint32_t count,
     return NULL;
 }
 
+/* What the library holds, as "ID, ID …". */
+static void list_ids(lull_entry_fn entry, uint32_t count, char *text, size_t room)
+{
+    size_t used = 0;
+    for (uint32_t i = 0; i < count && used < room; i++)
+        used += (size_t)snprintf(text + used, room - used, "%s%s", i > 0 ? ", " : "", entry(i)->id);
+}
+
 /* --- directories ----------------------------------------------------------------------------------------------------- */
 
 /* lib/lull beside the running program's own folder: the build tree and the installed tree have the same shape. */
@@ -309,8 +317,11 @@ static int32_t open_path(const struct lull_search *search, const char *path, con
     if (status != LULL_OK)
         return status;
     const struct lull_criterion *c = !id ? entry(0) : find_id(entry, count, id);
-    if (!c)
-        return lull_error_set(err, LULL_E_KEY, "%s: holds no criterion with the id %s", path, id);
+    if (!c) {
+        char ids[256];
+        list_ids(entry, count, ids, sizeof ids);
+        return lull_error_set(err, LULL_E_KEY, "%s: holds no criterion with the id %s, but %s", path, id, ids);
+    }
     found->criterion = c;
     snprintf(found->path, sizeof found->path, "%s", path);
     return LULL_OK;
@@ -330,7 +341,8 @@ static int32_t take_if_named(void *context, const struct lull_found *found)
     return 1;
 }
 
-/* DIR/name.so in the directories; id NULL means: the criterion called like the library, else its first. */
+/* DIR/name.so in the directories; id NULL means: the criterion called like the library. A library that holds others only
+ * is refused: whoever asked for this name would be judged by another criterion. */
 static int32_t open_name(const struct lull_search *search, const char *name, const char *id, struct lull_found *found,
                          struct lull_error *err)
 {
@@ -339,10 +351,7 @@ static int32_t open_name(const struct lull_search *search, const char *name, con
         snprintf(path, sizeof path, "%s/%s.so", dir, name);
         if (strlen(path) >= LULL_PATH_MAX || !is_file(path))
             continue;
-        if (id)
-            return open_path(search, path, id, found, err);
-        int32_t status = open_path(search, path, name, found, err);
-        return status == LULL_E_KEY ? open_path(search, path, NULL, found, err) : status;
+        return open_path(search, path, id ? id : name, found, err);
     }
     if (!id) {
         struct name_query query = {.id = name, .found = found};

@@ -99,7 +99,9 @@ static void opens_by_name(void **state)
     assert_opens(criteria, "null", "null");
     assert_opens(criteria, "halfbuf", "halfbuf");
     assert_opens(criteria, "halfbuf:halfbuf", "halfbuf");
-    assert_opens(plugins, "pair", "first-of-pair");
+    /* a file of that name that holds others only is another criterion: none is taken in its place */
+    assert_refused(plugins, "pair", LULL_E_KEY,
+                   "pair.so: holds no criterion with the id pair, but first-of-pair, second-of-pair");
     assert_opens(plugins, "pair:second-of-pair", "second-of-pair");
     assert_refused(criteria, "no-such", LULL_E_IO, "no-such");
     assert_refused(criteria, "null:other", LULL_E_KEY, "other");
@@ -124,13 +126,14 @@ static void directories_are_joined_and_ordered(void **state)
     (void)state;
     char joined[8000], hidden[4200];
     snprintf(joined, sizeof joined, "/no/such/dir::%s:%s", plugins, criteria);
-    assert_opens(joined, "pair", "first-of-pair");
+    assert_opens(joined, "pair:first-of-pair", "first-of-pair");
     assert_opens(joined, "fixed", "fixed");
-    /* a library called null.so in an earlier directory hides the later one */
+    /* a library called null.so in an earlier directory hides the later one, and is asked for its id */
     snprintf(hidden, sizeof hidden, "%s/null.so", scratch);
     assert_int_equal(symlink(in_dir(plugins, "pair.so"), hidden), 0);
     snprintf(joined, sizeof joined, "%s:%s", scratch, criteria);
-    assert_opens(joined, "null", "first-of-pair");
+    assert_refused(joined, "null", LULL_E_KEY, "null.so: holds no criterion with the id null, but first-of-pair");
+    assert_opens(joined, "null:second-of-pair", "second-of-pair");
     unlink(hidden);
 }
 
@@ -141,9 +144,9 @@ static void without_directories_the_usual_ones_are_searched(void **state)
     struct lull_found found;
     struct lull_error err = {.struct_size = sizeof err};
     unsetenv("LULL_PLUGIN_PATH"); /* no lib/lull beside the tests */
-    assert_int_equal(lull_open(&usual, "pair", &found, &err), LULL_E_IO);
+    assert_int_equal(lull_open(&usual, "pair:first-of-pair", &found, &err), LULL_E_IO);
     assert_int_equal(setenv("LULL_PLUGIN_PATH", plugins, 1), 0);
-    assert_int_equal(lull_open(&usual, "pair", &found, &err), LULL_OK);
+    assert_int_equal(lull_open(&usual, "pair:first-of-pair", &found, &err), LULL_OK);
     assert_string_equal(found.criterion->id, "first-of-pair");
     unsetenv("LULL_PLUGIN_PATH");
 }

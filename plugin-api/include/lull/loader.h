@@ -38,8 +38,8 @@ struct lull_found {
 };
 
 /* Finds and loads the criterion that spec names:
- *     NAME       the criterion with this id in DIR/NAME.so (or that library's first), else the first library in the
- *                directories that holds a criterion with this id;
+ *     NAME       the criterion with this id in DIR/NAME.so, else the first library in the directories that holds one; a
+ *                DIR/NAME.so that holds others only is refused;
  *     PATH       (it contains a '/' or ends in ".so") the first criterion of this library;
  *     PATH:ID    the one with this id.
  * Returns LULL_OK and fills *found, or a LULL_E_ code with *found untouched and err (may be NULL) filled:
