@@ -32,7 +32,7 @@ int ggn_study_address_parse(const char *text, struct ggn_study_address *address,
         return base_fail(err, BASE_EINVAL, "--listen %.64s: not an address in numbers, like 127.0.0.1 or [::1]", text);
     if (port && *port == ':') {
         long value = strtol(port + 1, &rest, 10);
-        if (rest == port + 1 || *rest != '\0' || value < 0 || value > 65535)
+        if (port[1] < '0' || port[1] > '9' || *rest != '\0' || value < 0 || value > 65535)
             return base_fail(err, BASE_EINVAL, "--listen %.64s: a port is 0 … 65535", text);
         a.port = (int)value;
     }

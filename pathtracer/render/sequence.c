@@ -30,7 +30,8 @@ int pt_sequence_levels(const char *text, uint32_t spp[PT_SEQUENCE_MAX_LEVELS], s
     char kind[16], end;
     double first, last, step;
     int geometric;
-    if (sscanf(text, "%15[a-z]:%lf:%lf:%lf%c", kind, &first, &last, &step, &end) != 4 ||
+    if (text[strcspn(text, " \t\n\v\f\r")] != '\0' || /* sscanf passes over blanks */
+        sscanf(text, "%15[a-z]:%lf:%lf:%lf%c", kind, &first, &last, &step, &end) != 4 ||
         (!(geometric = strcmp(kind, "geometric") == 0) && strcmp(kind, "linear") != 0))
         return base_fail(err, BASE_EINVAL, "--levels %s: expected geometric:FIRST:LAST:RATIO or linear:FIRST:LAST:STEP",
                          text);

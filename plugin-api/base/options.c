@@ -1,6 +1,7 @@
 #include "base/options.h"
 
 #include <argp.h>
+#include <ctype.h>
 #include <errno.h>
 #include <getopt.h>
 #include <math.h>
@@ -17,12 +18,15 @@ enum { EXIT_UNWRITTEN = 2, MAX_OPTIONS = 96, KEY_LONG = 256, KEY_USAGE = KEY_LON
 
 /* --- values --- */
 
+/* strtol and strtod pass over blanks before a number; an argument that has some is none. */
+static int begins_blank(const char *text) { return isspace((unsigned char)*text) != 0; }
+
 int base_parse_integer(const char *text, int64_t min, int64_t max, int64_t *out)
 {
     char *end;
     errno = 0;
     long long v = strtoll(text, &end, 10);
-    if (end == text || *end || errno || v < min || v > max)
+    if (begins_blank(text) || end == text || *end || errno || v < min || v > max)
         return 0;
     *out = v;
     return 1;
@@ -32,7 +36,7 @@ int base_parse_real(const char *text, double min, double max, double *out)
 {
     char *end;
     double v = strtod(text, &end);
-    if (end == text || *end || !(v >= min && v <= max))
+    if (begins_blank(text) || end == text || *end || !(v >= min && v <= max))
         return 0;
     *out = v;
     return 1;

@@ -102,6 +102,9 @@ static void refusals(void **state)
         {"a -w 3x", "--window 3x: expected an integer from 2 to 16"},
         {"a --seed -1", "--seed -1: expected an integer from 0 to 4294967295"},
         {"a --spp 99999999999999999999", "--spp 99999999999999999999: expected an integer from 1 to 1000000000000"},
+        {"a --spp \t8", "--spp \t8: expected an integer from 1 to 1000000000000"}, /* strtol would take it */
+        {"a --spp 8\t", "--spp 8\t: expected an integer from 1 to 1000000000000"},
+        {"a --ratio \n2", "--ratio \n2: expected a number from 1 to 16"},
         {"a --ratio nan", "--ratio nan: expected a number from 1 to 16"},
         {"a -k f64", "--kind f64: expected f32, f16 or bf16"},
         {"a -k f3", "--kind f3: expected f32, f16 or bf16"},
