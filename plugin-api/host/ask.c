@@ -1,6 +1,7 @@
 #include "host/frame.h"
 
 #include <math.h>
+#include <stdio.h>
 
 #include "base/clock.h"
 
@@ -71,39 +72,94 @@ static int32_t evaluate(struct lull_host_criterion *c, const struct question *q,
     return code == LULL_OK ? code : lull_host_blame(c, "", code, &e, err);
 }
 
+static int32_t check_due(const struct lull_host_blocks *b, const uint32_t *due, uint32_t count, struct lull_error *err)
+{
+    for (uint32_t k = 0; k < count; k++)
+        if (due[k] >= b->count || (k > 0 && due[k] <= due[k - 1]))
+            return lull_error_set(err, LULL_E_INVALID, "due[%u] is %u: expected rising indices of %u blocks", k, due[k],
+                                  b->count);
+    return LULL_OK;
+}
+
+static int32_t check_question(const struct lull_host_criterion *c, const struct lull_host_frame *f, const uint32_t *due,
+                              uint32_t count, const struct lull_decision *decisions, struct lull_error *err)
+{
+    int32_t code = lull_host_given(err, "criterion", c, "frame", f, NULL);
+    if (code == LULL_OK && count > 0)
+        code = lull_host_given(err, "due", due, "decisions", decisions, NULL);
+    if (code == LULL_OK)
+        code = check_due(&f->blocks, due, count, err);
+    return code == LULL_OK ? lull_host_check_samples(f, err) : code;
+}
+
 int32_t lull_host_evaluate(struct lull_host_criterion *c, const struct lull_host_frame *f, const struct lull_host_view *view,
                            const uint32_t *due, const uint8_t *final, uint32_t count, struct lull_decision *decisions,
                            struct lull_error *err)
 {
-    const struct lull_host_blocks *b = &f->blocks;
-    const struct question q = {b, due, final, count, decisions};
     struct lull_host_shown shown;
-    for (uint32_t k = 0; k < count; k++)
+    for (uint32_t k = 0; decisions && k < count; k++)
         decisions[k] = lull_host_undecided();
-    if (c->frame != f || c->block_count != b->count)
-        return lull_error_set(err, LULL_E_STATE, "criterion %s: it has not been opened for this frame", c->table->id);
-    int32_t code = lull_host_show(b, view, lull_host_wants_counts(c), &shown, err);
+    int32_t code = check_question(c, f, due, count, decisions, err);
     if (code != LULL_OK)
         return code;
+    const struct lull_host_blocks *b = &f->blocks;
+    const struct question q = {b, due, final, count, decisions};
+    if (c->frame != f || c->block_count != b->count)
+        return lull_error_set(err, LULL_E_STATE, "criterion %s: it has not been opened for this frame", c->table->id);
+    code = lull_host_show(b, view, lull_host_wants_counts(c), &shown, err);
+    if (code != LULL_OK)
+        return code;
+    /* what a criterion requires it misses itself */
+    code = lull_host_check_announced(f->config.planes & ~c->needs.planes_required, shown.planes, err);
     for (uint32_t i = 0; i < b->count; i++)
         c->all[i] = lull_host_state_of(&b->list[i], i, shown.planes[LULL_PLANE_HALF].data != NULL);
-    code = evaluate(c, &q, view, &shown, err);
+    if (code == LULL_OK)
+        code = evaluate(c, &q, view, &shown, err);
     for (uint32_t k = 0; k < count && code != LULL_OK; k++)
         decisions[k] = lull_host_undecided();
     lull_host_hide(&shown);
-    return code;
+    return code == LULL_OK ? lull_host_tell(c, err) : code;
+}
+
+/* A criterion of halves stops no block whose half_spp is never written: that is said once. */
+static void miss_halves(struct lull_host_frame *f, const uint32_t *due, uint32_t count)
+{
+    const struct lull_host_block *b = NULL;
+    char text[256];
+    if (f->told_halves || !(f->criterion->needs.planes_required & LULL_PLANE_BIT(LULL_PLANE_HALF)))
+        return;
+    for (uint32_t k = 0; k < count; k++) {
+        b = &f->blocks.list[due[k]];
+        if (b->spp < 2 || (b->half_spp > 0 && b->half_spp < b->spp))
+            return;
+    }
+    if (!b)
+        return;
+    f->told_halves = 1;
+    snprintf(
+        text, sizeof text,
+        "half_spp is %llu where spp is %llu, in every block: without a half of the samples no block stops. The renderer "
+        "writes half_spp as it writes spp",
+        (unsigned long long)b->half_spp, (unsigned long long)b->spp);
+    lull_host_say(f->criterion, LULL_LOG_WARNING, text);
 }
 
 int32_t lull_host_ask(struct lull_host_frame *f, const struct lull_host_view *view, const uint32_t *due,
                       const uint8_t *final, uint32_t count, struct lull_decision *decisions, struct lull_error *err)
 {
+    int32_t code = lull_host_given(err, "frame", f, "the frame's criterion", f ? f->criterion : NULL, NULL);
+    if (code != LULL_OK)
+        return code;
     double start_s = base_clock_wall_s(), start_cpu_s = base_clock_process_s();
-    int32_t code = lull_host_evaluate(f->criterion, f, view, due, final, count, decisions, err);
-    /* nothing else runs meanwhile: the process's seconds are those of the check */
+    code = lull_host_evaluate(f->criterion, f, view, due, final, count, decisions, err);
+    /* nothing else runs meanwhile: the process's seconds, with those of the denoiser, are those of the check */
     f->totals.criterion_s += base_clock_wall_s() - start_s;
     f->totals.criterion_thread_s += base_clock_process_s() - start_cpu_s;
     f->totals.checks += count;
     f->totals.asked += count;
     f->totals.failed_checks += code != LULL_OK;
-    return code;
+    if (code != LULL_OK)
+        return code;
+    miss_halves(f, due, count);
+    return lull_host_tell(f->criterion, err);
 }

@@ -214,9 +214,12 @@ int32_t lull_host_denoise(const struct lull_host_frame *frame, const struct lull
                           const struct lull_host_denoising *how, const struct lull_host_picture *out, struct lull_error *err)
 {
     struct lull_host_shown s;
+    int32_t code = lull_host_given(err, "frame", frame, "how", how, "out", out, "rgb", out ? out->rgb : NULL, NULL);
+    if (code != LULL_OK)
+        return code;
     if (how->struct_size < sizeof *how || out->struct_size < sizeof *out)
         return lull_error_set(err, LULL_E_VERSION, "a struct is smaller than in version 1.0");
-    int32_t code = lull_host_show(&frame->blocks, view, 0, &s, err);
+    code = lull_host_show(&frame->blocks, view, 0, &s, err);
     if (code != LULL_OK)
         return code;
     struct picture p = {.frame = frame,

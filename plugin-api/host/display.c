@@ -103,10 +103,13 @@ static int32_t copy(struct lull_host_display *d, const struct lull_host_view *v,
 
 int32_t lull_host_display_update(struct lull_host_display *d, const struct lull_host_view *view, struct lull_error *err)
 {
+    int32_t code = lull_host_given(err, "display", d, "view", view, NULL);
+    if (code != LULL_OK)
+        return code;
     const double start_s = base_clock_wall_s();
     if (start_s < d->next_s || pthread_mutex_trylock(&d->lock) != 0)
         return LULL_OK;
-    int32_t code = d->live ? copy(d, view, err) : LULL_OK;
+    code = d->live ? copy(d, view, err) : LULL_OK;
     pthread_mutex_unlock(&d->lock);
     d->next_s = start_s + fmax(EVERY_S, (base_clock_wall_s() - start_s) / COPY_SHARE);
     return code;
@@ -290,12 +293,15 @@ int32_t lull_host_display_open(const struct lull_host_frame *frame, const char *
                                struct lull_host_display **out, struct lull_error *err)
 {
     struct base_err why = {0};
+    int32_t code = lull_host_given(err, "frame", frame, "address", address, "name", name, "out", out, NULL);
+    if (code != LULL_OK)
+        return code;
     struct lull_host_display *d = calloc(1, sizeof *d);
     if (!d)
         return lull_host_no_memory(err, "the live view");
     d->socket = -1;
     d->blocks = &frame->blocks;
-    int32_t code = base_tcp_find(address, PORT, &d->address, &why) ? lull_host_translate(&why, err) : allocate(d, name, err);
+    code = base_tcp_find(address, PORT, &d->address, &why) ? lull_host_translate(&why, err) : allocate(d, name, err);
     if (code == LULL_OK)
         code = begin_thread(d, err);
     if (code == LULL_OK)

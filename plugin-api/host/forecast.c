@@ -99,6 +99,11 @@ static struct lull_host_work look_at(const struct lull_host_blocks *blocks, cons
 int32_t lull_host_forecast_of(const struct lull_host_blocks *blocks, const struct lull_host_totals *totals, int32_t threads,
                               struct lull_host_forecast *out, struct lull_error *err)
 {
+    int32_t code = lull_host_given(err, "blocks", blocks, "totals", totals, "out", out, NULL);
+    if (code != LULL_OK)
+        return code;
+    if (threads < 1)
+        return lull_error_set(err, LULL_E_INVALID, "%d threads: expected at least 1", threads);
     struct lull_host_forecast f = {.known = 1, .low = UINT64_MAX};
     struct lull_host_work *work = calloc(blocks->count, sizeof *work);
     if (!work)

@@ -4,6 +4,8 @@
 
 #include <lull/host.h>
 
+#include <stdatomic.h>
+
 #include "base/err.h"
 #include "base/threads.h"
 #include "picture/font.h"
@@ -32,7 +34,13 @@ struct lull_host_criterion {
     struct lull_decision *answers; /* owns */
     double begin_s;
     int open;
+
+    /* The first warning, where the services have no log; another LULL_UNHEARD_ state says what became of it. */
+    atomic_int unheard_state;
+    char unheard[600];
 };
+
+enum { LULL_UNHEARD_NONE, LULL_UNHEARD_BEING_WRITTEN, LULL_UNHEARD_WAITING, LULL_UNHEARD_TOLD };
 
 static inline int lull_host_wants_counts(const struct lull_host_criterion *c)
 {
@@ -61,6 +69,7 @@ struct lull_host_frame {
     struct lull_host_answer *answers; /* owns; [blocks][answer_room] */
     uint32_t *answer_count;           /* owns; [blocks] */
     uint32_t answer_room;             /* 0: none are kept */
+    int told_halves;                  /* that half_spp is never written */
 };
 
 /* What a row of a quote asks, and what it was told. */
@@ -89,6 +98,29 @@ struct lull_host_quote {
 int32_t lull_host_offer(struct lull_host_criterion *criterion, const struct lull_host_services *services,
                         struct lull_error *err);
 void lull_host_withdraw(struct lull_host_criterion *criterion);
+/* A line to the renderer's log; the first warning without one is kept for lull_host_tell. */
+void lull_host_say(struct lull_host_criterion *criterion, int32_t level, const char *text);
+/* Puts a warning that nobody has heard into err, once, with the code LULL_OK; returns LULL_OK. */
+int32_t lull_host_tell(struct lull_host_criterion *criterion, struct lull_error *err);
+
+/* --- given.c: what the renderer hands in ----------------------------------------------------------------------------- */
+
+/* Pairs of a name and a pointer, NULL at the end: LULL_E_INVALID names the first pointer that is NULL. */
+__attribute__((sentinel)) int32_t lull_host_given(struct lull_error *err, ...);
+int32_t lull_host_check_pairs(const struct lull_pair *pairs, uint32_t count, struct lull_error *err);
+int32_t lull_host_check_services(const struct lull_host_services *services, struct lull_error *err);
+/* All of it but size, blocks and mask. */
+int32_t lull_host_check_config(const struct lull_host_config *config, const struct lull_host_criterion *criterion,
+                               struct lull_error *err);
+int32_t lull_host_check_disjoint(const struct lull_host_block *list, uint32_t count, struct lull_error *err);
+/* What describes a plane that has data. */
+int32_t lull_host_check_plane(const char *name, const struct lull_plane *plane, uint32_t channels, struct lull_error *err);
+int32_t lull_host_check_view(const struct lull_host_blocks *blocks, const struct lull_host_view *view,
+                             struct lull_error *err);
+/* Are all of the mask `planes` there, but for counts, which the library makes? */
+int32_t lull_host_check_announced(uint32_t planes, const struct lull_plane shown[LULL_PLANE_COUNT], struct lull_error *err);
+/* What the renderer writes into blocks and totals. */
+int32_t lull_host_check_samples(const struct lull_host_frame *frame, struct lull_error *err);
 
 /* --- open.c --------------------------------------------------------------------------------------------------------- */
 

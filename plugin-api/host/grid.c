@@ -5,6 +5,8 @@
 
 /* Blocks by default: up to so many pixels wide, and small enough that a picture has so many. */
 enum { USUAL_BLOCK = 200, LEAST_DEFAULT = 16, ENOUGH_BLOCKS = 12 };
+/* A block takes some 300 bytes: more are a mistake. */
+enum { MOST_BLOCKS = 1 << 24 };
 
 static int32_t least(int32_t a, int32_t b) { return a < b ? a : b; }
 static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
@@ -75,6 +77,12 @@ static int32_t choose_size(const struct lull_host_config *g, const struct lull_r
     return LULL_OK;
 }
 
+static int32_t too_many(uint64_t count, struct lull_error *err)
+{
+    return lull_error_set(err, LULL_E_INVALID, "%llu blocks are too many: expected at most %d", (unsigned long long)count,
+                          MOST_BLOCKS);
+}
+
 static int32_t lay_grid(const struct lull_host_config *g, int clip, struct lull_host_blocks *b, struct lull_error *err)
 {
     struct lull_rect crop = {g->crop[0], g->crop[1], g->crop[2], g->crop[3]};
@@ -87,6 +95,9 @@ static int32_t lay_grid(const struct lull_host_config *g, int clip, struct lull_
     b->columns = (uint32_t)((width - 1) / w + 1);
     b->rows = (uint32_t)((height - 1) / h + 1);
     int32_t c0 = crop.x0 / w, c1 = (crop.x1 - 1) / w + 1, r0 = crop.y0 / h, r1 = (crop.y1 - 1) / h + 1;
+    const uint64_t count = (uint64_t)(c1 - c0) * (uint64_t)(r1 - r0);
+    if (count > MOST_BLOCKS)
+        return too_many(count, err);
     b->list_columns = (uint32_t)(c1 - c0);
     b->count = b->list_columns * (uint32_t)(r1 - r0);
     b->list = calloc(b->count, sizeof *b->list);
@@ -107,8 +118,13 @@ static int32_t lay_grid(const struct lull_host_config *g, int clip, struct lull_
 
 static int32_t lay_own(const struct lull_host_config *g, struct lull_host_blocks *b, struct lull_error *err)
 {
-    if (g->layout_count == 0 || g->layout_stride < sizeof(struct lull_rect))
+    if (!g->layout)
+        return lull_error_set(err, LULL_E_INVALID, "layout is NULL, layout_count is %u", g->layout_count);
+    if (g->layout_count == 0 || g->layout_stride < sizeof(struct lull_rect) || g->layout_stride % sizeof(int32_t) != 0 ||
+        (uintptr_t)g->layout % sizeof(int32_t) != 0)
         return lull_error_set(err, LULL_E_INVALID, "the layout has no blocks or a bad stride");
+    if (g->layout_count > MOST_BLOCKS)
+        return too_many(g->layout_count, err);
     b->count = g->layout_count;
     b->list = calloc(b->count, sizeof *b->list);
     if (!b->list)
@@ -121,7 +137,7 @@ static int32_t lay_own(const struct lull_host_config *g, struct lull_host_blocks
                                   r->x1, r->y1, g->width, g->height);
         b->list[i] = fresh(i, *r);
     }
-    return LULL_OK;
+    return lull_host_check_disjoint(b->list, b->count, err);
 }
 
 int32_t lull_host_lay_out(const struct lull_host_config *g, const struct lull_requirements *needs, int clip,
@@ -136,7 +152,7 @@ int32_t lull_host_lay_out(const struct lull_host_config *g, const struct lull_re
         return lull_error_set(err, LULL_E_INVALID, "a picture of %ux%u pixels: expected 1 to 2^31 - 1", g->width, g->height);
     int32_t code = choose_size(g, needs, &b, err);
     if (code == LULL_OK)
-        code = g->layout ? lay_own(g, &b, err) : lay_grid(g, clip, &b, err);
+        code = g->layout || g->layout_count > 0 ? lay_own(g, &b, err) : lay_grid(g, clip, &b, err);
     if (code != LULL_OK) {
         free(b.list);
         return code;

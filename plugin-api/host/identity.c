@@ -72,6 +72,9 @@ static int is_text(const struct lines *l)
 int32_t lull_host_same_identity(const char *saved, uint64_t saved_size, const char *present, const char *name,
                                 struct lull_error *err)
 {
+    int32_t code = lull_host_given(err, "saved", saved, "present", present, "name", name, NULL);
+    if (code != LULL_OK)
+        return code;
     const struct lines theirs = {saved, (size_t)saved_size}, ours = {present, strlen(present)};
     struct line a, b, none = {0};
     if (!is_text(&theirs))

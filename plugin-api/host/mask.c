@@ -20,6 +20,9 @@ int32_t lull_host_read_mask(const struct lull_plane *mask, struct lull_host_bloc
     if (!mask->data || mask->normaliser != LULL_NORM_ONE || mask->channels < 1 ||
         (mask->type != LULL_TYPE_F32 && mask->type != LULL_TYPE_F64))
         return lull_error_set(err, LULL_E_PLANE, "the mask: expected one channel of f32 or f64, LULL_NORM_ONE");
+    int32_t code = lull_host_check_plane("the mask", mask, 1, err);
+    if (code != LULL_OK)
+        return code;
     for (uint32_t i = 0; i < blocks->count; i++) {
         struct lull_host_block *b = &blocks->list[i];
         double lightest = 0.0;

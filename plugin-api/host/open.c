@@ -1,12 +1,11 @@
 #include "host/frame.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/clock.h"
 #include "base/colour.h"
-
-static const uint64_t MOST_SPP = INT32_MAX;
 
 /* --- a criterion ---------------------------------------------------------------------------------------------------- */
 
@@ -41,18 +40,31 @@ static void give_back(const struct lull_host_services *services)
         services->release(services->context);
 }
 
+static int32_t check_offer(const struct lull_host_services *services, const struct lull_criterion *table,
+                           const struct lull_pair *pairs, uint32_t pair_count, struct lull_host_criterion **out,
+                           struct lull_error *err)
+{
+    int32_t code = lull_host_given(err, "table", table, "out", out, NULL);
+    if (code == LULL_OK)
+        code = lull_table_check(table, err);
+    if (code == LULL_OK)
+        code = lull_host_check_services(services, err);
+    return code == LULL_OK ? lull_host_check_pairs(pairs, pair_count, err) : code;
+}
+
 int32_t lull_host_create(const struct lull_host_services *services, const struct lull_criterion *table,
                          const struct lull_pair *pairs, uint32_t pair_count, struct lull_host_criterion **out,
                          struct lull_error *err)
 {
-    struct lull_error e = {.struct_size = sizeof e};
-    struct lull_host_criterion *c = calloc(1, sizeof *c);
+    int32_t code = check_offer(services, table, pairs, pair_count, out, err);
+    struct lull_host_criterion *c = code == LULL_OK ? calloc(1, sizeof *c) : NULL;
     if (!c) {
         give_back(services);
-        return lull_host_no_memory(err, "criterion");
+        return code != LULL_OK ? code : lull_host_no_memory(err, "criterion");
     }
     c->table = table;
-    int32_t code = lull_host_offer(c, services, err);
+    struct lull_error e = {.struct_size = sizeof e};
+    code = lull_host_offer(c, services, err);
     if (code == LULL_OK)
         code = copy_pairs(c, pairs, pair_count, err);
     if (code == LULL_OK) {
@@ -68,18 +80,35 @@ int32_t lull_host_create(const struct lull_host_services *services, const struct
         return code;
     }
     *out = c;
-    return LULL_OK;
+    return lull_host_tell(c, err);
+}
+
+/* What is told while a criterion is looked for, and there is nobody to hear it. */
+static void keep_first(void *context, int32_t level, const char *text)
+{
+    char *kept = context;
+    if (level <= LULL_LOG_WARNING && kept[0] == '\0')
+        snprintf(kept, sizeof(struct lull_error), "%s", text);
 }
 
 int32_t lull_host_open(const struct lull_host_services *services, const char *spec, const struct lull_pair *pairs,
                        uint32_t pair_count, struct lull_host_criterion **out, struct lull_error *err)
 {
-    struct lull_search search = {.log = services ? services->log : NULL, .log_context = services ? services->context : NULL};
+    char kept[sizeof(struct lull_error)] = "";
+    struct lull_search search = {.log = keep_first, .log_context = kept};
     struct lull_found found;
-    int32_t code = lull_open(&search, spec, &found, err);
+    int32_t code = lull_host_check_services(services, err);
+    if (code == LULL_OK && services && services->log)
+        search = (struct lull_search){.log = services->log, .log_context = services->context};
     if (code == LULL_OK)
-        return lull_host_create(services, found.criterion, pairs, pair_count, out, err);
-    give_back(services);
+        code = lull_open(&search, spec, &found, err);
+    if (code != LULL_OK) {
+        give_back(services);
+        return code;
+    }
+    code = lull_host_create(services, found.criterion, pairs, pair_count, out, err);
+    if (code == LULL_OK && kept[0] != '\0' && atomic_load(&(*out)->unheard_state) == LULL_UNHEARD_NONE)
+        lull_error_set(err, LULL_OK, "%s", kept);
     return code;
 }
 
@@ -108,9 +137,9 @@ void lull_host_close(struct lull_host_criterion *c)
     free(c);
 }
 
-const struct lull_criterion *lull_host_table(const struct lull_host_criterion *c) { return c->table; }
+const struct lull_criterion *lull_host_table(const struct lull_host_criterion *c) { return c ? c->table : NULL; }
 
-const struct lull_requirements *lull_host_needs(const struct lull_host_criterion *c) { return &c->needs; }
+const struct lull_requirements *lull_host_needs(const struct lull_host_criterion *c) { return c ? &c->needs : NULL; }
 
 const char *lull_host_parameter(const struct lull_criterion *t, const char *name, const struct lull_pair *pairs,
                                 uint32_t pair_count, const struct lull_param **found)
@@ -236,7 +265,10 @@ static int32_t begin_instances(struct lull_host_criterion *c, const struct lull_
 
 int32_t lull_host_join(const struct lull_host_frame *f, struct lull_host_criterion *c, struct lull_error *err)
 {
-    int32_t code = fits(c, &f->blocks, err);
+    int32_t code = lull_host_given(err, "frame", f, "criterion", c, NULL);
+    if (code != LULL_OK)
+        return code;
+    code = fits(c, &f->blocks, err);
     c->frame = NULL;
     if (code == LULL_OK)
         code = allocate_frame(c, &f->blocks, err);
@@ -251,23 +283,6 @@ int32_t lull_host_join(const struct lull_host_frame *f, struct lull_host_criteri
 }
 
 /* --- a frame -------------------------------------------------------------------------------------------------------- */
-
-static int32_t check_config(const struct lull_host_config *g, const struct lull_host_criterion *c, struct lull_error *err)
-{
-    if (g->struct_size < sizeof *g)
-        return lull_error_set(err, LULL_E_VERSION, "the config is smaller than in version 1.0");
-    if (!(1 <= g->spp_min && g->spp_min <= g->spp_max && g->spp_max <= MOST_SPP))
-        return lull_error_set(err, LULL_E_INVALID, "spp_min %llu, spp_max %llu: expected 1 <= spp_min <= spp_max < 2^31",
-                              (unsigned long long)g->spp_min, (unsigned long long)g->spp_max);
-    if (!(g->max_seam == 0.0 || g->max_seam >= 1.0))
-        return lull_error_set(err, LULL_E_INVALID, "max_seam %g: expected 0 or at least 1", g->max_seam);
-    if (!c && !(g->flags & LULL_HOST_UNIFORM))
-        return lull_error_set(err, LULL_E_INVALID,
-                              "without a criterion every block gets the same samples: UNIFORM is missing");
-    if (g->mask && (!c || (g->flags & LULL_HOST_UNIFORM)))
-        return lull_error_set(err, LULL_E_INVALID, "a mask has no effect where every block gets the same samples");
-    return LULL_OK;
-}
 
 /* Samples at the first check. */
 static uint64_t first_check(const struct lull_host_frame *f)
@@ -312,7 +327,9 @@ static int32_t fill_frame(struct lull_host_frame *f, const struct lull_plane *ma
 int32_t lull_host_begin(const struct lull_host_config *config, struct lull_host_criterion *criterion,
                         struct lull_host_frame **out, struct lull_error *err)
 {
-    int32_t code = check_config(config, criterion, err);
+    int32_t code = lull_host_given(err, "config", config, "out", out, NULL);
+    if (code == LULL_OK)
+        code = lull_host_check_config(config, criterion, err);
     if (code != LULL_OK)
         return code;
     struct lull_host_frame *f = calloc(1, sizeof *f);
@@ -330,7 +347,7 @@ int32_t lull_host_begin(const struct lull_host_config *config, struct lull_host_
         return code;
     }
     *out = f;
-    return LULL_OK;
+    return criterion ? lull_host_tell(criterion, err) : LULL_OK;
 }
 
 void lull_host_end(struct lull_host_frame *f)
@@ -346,6 +363,6 @@ void lull_host_end(struct lull_host_frame *f)
     free(f);
 }
 
-struct lull_host_blocks *lull_host_blocks_of(struct lull_host_frame *f) { return &f->blocks; }
+struct lull_host_blocks *lull_host_blocks_of(struct lull_host_frame *f) { return f ? &f->blocks : NULL; }
 
-struct lull_host_totals *lull_host_totals_of(struct lull_host_frame *f) { return &f->totals; }
+struct lull_host_totals *lull_host_totals_of(struct lull_host_frame *f) { return f ? &f->totals : NULL; }

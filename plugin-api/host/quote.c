@@ -16,6 +16,11 @@ static int32_t no_memory(struct lull_error *err) { return lull_host_no_memory(er
 int32_t lull_host_quote_begin(const struct lull_host_frame *frame, int32_t threads, struct lull_host_quote **out,
                               struct lull_error *err)
 {
+    int32_t code = lull_host_given(err, "frame", frame, "out", out, NULL);
+    if (code != LULL_OK)
+        return code;
+    if (threads < 1)
+        return lull_error_set(err, LULL_E_INVALID, "%d threads: expected at least 1", threads);
     struct lull_host_quote *q = calloc(1, sizeof *q);
     if (!q)
         return no_memory(err);
@@ -60,8 +65,13 @@ static int32_t add_row(struct lull_host_quote *q, int32_t asked, struct lull_err
 int32_t lull_host_quote_add(struct lull_host_quote *q, const struct lull_pair *changed, int32_t asked,
                             struct lull_error *err)
 {
+    int32_t code = lull_host_given(err, "quote", q, NULL);
+    if (code == LULL_OK)
+        code = lull_host_check_pairs(changed, changed != NULL, err);
+    if (code != LULL_OK)
+        return code;
     const struct lull_host_criterion *own = q->frame->criterion;
-    int32_t code = add_row(q, asked, err);
+    code = add_row(q, asked, err);
     if (code != LULL_OK || !own)
         return code;
     struct lull_host_services services = own->offered;
@@ -81,7 +91,9 @@ int32_t lull_host_quote_add(struct lull_host_quote *q, const struct lull_pair *c
 
 int32_t lull_host_quote_add_other(struct lull_host_quote *q, struct lull_host_criterion *criterion, struct lull_error *err)
 {
-    int32_t code = add_row(q, 0, err);
+    int32_t code = lull_host_given(err, "quote", q, "criterion", criterion, NULL);
+    if (code == LULL_OK)
+        code = add_row(q, 0, err);
     if (code != LULL_OK) {
         lull_host_close(criterion);
         return code;
@@ -298,9 +310,12 @@ static void add_up(const struct lull_host_quote *q, const struct lull_host_quote
 int32_t lull_host_quote_finish(struct lull_host_quote *q, const struct lull_host_view *view,
                                const struct lull_host_quote_row **rows, uint32_t *count, struct lull_error *err)
 {
+    int32_t code = lull_host_given(err, "quote", q, "view", view, "rows", rows, "count", count, NULL);
+    if (code != LULL_OK)
+        return code;
     const struct lull_host_totals *totals = &q->frame->totals;
     struct lull_host_work *work = calloc(q->frame->blocks.count, sizeof *work);
-    int32_t code = work ? ask_all(q, view, err) : no_memory(err);
+    code = work ? ask_all(q, view, err) : no_memory(err);
     if (code == LULL_OK)
         code = find_unmet(q, view, err);
     q->check_s = totals->checks > 0 ? totals->criterion_s / (double)totals->checks : 0.0;

@@ -189,9 +189,14 @@ static cJSON *make(const struct lull_host_frame *f, const struct lull_host_repor
 
 static int32_t check_report(const struct lull_host_report *r, struct lull_error *err)
 {
-    return r->struct_size >= offsetof(struct lull_host_report, software)
-               ? LULL_OK
-               : lull_error_set(err, LULL_E_VERSION, "the report is smaller than in version 1.0");
+    if (r->struct_size < offsetof(struct lull_host_report, software))
+        return lull_error_set(err, LULL_E_VERSION, "the report is smaller than in version 1.0");
+    if (r->effect_count > 0 && !r->effects)
+        return lull_error_set(err, LULL_E_INVALID, "the report: effects is NULL, effect_count is %u", r->effect_count);
+    if (LULL_HAS(struct lull_host_report, r, command_count) && r->command_count > 0 && !r->command)
+        return lull_error_set(err, LULL_E_INVALID, "the report: command is NULL, command_count is %llu",
+                              (unsigned long long)r->command_count);
+    return LULL_OK;
 }
 
 int32_t lull_host_report_write(const struct lull_host_frame *f, const struct lull_host_report *r, const char *path,
@@ -199,7 +204,9 @@ int32_t lull_host_report_write(const struct lull_host_frame *f, const struct lul
 {
     struct base_err e = {0};
     int failed = 0;
-    int32_t code = check_report(r, err);
+    int32_t code = lull_host_given(err, "frame", f, "report", r, "path", path, NULL);
+    if (code == LULL_OK)
+        code = check_report(r, err);
     if (code != LULL_OK)
         return code;
     cJSON *root = make(f, r, &failed);
@@ -212,7 +219,10 @@ int32_t lull_host_report_text(const struct lull_host_frame *f, const struct lull
                               const struct lull_writer *writer, struct lull_error *err)
 {
     int failed = 0;
-    int32_t code = check_report(r, err);
+    int32_t code =
+        lull_host_given(err, "frame", f, "report", r, "writer", writer, "write", writer ? writer->write : NULL, NULL);
+    if (code == LULL_OK)
+        code = check_report(r, err);
     if (code != LULL_OK)
         return code;
     cJSON *root = make(f, r, &failed);

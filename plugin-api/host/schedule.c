@@ -16,7 +16,7 @@ const char *lull_host_reason(int32_t reason)
 uint32_t lull_host_active(const struct lull_host_blocks *b)
 {
     uint32_t n = 0;
-    for (uint32_t i = 0; i < b->count; i++)
+    for (uint32_t i = 0; b && i < b->count; i++)
         n += b->list[i].reason == LULL_REASON_NONE;
     return n;
 }
@@ -30,6 +30,8 @@ int32_t lull_host_out_of_time(const struct lull_host_frame *f)
 
 uint64_t lull_host_next_check(const struct lull_host_blocks *b, uint64_t spp, uint64_t asked)
 {
+    if (spp >= b->spp_max)
+        return b->spp_max;
     uint64_t next = asked > spp ? asked : (uint64_t)ceil((double)spp * CHECK_RATIO);
     if (next <= spp)
         next = spp + 1;
@@ -74,7 +76,7 @@ static uint64_t neighbour_spp(const struct lull_host_blocks *b, uint32_t i)
 uint32_t lull_host_reopen(struct lull_host_blocks *b, double max_seam)
 {
     uint32_t reopened = 0;
-    for (uint32_t i = 0; i < b->count; i++) {
+    for (uint32_t i = 0; i < b->count && max_seam >= 1.0; i++) {
         struct lull_host_block *block = &b->list[i];
         if (block->reason != LULL_REASON_CRITERION && block->reason != LULL_REASON_DROPPED)
             continue;
@@ -196,19 +198,41 @@ uint32_t lull_host_due(struct lull_host_frame *f, uint32_t *due, uint8_t *final)
     return active > 0 ? n : 0;
 }
 
+/* A renderer that never writes spp would be asked for samples for ever, but for the one check of UNIFORM. */
+static int32_t check_rendered(const struct lull_host_frame *f, struct lull_error *err)
+{
+    for (uint32_t i = 0; i < f->blocks.count && !(f->blocks.flags & LULL_HOST_UNIFORM); i++)
+        if (f->blocks.list[i].reason == LULL_REASON_NONE && f->blocks.list[i].spp == 0)
+            return lull_error_set(err, LULL_E_INVALID,
+                                  "block %u: spp is 0 at its check, which stands at %llu: the renderer writes the samples "
+                                  "that it has",
+                                  i, (unsigned long long)f->blocks.list[i].next_spp);
+    return lull_host_check_samples(f, err);
+}
+
 int32_t lull_host_check(struct lull_host_frame *f, const struct lull_host_view *view, struct lull_error *err)
 {
+    int32_t code = lull_host_given(err, "frame", f, NULL);
+    if (code == LULL_OK)
+        code = check_rendered(f, err);
+    if (code != LULL_OK)
+        return code;
     uint32_t n = lull_host_due(f, f->due, f->final);
-    int32_t code = n > 0 ? lull_host_ask(f, view, f->due, f->final, n, f->decisions, err) : LULL_OK;
+    code = n > 0 ? lull_host_ask(f, view, f->due, f->final, n, f->decisions, err) : LULL_OK;
     lull_host_apply(f, f->due, n, f->decisions);
-    if (f->config.max_seam >= 1.0)
-        lull_host_reopen(&f->blocks, f->config.max_seam);
+    lull_host_reopen(&f->blocks, f->config.max_seam);
     return code;
 }
 
 int32_t lull_host_stop(struct lull_host_frame *f, int32_t reason, const struct lull_host_view *view, struct lull_error *err)
 {
     uint32_t n = 0;
+    int32_t code = lull_host_given(err, "frame", f, NULL);
+    if (code != LULL_OK)
+        return code;
+    if (reason <= LULL_REASON_NONE || reason >= LULL_REASON_COUNT)
+        return lull_error_set(err, LULL_E_INVALID, "reason %d: expected a LULL_REASON_, 1 to %d", reason,
+                              LULL_REASON_COUNT - 1);
     for (uint32_t i = 0; i < f->blocks.count; i++) {
         const struct lull_host_block *b = &f->blocks.list[i];
         if (b->reason != LULL_REASON_NONE || b->spp == 0 || (b->asked && b->asked_spp == b->spp))
@@ -216,7 +240,6 @@ int32_t lull_host_stop(struct lull_host_frame *f, int32_t reason, const struct l
         f->due[n] = i;
         f->final[n++] = 1;
     }
-    int32_t code = LULL_OK;
     if (f->criterion && view && n > 0) {
         code = lull_host_ask(f, view, f->due, f->final, n, f->decisions, err);
         lull_host_note(f, f->due, n, f->decisions);

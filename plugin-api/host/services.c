@@ -1,18 +1,35 @@
 #include "host/frame.h"
 
-#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static void host_log(const struct lull_host *host, int32_t level, const char *text)
+void lull_host_say(struct lull_host_criterion *c, int32_t level, const char *text)
 {
-    const struct lull_host_criterion *c = host->context;
-    char line[600];
-    if (!c->offered.log)
+    int none = LULL_UNHEARD_NONE;
+    char line[sizeof c->unheard];
+    if (!c->offered.log && level > LULL_LOG_WARNING)
         return;
     snprintf(line, sizeof line, "criterion %s: %s", c->table->id, text);
-    c->offered.log(c->offered.context, level, line);
+    if (c->offered.log)
+        c->offered.log(c->offered.context, level, line);
+    else if (atomic_compare_exchange_strong(&c->unheard_state, &none, LULL_UNHEARD_BEING_WRITTEN)) {
+        memcpy(c->unheard, line, sizeof line);
+        atomic_store(&c->unheard_state, LULL_UNHEARD_WAITING);
+    }
+}
+
+int32_t lull_host_tell(struct lull_host_criterion *c, struct lull_error *err)
+{
+    int waiting = LULL_UNHEARD_WAITING;
+    if (err && atomic_compare_exchange_strong(&c->unheard_state, &waiting, LULL_UNHEARD_TOLD))
+        lull_error_set(err, LULL_OK, "%s", c->unheard);
+    return LULL_OK;
+}
+
+static void host_log(const struct lull_host *host, int32_t level, const char *text)
+{
+    lull_host_say(host->context, level, text);
 }
 
 static int32_t host_parallel_for(const struct lull_host *host, uint64_t count, lull_task_fn fn, void *arg)
@@ -28,15 +45,11 @@ int32_t lull_host_offer(struct lull_host_criterion *c, const struct lull_host_se
 {
     struct base_err e = {0};
     if (services) {
-        if (services->struct_size < sizeof *services)
-            return lull_error_set(err, LULL_E_VERSION, "the services are smaller than in version 1.0");
         c->offered = *services;
         c->offered.name = services->name ? strdup(services->name) : NULL;
         if (services->name && !c->offered.name)
             return lull_host_no_memory(err, "criterion");
     }
-    if (c->offered.threads > INT_MAX)
-        return lull_error_set(err, LULL_E_INVALID, "%u threads are too many", c->offered.threads);
     c->offered.threads = c->offered.threads > 0 ? c->offered.threads : 1;
     if (c->offered.threads > 1 && !c->offered.parallel_for &&
         !(c->threads = base_threads_create((int)c->offered.threads, &e)))

@@ -71,9 +71,11 @@ static const struct lull_state *state_extension(const struct lull_host_criterion
 
 int32_t lull_host_save_history(const struct lull_host_criterion *c, const struct lull_writer *writer, struct lull_error *err)
 {
+    int32_t code = lull_host_given(err, "criterion", c, "writer", writer, "write", writer ? writer->write : NULL, NULL);
+    if (code != LULL_OK)
+        return code;
     const struct lull_state *state = state_extension(c);
     struct lull_error e = {.struct_size = sizeof e};
-    int32_t code = LULL_OK;
     for (int s = 0; state && s <= LULL_HOST_STEPS && code == LULL_OK; s++)
         code = c->dialled[s] ? state->save(c->dialled[s], writer, &e) : LULL_OK;
     return code == LULL_OK ? code : lull_host_blame(c, "cannot save its state: ", code, &e, err);
@@ -140,7 +142,10 @@ int32_t lull_host_save(const struct lull_host_frame *f, const struct lull_writer
     struct bytes history = {0};
     struct lull_writer keep = {.struct_size = sizeof keep, .context = &history, .write = write_bytes};
     struct sink s = {.writer = writer};
-    int32_t code = f->criterion ? lull_host_save_history(f->criterion, &keep, err) : LULL_OK;
+    int32_t code = lull_host_given(err, "frame", f, "writer", writer, "write", writer ? writer->write : NULL, NULL);
+    if (code != LULL_OK)
+        return code;
+    code = f->criterion ? lull_host_save_history(f->criterion, &keep, err) : LULL_OK;
     if (code == LULL_OK) {
         put_frame(&s, f, &history);
         code = s.code == LULL_OK ? LULL_OK : lull_error_set(err, s.code, "the state could not be written");
@@ -236,11 +241,14 @@ int32_t lull_host_load(struct lull_host_frame *f, const void *data, uint64_t siz
 {
     struct source s = {.name = name, .bytes = {.data = data, .size = (size_t)size}, .err = err};
     struct parts p = {0};
+    int32_t code = lull_host_given(err, "frame", f, "name", name, "data", size > 0 ? data : name, NULL);
+    if (code != LULL_OK)
+        return code;
     struct lull_host_block *list = malloc(f->blocks.count * sizeof *list);
     if (!list)
         return lull_host_no_memory(err, name);
     memcpy(list, f->blocks.list, f->blocks.count * sizeof *list);
-    int32_t code = take_blocks(&s, &f->blocks, list);
+    code = take_blocks(&s, &f->blocks, list);
     if (code == LULL_OK)
         code = take_parts(&s, f, list, &p);
     if (code == LULL_OK && f->criterion)

@@ -143,7 +143,12 @@ int32_t lull_host_value_map(const struct lull_host_blocks *b, const double *valu
 {
     struct base_err e = {0};
     struct pic_canvas map;
-    int32_t code = lull_host_paint(b, values, unit, &map, err);
+    int32_t code = lull_host_given(err, "blocks", b, "values", values, "unit", unit, "path", path, NULL);
+    for (uint32_t i = 0; code == LULL_OK && i < b->count; i++)
+        if (!(isfinite(values[i]) && values[i] >= 0.0))
+            code = lull_error_set(err, LULL_E_INVALID, "values[%u] %g: expected a finite number from 0", i, values[i]);
+    if (code == LULL_OK)
+        code = lull_host_paint(b, values, unit, &map, err);
     if (code != LULL_OK)
         return code;
     int rc = pic_write_png(path, map.width, map.height, 3, map.rgb, &e);
@@ -181,6 +186,9 @@ static int32_t write_table(const struct lull_host_blocks *b, const char *path, c
 
 int32_t lull_host_stop_map(const struct lull_host_blocks *b, const char *path, const char *scene, struct lull_error *err)
 {
+    int32_t code = lull_host_given(err, "blocks", b, "path", path, "scene", scene, NULL);
+    if (code != LULL_OK)
+        return code;
     const char *dot = strrchr(path, '.');
     return dot && strcasecmp(dot, ".csv") == 0 ? write_table(b, path, scene, err) : write_picture(b, path, err);
 }

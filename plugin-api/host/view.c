@@ -50,18 +50,6 @@ static uint32_t spp_at(const struct lull_host_view *v, const struct lull_host_bl
     return own ? (uint32_t)read_at(&v->planes[LULL_PLANE_SPP], v, x, y, 0) : (uint32_t)k->spp;
 }
 
-static int32_t check_view(const struct lull_host_blocks *b, const struct lull_host_view *v, struct lull_error *err)
-{
-    if (v->struct_size < sizeof *v)
-        return lull_error_set(err, LULL_E_VERSION, "the view is smaller than in version 1.0");
-    if (v->x0 > b->x0 || v->y0 > b->y0 || v->x1 < b->x1 || v->y1 < b->y1)
-        return lull_error_set(err, LULL_E_INVALID, "the view %d,%d,%d,%d does not hold the blocks, %d,%d,%d,%d", v->x0,
-                              v->y0, v->x1, v->y1, b->x0, b->y0, b->x1, b->y1);
-    if (v->dropped && v->plane_count > LULL_PLANE_WEIGHT && v->planes[LULL_PLANE_WEIGHT].data)
-        return lull_error_set(err, LULL_E_INVALID, "a view with a plane WEIGHT counts no dropped samples");
-    return LULL_OK;
-}
-
 static int32_t show_counts(const struct lull_host_blocks *b, const struct lull_host_view *v, struct lull_host_shown *s,
                            struct lull_error *err)
 {
@@ -141,7 +129,7 @@ int32_t lull_host_show(const struct lull_host_blocks *b, const struct lull_host_
                        struct lull_host_shown *out, struct lull_error *err)
 {
     struct lull_host_shown s = {0};
-    int32_t code = check_view(b, v, err);
+    int32_t code = lull_host_check_view(b, v, err);
     if (code != LULL_OK)
         return code;
     int dropped = 0;

@@ -14,6 +14,8 @@ int32_t lull_host_check_outputs(const struct lull_host_output *outputs, uint32_t
     struct base_inputs read = BASE_INPUTS_EMPTY;
     struct base_err e = {0};
     int rc = 0;
+    if ((output_count > 0 && !outputs) || (input_count > 0 && !inputs))
+        return lull_host_given(err, "outputs", output_count > 0 ? outputs : (const void *)"", "inputs", inputs, NULL);
     for (uint32_t i = 0; i < output_count && !rc; i++)
         rc = base_outputs_add(&list, outputs[i].option, outputs[i].path, &e);
     for (uint32_t i = 0; i < input_count && !rc; i++)
@@ -31,6 +33,9 @@ struct lull_host_file {
 int32_t lull_host_file_begin(const char *path, struct lull_host_file **out, int32_t *descriptor, struct lull_error *err)
 {
     struct base_err e = {0};
+    int32_t code = lull_host_given(err, "path", path, "out", out, "descriptor", descriptor, NULL);
+    if (code != LULL_OK)
+        return code;
     struct lull_host_file *f = malloc(sizeof *f);
     if (!f)
         return lull_host_no_memory(err, path);
@@ -46,6 +51,9 @@ int32_t lull_host_file_begin(const char *path, struct lull_host_file **out, int3
 int32_t lull_host_file_commit(struct lull_host_file *f, struct lull_error *err)
 {
     struct base_err e = {0};
+    int32_t code = lull_host_given(err, "file", f, NULL);
+    if (code != LULL_OK)
+        return code;
     int rc = base_file_commit(&f->out, &e);
     free(f);
     return rc ? lull_host_translate(&e, err) : LULL_OK;
@@ -53,7 +61,8 @@ int32_t lull_host_file_commit(struct lull_host_file *f, struct lull_error *err)
 
 void lull_host_file_abort(struct lull_host_file *f)
 {
-    base_file_abort(&f->out);
+    if (f)
+        base_file_abort(&f->out);
     free(f);
 }
 
@@ -66,7 +75,11 @@ void lull_host_srgb(const double *linear, uint64_t count, uint8_t *codes)
 int32_t lull_host_write_png(const char *path, uint32_t width, uint32_t height, const uint8_t *rgb, struct lull_error *err)
 {
     struct base_err e = {0};
-    if (width > INT32_MAX || height > INT32_MAX)
-        return lull_error_set(err, LULL_E_INVALID, "%s: a picture of %ux%u pixels is too large", path, width, height);
+    int32_t code = lull_host_given(err, "path", path, "rgb", rgb, NULL);
+    if (code != LULL_OK)
+        return code;
+    if (width == 0 || height == 0 || width > INT32_MAX || height > INT32_MAX)
+        return lull_error_set(err, LULL_E_INVALID, "%s: a picture of %ux%u pixels: expected 1 to 2^31 - 1", path, width,
+                              height);
     return pic_write_png(path, (int32_t)width, (int32_t)height, 3, rgb, &e) ? lull_host_translate(&e, err) : LULL_OK;
 }

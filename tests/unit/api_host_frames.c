@@ -317,6 +317,8 @@ static void one_frame_at_a_time(void **state)
     struct lull_host_frame *second;
     begin(0, 0);
     assert_int_equal(lull_host_begin(&config, criterion, &second, &fault), LULL_OK);
+    for (int i = 0; i < BLOCKS; i++)
+        list[i].spp = lull_host_blocks_of(second)->list[i].spp = 12;
     was_due = 0;
     assert_int_equal(lull_host_check(frame, &view, &fault), LULL_E_STATE);
     assert_string_equal(fault.message, "criterion told: it has not been opened for this frame");

@@ -21,7 +21,11 @@
  * Sizes.    A struct that its caller makes begins with struct_size; later minor versions append fields. Structs without it
  *           never grow. host-layout-1.txt lists every offset.
  * Errors.   Functions that return int32_t return LULL_OK or a negative LULL_E_ code, and then fill err, which may be NULL
- *           and else begins with its struct_size. A failed call changes nothing unless its comment says so.
+ *           and else begins with its struct_size. A failed call changes nothing unless its comment says so. A number or a
+ *           pointer that makes no sense is refused by its name, a pointer to a struct or to text being not NULL where no
+ *           comment says that it may be.
+ * Warnings. Without a log in the services, the first warning of a criterion comes through err: the call returns LULL_OK
+ *           and fills err with the code LULL_OK and the text. Else a call that succeeds leaves err as it is.
  * Threads.  Calls about one criterion and its frames never overlap. Different criteria may be used at the same time as far
  *           as their thread level allows.
  * Numbers.  The same samples give the same decisions whatever the order in which blocks and threads finish.
@@ -41,7 +45,8 @@ struct lull_host_frame;     /* a picture in the making: its blocks, its totals, 
 
 /* --- open: a criterion ---------------------------------------------------------------------------------------------- */
 
-/* What the renderer offers a criterion while it is asked; copied. NULL instead of one: one thread, no messages. */
+/* What the renderer offers a criterion while it is asked; copied. NULL instead of one: one thread, and of the messages only
+ * the first warning, through err. */
 struct lull_host_services {
     uint32_t struct_size;
     uint32_t threads; /* that work while it is asked; 0 reads as 1 */
@@ -137,8 +142,9 @@ struct lull_host_block {
     int32_t x0, y0, x1, y1; /* pixels, end exclusive */
     int32_t reason;         /* LULL_REASON_ */
 
-    uint64_t spp, half_spp; /* samples per pixel so far, and those of them in HALF */
-    double thread_s;        /* thread seconds spent on it */
+    uint64_t spp, half_spp; /* samples per pixel so far, and those of them in HALF, without which criteria of halves never
+                             * stop a block: a check where it is 0 or spp in all blocks warns once */
+    double thread_s;        /* thread seconds spent on it; NaN: not known */
     uint64_t rays;          /* the renderer's own count; not read */
     uint64_t dropped;       /* samples, of all its pixels, that were left out for a value that is not finite */
 
@@ -169,7 +175,7 @@ struct lull_host_totals {
     uint64_t samples, paths, rays, dropped;
     double render_s, criterion_s; /* wall seconds of rendering, which the renderer adds up, and of the checks */
     uint64_t checks, failed_checks, skipped_checks;
-    double criterion_thread_s; /* processor seconds of the checks of this process, all its threads together */
+    double criterion_thread_s; /* processor seconds of the checks of this process, with those of its denoiser */
     uint64_t asked;            /* blocks that these were about */
 };
 
