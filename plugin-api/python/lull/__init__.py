@@ -11,23 +11,33 @@
 For renderers that keep their own film: HostFrame, which is shown numpy arrays as they lie in memory (Plane). Ready hosts:
 lull.blender for Blender's Cycles, lull.mitsuba for Mitsuba 3. Needs numpy and liblull-host.so; nothing is compiled.
 """
+import importlib
+import importlib.util
+import os
 import sys
+import sysconfig
 
+NEEDED = ""  # what this Python lacks, in one line
 try:
     import numpy  # noqa: F401
 except ImportError:
-    NEEDED = "lull needs numpy, which this Python does not have: python3 -m pip install numpy"
+    # Debian and others keep pip out of their own Python, which is Blender's there
+    managed = sys.prefix == sys.base_prefix and os.path.exists(os.path.join(sysconfig.get_path("stdlib"), "EXTERNALLY-MANAGED"))
+    NEEDED = ("lull needs numpy, which this Python does not have: " +
+              ("sudo apt install python3-numpy" if managed else "python3 -m pip install numpy"))
     if sys.argv[:1] == ["-m"]:  # a program of the package, as which Python starts it: one line for people
         print(NEEDED, file=sys.stderr)
         sys.exit(2)
-    raise ImportError(NEEDED) from None
+    if "bpy" not in sys.modules:  # in Blender, register() says it
+        raise ImportError(NEEDED) from None
 
-from .criterion import Criterion, Plane, Rect, load
-from .denoising import Denoised, denoise
-from .driver import Driver, Result
-from .frame import Frame
-from .host import Block, HostFrame
-from .library import Info, LullError, Parameter, criteria, find
+if not NEEDED:
+    from .criterion import Criterion, Plane, Rect, load
+    from .denoising import Denoised, denoise
+    from .driver import Driver, Result
+    from .frame import Frame
+    from .host import Block, HostFrame
+    from .library import Info, LullError, Parameter, criteria, find
 
 __all__ = ["Block", "Criterion", "Denoised", "Driver", "Frame", "HostFrame", "Info", "LullError", "Parameter", "Plane",
            "Rect", "Result", "criteria", "denoise", "find", "load"]
@@ -39,13 +49,30 @@ bl_info = {"name": "Lull", "author": "Lull", "version": (1, 0), "blender": (3, 4
            "description": "Cycles stops each block when its noise can no longer be seen"}
 
 
+def __getattr__(name: str) -> object:
+    """The package's modules, lull.outputs and others, when they are first asked for: hosts come without their renderers."""
+    if NEEDED and name in __all__:
+        raise ImportError(NEEDED)
+    if name.startswith("_") or importlib.util.find_spec(f"{__name__}.{name}") is None:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    return importlib.import_module(f"{__name__}.{name}")
+
+
 def register() -> None:
     """Blender switches the add-on on."""
-    from .blender import ui
-    ui.register()
+    if NEEDED:
+        from .blender import needed
+        needed.register(NEEDED)
+    else:
+        from .blender import ui
+        ui.register()
 
 
 def unregister() -> None:
     """Blender switches the add-on off."""
-    from .blender import ui
-    ui.unregister()
+    if NEEDED:
+        from .blender import needed
+        needed.unregister()
+    else:
+        from .blender import ui
+        ui.unregister()

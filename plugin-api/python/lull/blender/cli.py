@@ -10,6 +10,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn, Optional, Sequence
 
+from .. import NEEDED
+
+if NEEDED:  # this is a program: one line, no traceback
+    print(NEEDED, file=sys.stderr, flush=True)
+    sys.exit(2)
+
 from .. import denoising, quote
 from ..criterion import Criterion, load
 from ..driver import Result
