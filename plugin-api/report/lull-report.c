@@ -6,13 +6,13 @@
 
 #include <lull/host.h>
 
-#include "base/colour.h"
 #include "base/files.h"
 #include "base/options.h"
 #include "base/outputs.h"
 #include "picture/read.h"
 #include "report/exr.h"
 #include "report/sheet.h"
+#include "report/shown_as.h"
 
 enum { FAILED = 1, BAD_INPUT = 2, LAYERS = 3 };
 
@@ -68,39 +68,21 @@ static int read_report(struct settings *s, char **report, struct base_err *err)
     return report_from_exr(s->args[0], report, err);
 }
 
-/* Channels NAME.R, NAME.G and NAME.B as codes, the caller's; NULL: the file has them not. */
-static uint8_t *read_layer(const char *path, const char *name, const struct pic_image *like)
-{
-    const size_t pixels = (size_t)like->width * (size_t)like->height;
-    uint8_t *codes = malloc(3 * pixels);
-    for (size_t c = 0; c < 3 && codes; c++) {
-        char channel[32];
-        struct pic_image image = {0};
-        snprintf(channel, sizeof channel, "%s.%c", name, "RGB"[c]);
-        int found = pic_read_channel(path, channel, &image, NULL) == 0 && image.f32 && image.width == like->width &&
-                    image.height == like->height;
-        for (size_t i = 0; found && i < pixels; i++)
-            codes[3 * i + c] = base_srgb_code((double)image.f32[i]);
-        pic_release(&image);
-        if (!found) {
-            free(codes);
-            codes = NULL;
-        }
-    }
-    return codes;
-}
-
 static int write_page(const struct settings *s, const char *report, const char *quote, struct base_err *err)
 {
-    static const char *const names[LAYERS] = {"picture", "noisy", "denoised"};
+    static const char *const names[LAYERS] = {"picture", "noisy", "denoised"}, *const prefixes[LAYERS] = {"", "noisy.",
+                                                                                                          "denoised."};
+    static struct report_view view;
     struct lull_host_layer layers[LAYERS];
     uint8_t *codes[LAYERS] = {NULL};
     struct pic_image picture = {0};
     struct lull_error e = {.struct_size = sizeof e};
     uint32_t count = 0;
-    int rc = s->args[1] ? pic_read_display(s->args[1], &picture, err) : 0;
+    int rc = s->args[1] ? report_view_read(s->args[1], &view, err) : 0;
+    if (!rc && s->args[1])
+        rc = report_view_picture(s->args[1], &view, &picture, err);
     for (int i = 1; i < LAYERS && !rc && s->args[1]; i++)
-        codes[i] = read_layer(s->args[1], names[i], &picture);
+        codes[i] = report_view_channels(s->args[1], prefixes[i], &view, &picture);
     for (int i = 0; i < LAYERS && !rc && s->args[1]; i++)
         if (i == 0 || codes[i])
             layers[count++] = (struct lull_host_layer){names[i], i == 0 ? picture.u8 : codes[i]};

@@ -9,6 +9,7 @@
 #include "picture/colour_map.h"
 #include "picture/font.h"
 #include "picture/read.h"
+#include "report/shown_as.h"
 
 enum { LEAST_SIDE = 240, GAP = 4, MARGIN = 6, BAR = 10, LEGEND = MARGIN + BAR + MARGIN + 2 * PIC_FONT_HEIGHT + MARGIN };
 
@@ -69,7 +70,10 @@ static void paint_scale(const struct sheet *s)
 static int add_frame(struct sheet *s, const char *path, struct base_err *err)
 {
     struct pic_image picture = {0}, spp = {0};
-    int rc = pic_read_display(path, &picture, err);
+    static struct report_view view;
+    int rc = report_view_read(path, &view, err);
+    if (!rc)
+        rc = report_view_picture(path, &view, &picture, err);
     if (!rc)
         rc = pic_read_channel(path, "lull.spp.V", &spp, err);
     if (!rc &&

@@ -1,5 +1,6 @@
 """The Python package lull: the ABI's layout, finding criteria, the driver with a renderer in numpy, the path tracer's stops,
 files, and bad input. BUILD names the build folder."""
+import base64
 import copy
 import ctypes
 import json
@@ -602,6 +603,49 @@ def test_outputs():
     f.criterion.close()
     outputs.write_report(tmp("o.json"), d)  # tells of a criterion that was closed too
     assert json.loads(Path(tmp("o.json")).read_text())["criterion"]["params"]["threshold"] == "0.02"
+
+
+def pictures_of(page):
+    """The PNG files of a page of lull-report, written to the temporary folder, by layer."""
+    found = re.findall(r'data-layer="([^"]*)" src="data:image/png;base64,([^"]*)"', Path(page).read_text())
+    for name, data in found:
+        Path(tmp(f"page-{name}.png")).write_bytes(base64.b64decode(data))
+    return {name: tmp(f"page-{name}.png") for name, _ in found}
+
+
+def test_views():
+    """lull-report shows an EXR as its frame does, by exposure, transfer or any mapping, and says the quality parameter"""
+    views = ({}, {"exposure": .25}, {"transfer": "linear"}, {"transfer": "gamma", "gamma": 1.8, "exposure": 2.},
+             {"display": lambda v: np.clip(v / (v + .2), 0, 1)}, {"display": lambda v: .05 + .9 * np.clip(v, 0, 1)})
+    shown = []
+    for settings in views:
+        f = lull.Frame(lull.load("observer"), 32, 32, block=16, spp_max=32, **settings)
+        d = lull.Driver(f, Noise(SIGMAS))
+        d.run()
+        f.sums["color"][:, :, :] = 32 * np.exp2(np.linspace(-18, 10, 32 * 32 * 3)).reshape(32, 32, 3)  # and beyond the ramp
+        outputs.write_exr(tmp("v.exr"), d, "scene")
+        outputs.write_preview(tmp("v.png"), d)
+        subprocess.run([f"{BUILD}/bin/lull-report", tmp("v.exr"), "-o", tmp("v.html")], check=True)
+        page, own = grey_levels(pictures_of(tmp("v.html"))["picture"]), grey_levels(tmp("v.png"))
+        assert abs(page - own).max() <= 1.001, (settings, np.argwhere(abs(page-own)>1.001)[:5], page[abs(page-own)>1.001][:5], own[abs(page-own)>1.001][:5])  # straight lines between 16 greys an octave: a code at most
+        shown.append(own)
+        report = re.search(r'"params":(\{[^}]*\})', Path(tmp("v.html")).read_text())
+        assert json.loads(report[1])["visible"] == lull.load("observer").info.parameter("visible").default
+    assert all(abs(a - shown[0]).max() > 20 for a in shown[1:])
+    data = Path(tmp("v.exr")).read_bytes()  # the last one's ramp, damaged
+    at = data.index(b"lull:view\0string\0") + len(b"lull:view\0string\0") + 4
+    for damage in (b"-99", b"nan", b"-14 16 9 x", b"-14 0 "):
+        Path(tmp("w.exr")).write_bytes(data[:at] + damage + data[at + len(damage):])
+        done = subprocess.run([f"{BUILD}/bin/lull-report", tmp("w.exr"), "-o", tmp("w.html")], text=True, capture_output=True)
+        assert done.returncode == 2 and "w.exr: its lull:view makes no sense" in done.stderr and not os.path.exists(tmp("w.html"))
+
+
+def test_modules_by_name():
+    """import lull is enough for lull.outputs and every other module, as the pages write it; others are no attribute of it"""
+    code = ("import lull; lull.outputs.write_exr, lull.quote.table, lull.blender, lull.checkpoint.save, lull.exr.read\n"
+            "try: lull.nothing\nexcept AttributeError as e: print(e)")
+    done = subprocess.run([sys.executable, "-c", code], text=True, capture_output=True)
+    assert done.stdout == "module 'lull' has no attribute 'nothing'\n", done
 
 
 def test_progress():

@@ -73,6 +73,17 @@ def srgb(linear: np.ndarray) -> np.ndarray:
     return codes
 
 
+def srgb_encoded(linear: np.ndarray) -> np.ndarray:
+    """Display values in [0, 1] by the sRGB transfer (IEC 61966-2-1)."""
+    light = np.clip(linear, 0.0, 1.0)
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def srgb_decoded(shown: np.ndarray) -> np.ndarray:
+    """The linear light of display values in [0, 1]."""
+    return np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+
+
 def write_each(writers: Iterable[tuple[str, Callable[[str], None]]]) -> tuple[list[str], list[str]]:
     """Calls write(path) for each pair that has a path, whatever becomes of the others. What cannot be written after all is
     kept where temporary files go. Returns the names of the files written, and a line for each that failed."""

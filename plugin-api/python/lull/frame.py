@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from . import abi, limits
 from .criterion import CHANNELS, Criterion, Plane, Rect, plane_names
+from .files import srgb_decoded
 from .host import Block, HostFrame
 from .library import LullError
 
@@ -123,6 +124,15 @@ class Frame(HostFrame):
     def spp(self) -> np.ndarray:
         """Samples per pixel [h, w] that are in the mean."""
         return (self.per_pixel(lambda b: b.spp) - self.dropped).astype(np.uint32)
+
+    def displayed(self, linear: np.ndarray) -> np.ndarray:
+        """What the criterion takes radiance [..., 3] to look like: linear display values, which the sRGB transfer shows."""
+        if self.display:
+            return self.display(linear)
+        value, transfer = linear * self.shown["exposure"], self.shown["transfer"]
+        if transfer == "srgb":
+            return value
+        return srgb_decoded(np.clip(value, 0.0, 1.0) ** (1 / self.shown["gamma"] if transfer == "gamma" else 1.0))
 
     def cropped(self, array: np.ndarray) -> np.ndarray:
         """The part of an array over the view that the crop asked for."""

@@ -15,7 +15,7 @@ import numpy as np
 from . import abi, exr
 from .denoising import Denoised
 from .driver import Driver
-from .files import file_call, srgb, write_png
+from .files import file_call, srgb, srgb_encoded, write_png
 from .frame import Frame
 from .host import HostFrame, reasons
 from .library import library
@@ -33,13 +33,28 @@ def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull 
                 **(_denoised_layers(frame, denoised) if denoised else {}),
                 **{name: frame.mean(name) for name in frame.layers}, **(more or {})}
     info = frame.criterion.info
-    settings = "".join(f" {key}={value}" for key, value in frame.criterion.parameters.items())
+    given = {p.name: frame.criterion.parameters.get(p.name, p.default) for p in info.parameters}
+    settings = "".join(f" {key}={value}" for key, value in given.items() if value is not None)
     exr.write(path, {name: frame.cropped(plane) for name, plane in channels.items() if plane is not None},
               (frame.width, frame.height), frame.crop[:2], {
         "lull:scene": scene, "lull:criterion": f"{info.id} {info.version}{settings}",
         "lull:reasons": " ".join(f"{i}={name}" for i, name in enumerate(reasons())),
         "lull:block": f"{frame.layout.block_width}x{frame.layout.block_height}", "lull:seed": float(frame.seed),
-        "lull:samples": float(driver.totals.samples), "software": software})
+        "lull:samples": float(driver.totals.samples), **_view(frame), "software": software})
+
+
+# Greys of lull:view: from 2^_VIEW_LOW over so many octaves
+_VIEW_LOW, _VIEW_OCTAVES, _VIEW_PER_OCTAVE = -14, 22, 16
+
+
+def _view(frame: Frame) -> dict[str, str]:
+    """How a frame shows greys, as lull-report reads it; {}: by the sRGB transfer alone."""
+    if not frame.display and frame.shown["exposure"] == 1.0 and frame.shown["transfer"] == "srgb":
+        return {}
+    steps = np.arange(_VIEW_OCTAVES * _VIEW_PER_OCTAVE + 1) / _VIEW_PER_OCTAVE
+    greys = np.append(0.0, np.exp2(_VIEW_LOW + steps))
+    codes = srgb_encoded(frame.displayed(np.repeat(greys[:, None], 3, 1))[:, 1])
+    return {"lull:view": f"{_VIEW_LOW} {_VIEW_PER_OCTAVE} " + " ".join(str(round(c)) for c in 65535 * codes)}
 
 
 def _denoised_layers(frame: Frame, denoised: Denoised) -> dict[str, np.ndarray]:
@@ -63,9 +78,8 @@ def is_ours(path: str) -> bool:
 
 
 def shown(frame: Frame, denoised: Optional[Denoised] = None) -> np.ndarray:
-    """[h, w, 3] uint8, cut to the crop: the display mapping of the frame if it has one, then the sRGB transfer."""
-    mean = frame.cropped(denoised.picture if denoised else frame.mean())
-    return srgb(frame.display(mean) if frame.display else mean)
+    """[h, w, 3] uint8, cut to the crop: as the criterion takes it to be shown."""
+    return srgb(frame.displayed(frame.cropped(denoised.picture if denoised else frame.mean())))
 
 
 def write_preview(path: str, driver: Driver, denoised: Optional[Denoised] = None) -> None:

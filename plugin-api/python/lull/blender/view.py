@@ -14,6 +14,8 @@ from typing import Callable, Iterator, Optional
 import bpy
 import numpy as np
 
+from ..files import srgb_decoded
+
 LOW, HIGH, STEPS = -14.0, 8.0, 2048  # log2 of the darkest and the brightest grey of the ramp, and their number
 
 
@@ -50,7 +52,7 @@ def display_of(scene: bpy.types.Scene) -> Optional[Callable[[np.ndarray], np.nda
         return None
     greys = np.concatenate(([0.0], np.exp2(np.linspace(LOW, HIGH, STEPS - 1))))
     encoded = _save_ramp(scene, greys)
-    shown = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    shown = srgb_decoded(encoded)
     return lambda linear: np.interp(linear, greys, shown)
 
 

@@ -1,0 +1,107 @@
+#include "report/shown_as.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/colour.h"
+#include "picture/read.h"
+
+static const double MOST_CODE = 65535.0;
+
+/* The next number of the text, in a range. */
+static int next(const char **at, double low, double high, double *out)
+{
+    char *end;
+    *out = strtod(*at, &end);
+    int found = end != *at && (*end == ' ' || *end == '\0') && *out >= low && *out <= high;
+    *at = end + strspn(end, " ");
+    return found;
+}
+
+int report_view_parse(const char *text, const char *path, struct report_view *out, struct base_err *err)
+{
+    const char *at = text;
+    struct report_view v = {0};
+    if (*text != '\0') {
+        int good =
+            next(&at, -64.0, 64.0, &v.low) && next(&at, 1e-3, 1e3, &v.per_octave) && next(&at, 0.0, MOST_CODE, &v.black);
+        while (good && *at != '\0')
+            good = v.count < REPORT_MOST_GREYS && next(&at, 0.0, MOST_CODE, &v.codes[v.count++]);
+        if (!good || v.count < 2)
+            return base_fail(err, BASE_EINVAL, "%s: its lull:view makes no sense (expected LOW PER_OCTAVE CODE CODE CODE …)",
+                             path);
+    }
+    *out = v;
+    return 0;
+}
+
+int report_view_read(const char *path, struct report_view *out, struct base_err *err)
+{
+    struct pic_attribute attribute = {.name = "lull:view"};
+    struct pic_window window;
+    if (pic_read_header(path, &window, &attribute, 1, NULL) != 0)
+        attribute.text[0] = '\0'; /* no picture of Lull's; whoever reads its pixels says what is wrong */
+    return report_view_parse(attribute.text, path, out, err);
+}
+
+uint8_t report_view_code(const struct report_view *v, double value)
+{
+    if (v->count == 0)
+        return base_srgb_code(value);
+    const double darkest = exp2(v->low), place = value > darkest ? (log2(value) - v->low) * v->per_octave : 0.0;
+    double code;
+    if (!(value > 0.0))
+        code = isnan(value) ? 0.0 : v->black;
+    else if (value <= darkest)
+        code = v->black + (v->codes[0] - v->black) * value / darkest;
+    else if (place >= v->count - 1)
+        code = v->codes[v->count - 1];
+    else {
+        const int i = (int)place;
+        code = v->codes[i] + (v->codes[i + 1] - v->codes[i]) * (place - i);
+    }
+    return (uint8_t)lround(code * 255.0 / MOST_CODE);
+}
+
+uint8_t *report_view_channels(const char *path, const char *prefix, const struct report_view *view,
+                              const struct pic_image *like)
+{
+    const size_t pixels = (size_t)like->width * (size_t)like->height;
+    uint8_t *codes = malloc(3 * pixels);
+    for (size_t c = 0; c < 3 && codes; c++) {
+        char channel[32];
+        struct pic_image image = {0};
+        snprintf(channel, sizeof channel, "%s%c", prefix, "RGB"[c]);
+        int found = pic_read_channel(path, channel, &image, NULL) == 0 && image.f32 && image.width == like->width &&
+                    image.height == like->height;
+        for (size_t i = 0; found && i < pixels; i++)
+            codes[3 * i + c] = report_view_code(view, (double)image.f32[i]);
+        pic_release(&image);
+        if (!found) {
+            free(codes);
+            codes = NULL;
+        }
+    }
+    return codes;
+}
+
+int report_view_picture(const char *path, const struct report_view *view, struct pic_image *out, struct base_err *err)
+{
+    struct pic_image picture = {0};
+    int rc = pic_read_display(path, &picture, err);
+    if (rc)
+        return rc;
+    if (view->count > 0) {
+        uint8_t *codes = report_view_channels(path, "", view, &picture);
+        if (!codes) {
+            pic_release(&picture);
+            return base_fail(err, BASE_EINVAL, "%s: it has a view, lull:view, but no channels R, G and B", path);
+        }
+        free(picture.u8);
+        picture.u8 = codes;
+    }
+    *out = picture;
+    return 0;
+}
