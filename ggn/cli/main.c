@@ -140,6 +140,7 @@ static int run(const struct command *command, int argc, char **argv)
 int main(int argc, char **argv)
 {
     char name[64], text[128];
+    base_interrupt_begin();
     if (argc < 2 || argv[1][0] == '-')
         return main_options(argc, argv);
     const struct command *command = find(argv[1]);

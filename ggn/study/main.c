@@ -516,6 +516,7 @@ static int run(int argc, char **argv)
 
 int main(int argc, char **argv)
 {
+    base_interrupt_begin();
     if (argc < 2 || argv[1][0] == '-')
         return main_options(argc, argv);
     int status = run(argc, argv);

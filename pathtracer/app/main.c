@@ -51,10 +51,10 @@ static int run(struct pt_cli *cli, struct job *job, struct base_log *log, int *s
     if (cli->action == PT_CLI_LIST_CRITERIA)
         return list_criteria(log, err);
     int rc = pt_open_scene(cli, job, log, &open, err);
-    if (!rc && !works)
-        base_interrupt_catch();
     if (!rc && samples)
         rc = pt_open_render(cli, job, log, &open, err);
+    if (!rc && !works) /* before that there is nothing to save, and a criterion may never return from being loaded */
+        base_interrupt_catch();
     if (!rc && samples)
         rc = pt_agree_handshake(&open, job, err);
     if (!rc)
@@ -76,6 +76,7 @@ int main(int argc, char **argv)
     struct job *job = NULL;
     struct base_err err = {0}, job_err = {0};
     int status = 0;
+    base_interrupt_begin();
     int rc = pt_cli_parse(&cli, argc, argv, &err);
     if (job_open(&job, rc ? &job_err : &err) != 0 && !rc)
         rc = err.code;

@@ -13,6 +13,8 @@ static void on_request(int number)
     base_interrupted = 1;
 }
 
+void base_interrupt_begin(void) { signal(SIGXFSZ, SIG_IGN); }
+
 void base_interrupt_catch(void)
 {
     struct sigaction before, action = {.sa_handler = on_request, .sa_flags = (int)SA_RESETHAND};

@@ -7,6 +7,10 @@
 
 #include <signal.h>
 
+/* What a program calls first: SIGXFSZ is ignored. A file that may not grow (ulimit -f) is an error of what is written, as on
+ * a full disk, and no end without a word. */
+void base_interrupt_begin(void);
+
 /* Not 0: asked to end. */
 extern volatile sig_atomic_t base_interrupted;
 

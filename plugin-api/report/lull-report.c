@@ -7,6 +7,7 @@
 #include <lull/host.h>
 
 #include "base/files.h"
+#include "base/interrupt.h"
 #include "base/options.h"
 #include "base/outputs.h"
 #include "picture/read.h"
@@ -129,6 +130,7 @@ int main(int argc, char **argv)
 {
     static struct settings s;
     struct base_err err = {0};
+    base_interrupt_begin();
     int rc = base_options_parse(&command, argc, argv, &s, &err);
     if (!rc)
         rc = is_kind(s.page, "png") ? make_sheet(&s, &err) : make_page(&s, &err);

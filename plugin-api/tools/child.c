@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -166,7 +167,7 @@ static void gather(struct lc *c, pid_t pid, int fd, unsigned limit_s, FILE *outp
     if (!read_lines(fd, limit_s, report)) {
         kill(pid, SIGKILL);
         waitpid(pid, &status, 0);
-        keep_failure(report, "it did not end within %u s", limit_s);
+        keep_failure(report, "it hangs: it did not end within %u s", limit_s);
     } else {
         waitpid(pid, &status, 0);
         keep_end(status, report);
@@ -191,8 +192,11 @@ int lc_child_run(struct lc *c, void (*fn)(struct lc *c, const void *arg), const 
         return -1;
     }
     fflush(stdout);
+    const pid_t parent = getpid();
     pid_t pid = fork();
     if (pid == 0) {
+        if (prctl(PR_SET_PDEATHSIG, SIGKILL) != 0 || getppid() != parent) /* who hangs ends with whoever waits for it */
+            _exit(1);
         close(ends[0]);
         dup2(fileno(output), STDOUT_FILENO);
         dup2(fileno(output), STDERR_FILENO);

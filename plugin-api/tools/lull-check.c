@@ -8,6 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/interrupt.h"
 #include "base/options.h"
 
 enum { PAIRS_MAX = 64, NAMES_MAX = 64, SPECS_MAX = 256, IDS_MAX = LC_LINES_MAX };
@@ -97,6 +98,7 @@ static void find(struct lc *c, const void *arg)
     struct lull_search search = {0};
     struct lull_found *found = malloc(sizeof *found);
     struct lull_error err = {.struct_size = sizeof err, .message = "out of memory"};
+    lc_doing(c, "in loading the library, or in its entry");
     if (!found || lull_open(&search, spec, found, &err) != LULL_OK) {
         size_t last = strlen(spec) > 0 ? strlen(spec) - 1 : 0;
         int senseless = spec[0] == '\0' || spec[0] == ':' || spec[last] == ':';
@@ -124,6 +126,7 @@ static void find(struct lc *c, const void *arg)
 /* Loads the criterion, in a child. */
 static int find_table(struct lc *c, const char *id)
 {
+    lc_doing(c, "in loading the library, or in its entry");
     lull_entry_fn entry = lc_entry(c->path);
     c->criterion = NULL;
     for (uint32_t i = 0; entry && !c->criterion && entry(i); i++)
@@ -152,6 +155,7 @@ static int prepare(struct lc *c)
 {
     struct lull_instance *instance = NULL;
     struct lull_error err = {.struct_size = sizeof err};
+    lc_doing(c, "in create");
     int32_t status = c->criterion->create(NULL, c->pairs, c->pair_count, sizeof *c->pairs, &instance, &err);
     const char *wanted = status == LULL_E_VALUE ? missing(c, err.message) : NULL;
     if (wanted) {
@@ -165,6 +169,7 @@ static int prepare(struct lc *c)
     if (!LC_EXPECT(c, status == LULL_OK && instance, "create failed (%d): %s", status, err.message))
         return -1;
     c->req = (struct lull_requirements){.struct_size = sizeof c->req};
+    lc_doing(c, "in requirements or destroy");
     status = c->criterion->requirements(instance, &c->req, &err);
     c->criterion->destroy(instance);
     c->planes = c->required_only ? c->req.planes_required : c->req.planes_used;
@@ -183,8 +188,10 @@ struct task {
 static void run_task(struct lc *c, const void *arg)
 {
     const struct task *task = arg;
-    if (find_table(c, task->id) == 0 && (!task->needs_instance || prepare(c) == 0) && task->check)
-        task->check->run(c);
+    if (find_table(c, task->id) != 0 || (task->needs_instance && prepare(c) != 0) || !task->check)
+        return;
+    lc_doing(c, "%s", "");
+    task->check->run(c);
 }
 
 struct totals {
@@ -310,6 +317,7 @@ int main(int argc, char **argv)
 {
     static struct arguments a = {.workers = 4, .limit_s = 120, .misuse = 2000, .seed = 1};
     struct base_err err = {0};
+    base_interrupt_begin();
     if (!base_options_parse(&options, argc, argv, &a, &err) && a.spec_count == 0 && !a.list)
         base_fail(&err, BASE_EINVAL, "expected CRITERION... (--help says more)");
     if (err.code) {
