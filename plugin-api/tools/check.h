@@ -239,6 +239,8 @@ int lc_elf_exports(const char *path, void (*visit)(void *context, const char *na
 
 /* Calls of malloc and friends by this process; -1 in a build that cannot count them (sanitizers). */
 long lc_alloc_count(void);
+/* Allocations that are not freed, and their bytes; 0 in such a build, whose LeakSanitizer looks for what is lost. */
+void lc_alloc_live(long *count, long *bytes);
 /* The k-th allocation from now on (0 = the next) fails, and so do all that follow; -1 = none. No effect where not counted.
  */
 void lc_alloc_fail_after(long k);

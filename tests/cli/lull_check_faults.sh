@@ -4,6 +4,26 @@
 # what the host that lull-check plays gives it. The whole output of each run is compared with tests/golden/lull_check_faults.txt.
 . tests/cli/lull_check_setup
 fault() { run "$1 $2: $3" -o "$2" -p "fault=$1" "$plugins/faulty.so"; }
+# What hangs is ended after a minute, in which even a busy machine comes to where it hangs: all of it meanwhile.
+hangs=0
+hang() { # hang NAME ARGS...: begun here, told by `hanged NAME`
+    hangs=$((hangs + 1)) name=$1
+    shift
+    echo "$name" >"$tmp/hang$hangs.name"
+    { "$check" -L 60 "$@"; echo "exit status $?"; } >"$tmp/hang$hangs" 2>&1 &
+    echo $! >"$tmp/hang$hangs.pid"
+}
+hanged() {
+    i=$(grep -lxF "$1" "$tmp"/hang*.name)
+    wait "$(cat "${i%.name}.pid")"
+    mv "${i%.name}" "$tmp/out"
+    same "$1"
+}
+hang "30 flat: hangs" -o flat -p fault=30 "$plugins/faulty.so"
+hang "47 misuse: hangs on a block from right to left" -o misuse -p fault=47 "$plugins/faulty.so"
+for where in load entry create begin evaluate; do
+    LULL_HANG=$where hang "hangs in $where" -o table -o flat "$plugins/hang.so"
+done
 
 run "all checks of the faulty criterion without a fault" "$plugins/faulty.so"
 
@@ -39,9 +59,7 @@ fault 26 missing-planes "does not miss a required plane"
 fault 27 unknown-key "a failed create touches the instance"
 fault 28 out-of-memory "does not look at malloc's result"
 fault 29 no-samples "stops at 0 samples"
-limit=2
-fault 30 flat "hangs"
-limit=
+hanged "30 flat: hangs"
 fault 31 order "begins a frame twice"
 fault 32 invalid "accepts a block that is not in the frame"
 fault 33 repeat "claims to be deterministic and is not"
@@ -58,11 +76,16 @@ fault 43 misuse "fills the error of a call that succeeds"
 fault 44 misuse "drops its history when it refuses a frame"
 fault 45 misuse "makes memory for the frame's blocks and trusts the call's"
 fault 46 misuse "crashes on a long key"
-limit=2
-fault 47 misuse "hangs on a block from right to left"
-limit=
+hanged "47 misuse: hangs on a block from right to left"
 fault 48 misuse "saves without a frame"
 fault 49 misuse "reads past a short writer"
+fault 50 leaks "each frame leaks 8 bytes"
+fault 51 leaks "every seventh create leaks 8 bytes"
+fault 52 leaks "a list of all that was created, which doubles when it is full"
+fault 53 leaks "no fault: a table that is full after 60 times and 32 KB once, late"
+for where in load entry create begin evaluate; do
+    hanged "hangs in $where"
+done
 
 # A mean over the block alone, without the guard against rare bright paths.
 for k in halfbuf variance; do

@@ -65,6 +65,10 @@ enum fault {
     SPINS,
     SAVES_NOTHING,
     SHORT_WRITER,
+    FRAME_LEAK,
+    RARE_LEAK,
+    GROWING_LIST,
+    LAZY_CACHE,
     FAULT_COUNT
 };
 
@@ -262,9 +266,28 @@ static void *sleeper(void *arg)
     return arg;
 }
 
+/* What is kept for ever, by the n-th call: little each time, at times, in a list that doubles; or a table of 60 entries and
+ * something large once, late, which is no leak. */
+static void keep_for_ever(enum fault fault)
+{
+    static void *volatile kept; /* volatile: compilers leave out a malloc that nobody uses */
+    static void *list;
+    static size_t n;
+    n++;
+    if (fault == FRAME_LEAK || (fault == RARE_LEAK && n % 7 == 0) || (fault == LAZY_CACHE && n <= 60))
+        kept = malloc(8);
+    if (fault == LAZY_CACHE && n == 97)
+        kept = malloc(32800);
+    if (fault == GROWING_LIST && (n & (n - 1)) == 0)
+        list = realloc(list, 32 * n);
+    (void)kept;
+}
+
 static void create_faults(struct lull_instance *in)
 {
     pthread_t thread;
+    if (fault_of(in) == RARE_LEAK || fault_of(in) == GROWING_LIST || fault_of(in) == LAZY_CACHE)
+        keep_for_ever(fault_of(in));
     if (fault_of(in) == LEAK)
         in->rects = malloc(40);
     if (fault_of(in) == FILE_LEAK)
@@ -358,6 +381,8 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     free(in->history);
     in->history = history;
     in->history_count = frame->block_count;
+    if (fault_of(in) == FRAME_LEAK)
+        keep_for_ever(FRAME_LEAK);
     if (fault_of(in) == KEEPS_POINTER)
         in->rects = frame->blocks;
     return LULL_OK;
