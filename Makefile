@@ -49,7 +49,7 @@ LDFLAGS_ALL  = -pthread $(SAN_$(MODE)) $(LDFLAGS)
 # --- libraries -----------------------------------------------------------------------------------------------------------
 EXR_CFLAGS  := $(shell $(PKG) --cflags OpenEXR 2>/dev/null)
 EXR_LIBS    := $(or $(filter -L% -lOpenEXRCore%,$(shell $(PKG) --libs OpenEXR 2>/dev/null)),-lOpenEXRCore)
-BLAS_CFLAGS := $(shell $(PKG) --cflags openblas lapacke 2>/dev/null)
+BLAS_CFLAGS := $(shell $(PKG) --cflags openblas 2>/dev/null)
 # Embree has no .pc file: the compiler says which headers it finds.
 EMBREE := $(or $(EMBREE),$(firstword $(foreach v,4 3,$(shell \
     $(CC) $(CPPFLAGS) $(CFLAGS) -E -include embree$(v)/rtcore.h -x c /dev/null >/dev/null 2>&1 && echo $(v)))),4)
@@ -63,7 +63,7 @@ MPI     ?= $(if $(MPI_PKG),1)
 MPI_CFLAGS := $(patsubst -I%,-isystem %,$(if $(MPI_PKG),$(shell $(PKG) --cflags $(MPI_PKG))))
 MPI_LIBS   := $(if $(MPI_PKG),$(shell $(PKG) --libs $(MPI_PKG)))
 STUDY_LIBS := -lmicrohttpd -lsqlite3
-GGN_LIBS := -lopenblas -llapacke -lsvm -lcjson -lpng -lz -ldl -lm
+GGN_LIBS := -lsvm -lcjson -lpng -lz -ldl -lm
 
 # --- include paths: the dependency arrows --------------------------------------------------------------------------------
 API := -Iplugin-api/include

@@ -5,10 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <cblas.h>
 #include <cjson/cJSON.h>
 
 #include "base/json.h"
+#include "baselines/blas.h"
 #include "baselines/features.h"
 #include "baselines/lstm.h"
 #include "model/stopper.h"
@@ -258,13 +258,14 @@ void ggn_baseline_reader_destroy(struct ggn_baseline_reader *r)
 struct ggn_baseline_reader *ggn_baseline_reader_create(const struct ggn_baseline *b, struct base_err *err)
 {
     const size_t pixels = (size_t)b->width * (size_t)b->height;
+    if (b->kind == GGN_SVD_ENTROPY && ggn_blas_open(err) != 0)
+        return NULL;
     struct ggn_baseline_reader *r = calloc(1, sizeof *r);
 
     if (!r) {
         base_fail_nomem(err, "baseline");
         return NULL;
     }
-    openblas_set_num_threads(1);
     r->b = b;
     r->tile = malloc(3 * pixels * sizeof *r->tile);
     r->codes = malloc(3 * pixels);

@@ -4,9 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <lapacke.h>
-
 #include "base/colour.h"
+#include "baselines/blas.h"
 
 void ggn_lightness(const uint8_t *rgb, size_t pixels, double *l)
 {
@@ -43,13 +42,16 @@ int ggn_svd_entropy(const double *l, int w, int h, int first, int last, double *
     double a[N * N], s[N], work[64 * N];
     if (first < 0 || last > N || last - first < 2 || w < N || h < N)
         return base_fail(err, BASE_EINVAL, "SVD-entropy of singular values %d to %d of a %dx%d block", first, last, w, h);
+    int rc = ggn_blas_open(err);
+    if (rc)
+        return rc;
     for (int by = 0; by < h / N; by++)
         for (int bx = 0; bx < w / N; bx++) {
             double largest = 0.0;
             for (int y = 0; y < N; y++)
                 for (int x = 0; x < N; x++)
                     a[x * N + y] = floor(l[(size_t)(by * N + y) * (size_t)w + (size_t)(bx * N + x)]);
-            if (LAPACKE_dgesvd_work(LAPACK_COL_MAJOR, 'N', 'N', N, N, a, N, s, NULL, 1, NULL, 1, work, 64 * N) != 0)
+            if (ggn_blas_singular_values(N, a, s, work) != 0)
                 return base_fail(err, BASE_EINVAL, "SVD-entropy: the singular values do not converge");
             largest = s[0];
             for (int i = 0; i < N; i++) /* rounding errors of a rank-deficient sub-block are no noise */

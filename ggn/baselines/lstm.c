@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <cblas.h>
+#include "baselines/blas.h"
 
 enum { LAYERS = 3, BATCH = 64 };
 static const int widths[LAYERS] = {512, 128, 32};
@@ -132,6 +132,8 @@ static void place_activations(struct ggn_lstm *l)
 /* weights NULL: for training, with parameters of its own. */
 static struct ggn_lstm *create(int inputs, int steps, int batch, const float *weights, struct base_err *err)
 {
+    if (ggn_blas_open(err) != 0)
+        return NULL;
     struct ggn_lstm *l = calloc(1, sizeof *l);
     if (!l) {
         base_fail_nomem(err, "LSTM");
@@ -166,7 +168,6 @@ struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct ba
     if (!l)
         return NULL;
     l->seed = seed;
-    openblas_set_num_threads(1);
     init_weights(l, seed);
     return l;
 }
@@ -186,11 +187,10 @@ static void forward_step(const struct ggn_lstm *l, const struct layer *y, int t,
     const float *x = y->x + (size_t)t * (size_t)l->batch * (size_t)y->in;
     for (int r = 0; r < batch; r++)
         memcpy(z + (size_t)r * 4 * (size_t)out, l->p + y->b, 4 * (size_t)out * sizeof *z);
-    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, batch, 4 * out, y->in, 1.0f, x, y->in, l->p + y->w, y->in, 1.0f, z,
-                4 * out);
+    ggn_blas_sgemm(CblasNoTrans, CblasTrans, batch, 4 * out, y->in, 1.0f, x, y->in, l->p + y->w, y->in, 1.0f, z, 4 * out);
     if (t > 0)
-        cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, batch, 4 * out, out, 1.0f,
-                    y->h + (size_t)(t - 1) * (size_t)l->batch * (size_t)out, out, l->p + y->u, out, 1.0f, z, 4 * out);
+        ggn_blas_sgemm(CblasNoTrans, CblasTrans, batch, 4 * out, out, 1.0f,
+                       y->h + (size_t)(t - 1) * (size_t)l->batch * (size_t)out, out, l->p + y->u, out, 1.0f, z, 4 * out);
     for (int r = 0; r < batch; r++)
         for (int k = 0; k < out; k++) {
             float *g = z + (size_t)r * 4 * (size_t)out + (size_t)k;
@@ -255,19 +255,17 @@ static void backward_step(struct ggn_lstm *l, struct layer *y, int t, int batch)
         }
     const float *x = y->x + (size_t)t * (size_t)l->batch * (size_t)y->in;
     /* dW += dZᵀ·X, dU += dZᵀ·H₋, dX = dZ·W, dH₋ = dZ·U */
-    cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, 4 * out, y->in, batch, 1.0f, z, 4 * out, x, y->in, 1.0f,
-                l->grad + y->w, y->in);
-    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, batch, y->in, 4 * out, 1.0f, z, 4 * out, l->p + y->w, y->in, 0.0f,
-                y->dx + (size_t)t * (size_t)l->batch * (size_t)y->in, y->in);
+    ggn_blas_sgemm(CblasTrans, CblasNoTrans, 4 * out, y->in, batch, 1.0f, z, 4 * out, x, y->in, 1.0f, l->grad + y->w, y->in);
+    ggn_blas_sgemm(CblasNoTrans, CblasNoTrans, batch, y->in, 4 * out, 1.0f, z, 4 * out, l->p + y->w, y->in, 0.0f,
+                   y->dx + (size_t)t * (size_t)l->batch * (size_t)y->in, y->in);
     for (int r = 0; r < batch; r++)
         for (int k = 0; k < 4 * out; k++)
             l->grad[y->b + (size_t)k] += z[(size_t)r * 4 * (size_t)out + (size_t)k];
     if (t == 0)
         return;
-    cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, 4 * out, out, batch, 1.0f, z, 4 * out,
-                y->h + (size_t)(t - 1) * (size_t)l->batch * (size_t)out, out, 1.0f, l->grad + y->u, out);
-    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, batch, out, 4 * out, 1.0f, z, 4 * out, l->p + y->u, out, 0.0f,
-                l->dh, out);
+    ggn_blas_sgemm(CblasTrans, CblasNoTrans, 4 * out, out, batch, 1.0f, z, 4 * out,
+                   y->h + (size_t)(t - 1) * (size_t)l->batch * (size_t)out, out, 1.0f, l->grad + y->u, out);
+    ggn_blas_sgemm(CblasNoTrans, CblasNoTrans, batch, out, 4 * out, 1.0f, z, 4 * out, l->p + y->u, out, 0.0f, l->dh, out);
 }
 
 /* Gradients of the sum over the batch of d[r]·logit[r]. */

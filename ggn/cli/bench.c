@@ -1,5 +1,4 @@
 /* `ggn bench`: how fast the networks run on this machine, per layer and as medians. */
-#include <cblas.h>
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -7,6 +6,7 @@
 
 #include "base/clock.h"
 #include "base/options.h"
+#include "baselines/blas.h"
 #include "cli/commands.h"
 #include "figures/stats.h"
 #include "model/inference.h"
@@ -228,12 +228,11 @@ static double sgemm_gflops(const struct bench *b, float *memory)
 {
     float *x = memory, *y = x + SGEMM_N * SGEMM_N, *z = y + SGEMM_N * SGEMM_N;
 
-    openblas_set_num_threads(b->o.threads);
+    ggn_blas_threads(b->o.threads);
     double start = now_s(b);
-    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, SGEMM_N, SGEMM_N, SGEMM_N, 1, x, SGEMM_N, y, SGEMM_N, 0, z,
-                SGEMM_N);
+    ggn_blas_sgemm(CblasNoTrans, CblasNoTrans, SGEMM_N, SGEMM_N, SGEMM_N, 1, x, SGEMM_N, y, SGEMM_N, 0, z, SGEMM_N);
     double elapsed = now_s(b) - start;
-    openblas_set_num_threads(1);
+    ggn_blas_threads(1);
     return 2e-9 * SGEMM_N * SGEMM_N * SGEMM_N / elapsed;
 }
 
@@ -244,6 +243,10 @@ static int measure(struct bench *b, double figure[N_FIGURES], struct base_err *e
 
     if (!gemm)
         return base_fail_nomem(err, "sgemm");
+    if (ggn_blas_open(err) != 0) {
+        free(gemm);
+        return BASE_EINVAL;
+    }
     for (int i = -1; i < b->o.rounds; i++) { /* round −1 warms up */
         int k = i < 0 ? 0 : i;
         sample[DENOISER][k] = forward_ms(b, b->r, GGN_NET_R);

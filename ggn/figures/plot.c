@@ -55,19 +55,59 @@ int ggn_plot_begin(struct ggn_plot *plot, const char *path, int width, int heigh
     return 0;
 }
 
-static int run_gnuplot(struct ggn_plot *plot, struct base_err *err)
+/* All of what a descriptor has to say, which is closed; its first line that says something is kept. */
+static void read_complaint(int fd, char *line, size_t room)
+{
+    char text[512];
+    FILE *from = fdopen(fd, "r");
+    line[0] = '\0';
+    while (from && fgets(text, sizeof text, from))
+        if (line[0] == '\0' && text[strspn(text, " \n")] != '\0')
+            snprintf(line, room, ": %.*s", (int)strcspn(text, "\n"), text);
+    if (from)
+        fclose(from);
+    else
+        close(fd);
+}
+
+/* Its standard error is a pipe, so that a failure is one line of ours. */
+static int start_gnuplot(struct ggn_plot *plot, pid_t *pid, int *said)
 {
     char *argv[] = {(char[]){"gnuplot"}, plot->tmp_script, NULL};
+    posix_spawn_file_actions_t actions;
+    int ends[2];
+    if (pipe(ends) != 0)
+        return errno;
+    int bad = posix_spawn_file_actions_init(&actions);
+    if (!bad) {
+        bad = posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO) ||
+                      posix_spawn_file_actions_addclose(&actions, ends[0]) ||
+                      posix_spawn_file_actions_addclose(&actions, ends[1])
+                  ? ENOMEM
+                  : posix_spawnp(pid, argv[0], &actions, NULL, argv, environ);
+        posix_spawn_file_actions_destroy(&actions);
+    }
+    close(ends[1]);
+    if (bad)
+        close(ends[0]);
+    *said = ends[0];
+    return bad;
+}
+
+static int run_gnuplot(struct ggn_plot *plot, struct base_err *err)
+{
+    char complaint[256];
     pid_t pid;
-    int status;
-    int bad = posix_spawnp(&pid, argv[0], NULL, NULL, argv, environ);
+    int status, said = -1;
+    int bad = start_gnuplot(plot, &pid, &said);
     if (bad != 0)
         return base_fail(err, BASE_EIO, "%s: gnuplot cannot be started: %s", plot->path, strerror(bad));
+    read_complaint(said, complaint, sizeof complaint);
     while (waitpid(pid, &status, 0) < 0)
         if (errno != EINTR)
             return base_fail(err, BASE_EIO, "%s: gnuplot was lost: %s", plot->path, strerror(errno));
     if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
-        return base_fail(err, BASE_EIO, "%s: gnuplot failed", plot->path);
+        return base_fail(err, BASE_EIO, "%s: gnuplot failed%s", plot->path, complaint);
     return base_file_rename(plot->tmp_picture, plot->path, err);
 }
 

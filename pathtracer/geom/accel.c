@@ -7,6 +7,7 @@
 
 #include "geom/embree.h"
 #include "geom/quadric.h"
+#include "geom/terminate.h"
 
 struct pt_accel {
     RTCDevice device;
@@ -261,12 +262,16 @@ static int build(struct pt_scene *scene, struct pt_accel *accel)
 
 int pt_accel_build(struct pt_scene *scene, struct base_err *err)
 {
+    static const char what[] = "the acceleration structure";
     struct pt_accel *accel = calloc(1, sizeof *accel);
     if (!accel)
-        return base_fail_nomem(err, "the acceleration structure");
-    if (!build(scene, accel)) {
+        return base_fail_nomem(err, what);
+    pt_terminate_begin(what);
+    int built = build(scene, accel);
+    pt_terminate_end();
+    if (!built) {
         destroy(accel);
-        return base_fail_nomem(err, "the acceleration structure");
+        return base_fail_nomem(err, what);
     }
     struct RTCBounds b;
     rtcGetSceneBounds(accel->world, &b);

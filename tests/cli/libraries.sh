@@ -20,10 +20,10 @@ needs() { # needs FILE NAME...: exactly these, beside the C library and the sani
 t "observer.so needs the mathematical library" needs "$lib/observer.so" libm
 t "denoised.so needs the mathematical library, and no denoiser" needs "$lib/denoised.so" libm
 t "ggn.so needs no BLAS" needs "$lib/ggn.so" libcjson libm
-t "baselines.so needs OpenBLAS, LAPACKE and libsvm" needs "$lib/baselines.so" libcjson liblapacke libm libopenblas libsvm
+t "baselines.so needs libsvm, and OpenBLAS when it is asked only" needs "$lib/baselines.so" libcjson libm libsvm
 for k in fixed halfbuf variance; do t "$k.so needs the mathematical library" needs "$lib/$k.so" libm; done
 t "lull-study needs libmicrohttpd and SQLite, no BLAS" needs "$BUILD/bin/lull-study" libcjson libm libmicrohttpd libpng16 libsqlite3 libz
-t "ggn needs neither" needs "$BUILD/bin/ggn" libcjson liblapacke libm libopenblas libpng16 libsvm libz
+t "ggn needs neither" needs "$BUILD/bin/ggn" libcjson libm libpng16 libsvm libz
 only() { # only NAME: opened by it, NAME.so is the one library of criteria that is loaded
     LD_DEBUG=files "$BUILD/bin/lull-check" -q -o table "$1" 2>&1 | sed -n 's|.*calling init: .*/\([a-z_-]*[.]so\)$|\1|p' | sort -u >"$err.names"
     loaded=$(grep -xE "$(ls "$lib" | tr '\n' '|' | sed 's/|$//')" "$err.names" | tr '\n' ' ')
