@@ -129,7 +129,7 @@ check "   ...another without scalars" $?
 fails "networks with other inputs to start from" "another size, preset or input" $ggn train $law --scalars 0 --init "$tmp/law.ggn"
 $ggn evaluate -d "$tmp/law" -m "$tmp/law.ggn" -m "$tmp/plain.ggn" --no-quality >"$tmp/figures" 2>"$tmp/err" && grep -q "^law.ggn" "$tmp/figures"
 check "   ...evaluate judges it" $?
-LULL_MODEL=$tmp/law.ggn $BUILD/bin/lull-check -q "$BUILD/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
+LULL_MODEL=$tmp/law.ggn $BUILD/bin/lull-check -q -L "${LIMIT_S:-3600}" "$BUILD/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
 check "   ...lull-check passes the criterion with it" $?
 
 # the noise picture, dropped at random, averaged weights, no flips: the same bytes after an interruption, and other bytes than without
@@ -144,7 +144,7 @@ for no in "" --no-pictures; do
     $ggn evaluate -d $data -m "$tmp/picture.ggn" --no-quality --json $no >"$tmp/figures$no" 2>"$tmp/err" || break
 done && ! cmp -s "$tmp/figures" "$tmp/figures--no-pictures"
 check "evaluate with and without noise pictures" $?
-LULL_MODEL=$tmp/picture.ggn $BUILD/bin/lull-check -q "$BUILD/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
+LULL_MODEL=$tmp/picture.ggn $BUILD/bin/lull-check -q -L "${LIMIT_S:-3600}" "$BUILD/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
 check "lull-check passes the criterion with this model" $?
 fails "a model of another input to start from" "another size, preset or input" $ggn train $tiny --init "$tmp/picture.ggn"
 fails "no noise picture in the published preset" "preset paper has neither noise pictures" $ggn train --data $data --preset paper --picture 1
@@ -164,11 +164,11 @@ $ggn train $tiny --out "$tmp/no/such/folder/m.ggn" -q 2>"$tmp/err"
 check "an output folder that is not there" $?
 
 # the criterion with this model holds to the whole contract
-LULL_MODEL=$tmp/a.ggn $BUILD/bin/lull-check "$BUILD/lib/lull/ggn.so:ggn" >"$tmp/out" 2>&1
+LULL_MODEL=$tmp/a.ggn $BUILD/bin/lull-check -L "${LIMIT_S:-3600}" "$BUILD/lib/lull/ggn.so:ggn" >"$tmp/out" 2>&1
 rc=$?
 grep '^not ok' "$tmp/out" >"$tmp/err"
 check "lull-check passes the criterion ggn" $rc
-LULL_MODEL=$tmp/a.ggn $BUILD/bin/lull-check -q -o state -o repeat -o batch -p gate=0 -p visible=0.9 -p passes=1 \
+LULL_MODEL=$tmp/a.ggn $BUILD/bin/lull-check -q -L "${LIMIT_S:-3600}" -o state -o repeat -o batch -p gate=0 -p visible=0.9 -p passes=1 \
     "$BUILD/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
 check "and with other parameters" $?
 echo "1..$n"

@@ -66,13 +66,13 @@ of() { # of ID [CHECK...]: options for the criterion
 }
 # With the denoiser of tests/stub everything; with the real one, which takes a second for a block, what it could break.
 denoised() { # denoised WHERE
-    t "denoised.so keeps the contract$1" env LULL_OIDN="$checker_build/tests/oidn-stub" "$checker" -q -L "${LIMIT_S:-600}" "$so"
+    t "denoised.so keeps the contract$1" env LULL_OIDN="$checker_build/tests/oidn-stub" "$checker" -q -L "${LIMIT_S:-3600}" "$so"
     set -- "denoised.so keeps it with Open Image Denoise$1" null strides repeat evaluate-allocates out-of-memory
     if "$checker" -o table "$so" | grep -q "^ok.*table"; then
         name=$1
         shift
         # shellcheck disable=SC2046
-        t "$name" "$checker" -q -L "${LIMIT_S:-600}" $(printf -- '-o %s ' "$@") "$so"
+        t "$name" "$checker" -q -L "${LIMIT_S:-3600}" $(printf -- '-o %s ' "$@") "$so"
     else
         n=$((n + 1))
         echo "ok $n - $1 # SKIP scripts/setup --denoiser has not put it into build/oidn"
@@ -85,12 +85,12 @@ all() { # all CHECKER LIBDIR WHERE CHECK...: each criterion of the build
         case ${so##*/} in
         denoised.so) denoised "$where" ;;
         observer.so)
-            t "observer keeps the contract$where" "$checker" -q -L "${LIMIT_S:-600}" "$so"
-            t "observer keeps it without half buffers$where" "$checker" -q -L "${LIMIT_S:-600}" -r "$so" ;;
+            t "observer keeps the contract$where" "$checker" -q -L "${LIMIT_S:-3600}" "$so"
+            t "observer keeps it without half buffers$where" "$checker" -q -L "${LIMIT_S:-3600}" -r "$so" ;;
         baselines.so)
             for k in svd-entropy attributes noise-mask; do
                 # shellcheck disable=SC2046
-                t "$k keeps the contract$where" "$checker" -q -L "${LIMIT_S:-600}" $(of $k $few state repeat batch shapes evaluate-allocates) "$so:$k"
+                t "$k keeps the contract$where" "$checker" -q -L "${LIMIT_S:-3600}" $(of $k $few state repeat batch shapes evaluate-allocates) "$so:$k"
             done ;;
         ggn.so)
             if [ -z "${LULL_MODEL:-}" ] && ! ls ggn/models/lull-*.ggn >/dev/null 2>&1; then
@@ -98,9 +98,9 @@ all() { # all CHECKER LIBDIR WHERE CHECK...: each criterion of the build
                 echo "ok $n - ggn keeps the contract$where # SKIP no model in ggn/models"
             else
                 # shellcheck disable=SC2046
-                t "ggn keeps the contract$where" "$checker" -q -L "${LIMIT_S:-600}" $(of ggn $few "$@") "$so"
+                t "ggn keeps the contract$where" "$checker" -q -L "${LIMIT_S:-3600}" $(of ggn $few "$@") "$so"
             fi ;;
-        *) [ "$checker" = "$check" ] || t "${so##*/} keeps the contract$where" "$checker" -q -L "${LIMIT_S:-600}" "$so" ;; # plain: above
+        *) [ "$checker" = "$check" ] || t "${so##*/} keeps the contract$where" "$checker" -q -L "${LIMIT_S:-3600}" "$so" ;; # plain: above
         esac
     done
 }
