@@ -115,9 +115,9 @@ struct pt_shape {
     int32_t material;              /* id, never -1 */
     int32_t light;                 /* id of the area light it carries, -1 = none; always -1 in objects */
     int32_t medium_in, medium_out; /* on the side against / along the geometric normal; equal = the ray keeps its medium */
-    int32_t flip_normal;   /* the geometric normal is against that of the stored shape: of triangles by the right-hand rule
-                            (reverse orientation XOR a transform that swaps handedness), of quadrics away from centre or axis,
-                            +z of a disk (reverse orientation). Lamps, glass and media follow it */
+    int32_t flip_normal;   /* the geometric normal, which lamps, glass and media follow, is against that of the stored shape:
+                            of triangles by the right-hand rule (reverse orientation XOR a transform that swaps
+                            handedness), of quadrics away from centre or axis, +z of a disk (reverse orientation) */
     int32_t has_alpha;     /* `alpha` is not constant 1 */
     struct pt_input alpha; /* float: probability that a hit counts */
 };

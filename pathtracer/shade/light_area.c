@@ -29,7 +29,7 @@ static float whole_sphere(const struct pt_quadric *q, pt_vec3 *centre)
  * the near half is sampled, which for an inner side is the point itself. */
 #define ON_SPHERE 0.99999f
 
-/* Steps in which the area of a stretched quadric is summed up: within 1e-4 of it however flat or long the transform makes it. */
+/* Steps in which the area of a stretched quadric is summed up: within 1e-4 however flat or long the transform makes it. */
 enum { AREA_STEPS = 256 };
 
 /* 1 - cos of the half angle of the cone that the sphere fills, 0 when seen from inside. Without cancellation:
@@ -78,8 +78,8 @@ static pt_vec3 point_on(const struct pt_quadric *q, float u0, float u1, pt_vec3 
     return v3(rho * c, rho * s, z);
 }
 
-/* Mean of the area scale over a sphere or a cylinder, or what is left of it, weighted by area: the midpoint rule over φ and, as the
- * integrand is smooth in it, the polar angle θ. */
+/* Mean of the area scale over a sphere or a cylinder, or what is left of it, weighted by area: the midpoint rule over φ and,
+ * as the integrand is smooth in it, the polar angle θ. */
 static double mean_area_scale(const struct pt_quadric *q)
 {
     float z0 = fmaxf(-1.0f, q->z_min / q->radius), z1 = fminf(1.0f, q->z_max / q->radius);
