@@ -89,12 +89,13 @@ static inline void pt_place_mesh(pt_effects fx, const struct pt_scene *scene, co
     at->error =
         v3_scale(v3(pt_max3_abs(a.x, b.x, c.x), pt_max3_abs(a.y, b.y, c.y), pt_max3_abs(a.z, b.z, c.z)), PT_OFFSET_ERROR);
     pt_vec3 n = v3_norm(hit->geometric);
+    s->n_geometric = s->n_shading = shape->flip_normal ? v3_neg(n) : n;
     if (mesh->has_normals) {
         pt_vec3 ns = v3_norm(pt_corners_mix(k.a->n, k.b->n, k.c->n, hit->u, hit->v));
-        s->n_shading = v3_is_black(ns) ? n : ns;
-        s->n_geometric = v3_dot(s->n_shading, n) < 0.0f ? v3_neg(n) : n;
-    } else {
-        s->n_geometric = s->n_shading = shape->flip_normal ? v3_neg(n) : n;
+        if (!v3_is_black(ns)) {
+            s->n_shading = ns;
+            s->n_geometric = v3_dot(ns, s->n_geometric) < 0.0f ? v3_neg(s->n_geometric) : s->n_geometric;
+        }
     }
     if (fx & (PT_FX_TEXTURE | PT_FX_ALPHA | PT_FX_BUMP))
         pt_place_uv(mesh, k, hit->u, hit->v, s);

@@ -126,6 +126,7 @@ static int store_positions(const struct pt_soup *soup, const struct pt_xform *t,
     return 1;
 }
 
+/* What has no length, or a component that is no number, is no normal: zero. */
 static void store_normals(const struct pt_soup *soup, const struct pt_xform *inverse, int negate, struct pt_vertex *out)
 {
     for (size_t i = 0; i < soup->vertex_count; i++) {
@@ -139,7 +140,8 @@ static void store_normals(const struct pt_soup *soup, const struct pt_xform *inv
         }
         /* Scenes scaled by 1e±6 must not leave float's range when the length is squared. */
         float big = fmaxf(fabsf(o[0]), fmaxf(fabsf(o[1]), fabsf(o[2])));
-        out[i].n = big > 0 && isfinite(big) ? v3(o[0] / big, o[1] / big, o[2] / big) : v3_splat(0);
+        int some = big > 0 && isfinite(o[0]) && isfinite(o[1]) && isfinite(o[2]);
+        out[i].n = some ? v3(o[0] / big, o[1] / big, o[2] / big) : v3_splat(0);
     }
 }
 

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "pbrt/number.h"
 #include "pbrt/params.h"
@@ -171,6 +172,13 @@ static int read_header(struct reader *r)
 
 static int truncated(struct reader *r) { return base_fail(r->err, BASE_EINVAL, "%s: truncated PLY file", r->name); }
 
+/* What exporters write for a number that is none; where one is needed, its reader refuses it. */
+static int is_no_number(const char *text, size_t n)
+{
+    size_t sign = n > 0 && (text[0] == '-' || text[0] == '+');
+    return n >= sign + 3 && (strncasecmp(text + sign, "nan", 3) == 0 || strncasecmp(text + sign, "inf", 3) == 0);
+}
+
 static int ascii_value(struct reader *r, double *out)
 {
     while (r->at < r->end && (*r->at == ' ' || *r->at == '\n' || *r->at == '\t' || *r->at == '\r'))
@@ -181,9 +189,12 @@ static int ascii_value(struct reader *r, double *out)
     if (start == r->at)
         return truncated(r);
     size_t n = (size_t)(r->at - start);
-    if (!pt_number_parse(start, n, out))
+    if (pt_number_parse(start, n, out))
+        return 0;
+    if (!is_no_number(start, n))
         return base_fail(r->err, BASE_EINVAL, "%s: \"%.*s\" in PLY data (expected a finite number)", r->name,
                          n < 30 ? (int)n : 30, start);
+    *out = NAN;
     return 0;
 }
 
@@ -244,7 +255,7 @@ static int store_vertex_value(struct reader *r, uint64_t i, enum role role, doub
     case R_NY:
     case R_NZ:
         if (p->normals)
-            p->normals[3 * i + (uint64_t)(role - R_NX)] = isfinite((float)v) ? (float)v : 0.0f;
+            p->normals[3 * i + (uint64_t)(role - R_NX)] = (float)v;
         break;
     case R_U:
     case R_V:

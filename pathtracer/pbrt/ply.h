@@ -12,7 +12,7 @@
 struct pt_ply {
     uint32_t vertex_count, triangle_count;
     float *positions;  /* owns: [vertex_count][3], finite */
-    float *normals;    /* owns: [vertex_count][3] or NULL */
+    float *normals;    /* owns: [vertex_count][3] as they stand in the file, finite or not; or NULL */
     float *uvs;        /* owns: [vertex_count][2] or NULL */
     uint32_t *indices; /* owns: [triangle_count][3], each < vertex_count */
     uint32_t polygons; /* faces of more than four corners, cut into fans */

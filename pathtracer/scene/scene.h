@@ -84,7 +84,7 @@ struct pt_texture {
 
 /* All that a hit reads of a corner lies in one cache line. */
 struct pt_vertex {
-    pt_vec3 p, n; /* n: shading normal, any length, already negated for a shape with reverse orientation */
+    pt_vec3 p, n; /* n: shading normal, any length, already negated for a shape with reverse orientation; 0: none */
     float u, v;
 };
 _Static_assert(sizeof(struct pt_vertex) == 32, "a vertex is half a cache line");
@@ -93,7 +93,7 @@ struct pt_mesh {
     uint32_t vertex_count, triangle_count;
     const struct pt_vertex *vertices; /* [vertex_count], each within one cache line */
     const uint32_t *indices;          /* [triangle_count][3], each < vertex_count */
-    int32_t has_normals;              /* they decide the side of the geometric normal */
+    int32_t has_normals;              /* where there are some, they decide the side of the geometric normal */
     int32_t has_uvs;                  /* else (0,0), (1,0), (1,1) at the three corners of a triangle */
 };
 

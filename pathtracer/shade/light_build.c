@@ -56,10 +56,8 @@ static double triangle_emitter(const struct pt_scene *scene, const struct pt_sha
     double area = 0.5 * sqrt((double)n.x * (double)n.x + (double)n.y * (double)n.y + (double)n.z * (double)n.z);
     e->n = area > 0.0 ? v3_scale(n, (float)(0.5 / area)) : v3_splat(0.0f);
     e->area_over_pmf = (float)area; /* divided by the pmf once that is known */
-    int against = shape->flip_normal;
-    if (mesh->has_normals)
-        against = v3_dot(v3_add(a->n, v3_add(b->n, c->n)), n) < 0.0f;
-    if (against)
+    float side = mesh->has_normals ? v3_dot(v3_add(a->n, v3_add(b->n, c->n)), n) : 0.0f;
+    if (side != 0.0f ? side < 0.0f : shape->flip_normal)
         e->n = v3_neg(e->n);
     return isfinite(e->area_over_pmf) ? area : 0.0;
 }
