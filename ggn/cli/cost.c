@@ -56,6 +56,7 @@ static const struct base_option list[] = {
 struct job {
     const struct options *o;
     struct ggn_eval_set set;
+    cJSON *learned[MAX_FILES]; /* own; the data that each model was made with */
     enum ggn_split split;
     struct ggn_checks_made *checks; /* [blocks] */
     double *stop;                   /* [blocks] */
@@ -474,9 +475,10 @@ static int cost_thresholds(struct job *j, struct base_err *err)
     return rc;
 }
 
-/* What the models take, and the longest window. */
-static int read_models(const struct options *o, struct ggn_eval_options *eo, struct base_err *err)
+/* What the models take, the longest window, and the scenes that they know. */
+static int read_models(struct job *j, struct ggn_eval_options *eo, struct base_err *err)
 {
+    const struct options *o = j->o;
     int rc = 0;
     for (int i = 0; i < o->n_models && !rc; i++) {
         struct ggn_model *model = NULL;
@@ -484,6 +486,7 @@ static int read_models(const struct options *o, struct ggn_eval_options *eo, str
         if (!rc) {
             eo->noise_maps |= model->hyper.noise_map && (model->hyper.reach > 0 || !o->no_noise_maps);
             eo->measures |= model->hyper.reach > 0;
+            j->learned[i] = cJSON_Duplicate(cJSON_GetObjectItemCaseSensitive(model->provenance, "data"), 1);
             eo->window = model->hyper.window > eo->window ? model->hyper.window : eo->window;
         }
         ggn_model_destroy(model);
@@ -549,13 +552,15 @@ int ggn_cmd_cost(int argc, char **argv)
     if (!rc && !(threads = base_threads_create(o.threads, &err)))
         rc = err.code;
     eo.dir = o.data;
+    eo.split.learned = (const cJSON *const *)j.learned;
+    eo.split.n_learned = o.n_models;
     eo.quality = !o.no_quality;
     eo.recorded = o.recorded;
     eo.without_halves = o.no_noise_maps;
     eo.ratio = o.ratio;
     eo.cadence = o.cadence;
     if (!rc)
-        rc = read_models(&o, &eo, &err);
+        rc = read_models(&j, &eo, &err);
     if (!rc)
         rc = ggn_eval_set_load(&j.set, &eo, threads, &skipped, &err);
     for (int b = 0; o.recorded && b < j.set.n_blocks; b++) /* whose thresholds lie beyond: nothing is known there */
@@ -565,6 +570,8 @@ int ggn_cmd_cost(int argc, char **argv)
         rc = base_fail(&err, BASE_EINVAL, "%s: no labelled block in the split '%s'", o.data, ggn_split_names[j.split]);
     if (!rc)
         rc = cost(&j, threads, &err);
+    for (int i = 0; i < o.n_models; i++)
+        cJSON_Delete(j.learned[i]);
     ggn_eval_set_release(&j.set);
     base_threads_destroy(threads);
     return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;

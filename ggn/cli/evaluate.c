@@ -23,7 +23,7 @@
 enum { MAX_MODELS = 8, MAX_FILES = 8, MAX_METHODS = 10 + 2 * MAX_FILES + 2 * MAX_MODELS, MAX_ADJUSTED = 8 };
 
 struct options {
-    const char *data, *out, *observer, *models[MAX_MODELS], *thresholds[MAX_FILES], *trained[MAX_FILES];
+    const char *data, *validation, *test, *out, *observer, *models[MAX_MODELS], *thresholds[MAX_FILES], *trained[MAX_FILES];
     int n_models, n_thresholds, n_trained, json, no_quality, threads, window, retune, recorded, baselines, epochs, bf16,
         no_noise_maps;
     double early, ratio, visible;
@@ -57,7 +57,10 @@ static const char *const written[] = {"figures.json", NULL}; /* its inputs are n
 static const struct base_option list[] = {
     {.help = "What is measured:"},
     {"data", 'd', "DATA", TO(data), .input = BASE_FOLDER, .needed = 1,
-     .help = "labelled data set: a folder of sequences with split.json (needed)"},
+     .help = "labelled data set: a folder of sequences (needed)"},
+    {"validation", 'V', "SCENE,...", TO(validation),
+     .help = "validation scenes, over the split of the data set or the models"},
+    {"test", 'T', "SCENE,...", TO(test), .help = "test scenes, likewise"},
     {"model", 'm', "FILE", BASE_TO_LIST(struct options, models, n_models, "models"), .input = BASE_FILE,
      .help = "trained model (.ggn); may be repeated"},
     {"observer", 'O', "FILE", TO(observer), .input = BASE_FILE,
@@ -96,6 +99,7 @@ static const struct base_option list[] = {
 
 struct evaluation {
     const struct options *o;
+    const cJSON *learned[MAX_MODELS]; /* the data that each model was made with */
     struct ggn_eval_set set;
     struct ggn_model *models[MAX_MODELS];
     struct ggn_method methods[MAX_METHODS];
@@ -330,13 +334,15 @@ static int report(struct evaluation *j, int skipped, struct base_err *err)
     int failed = 0;
     base_json_text(root, "data", j->o->data, &failed);
     base_json_text(root, "labels", ggn_dataset_label_source(&j->set.images.data), &failed);
+    base_json_text(root, "split", ggn_split_sources[j->set.images.split_source], &failed);
     base_json_number(root, "window", j->set.window, &failed);
     base_json_number(root, "early_rate_tuned_for", j->o->early, &failed);
     base_json_text(root, "tuned_on", ggn_split_names[j->tuning], &failed);
     cJSON *splits = base_json_object(root, "splits", &failed), *changes = base_json_object(root, "changes", &failed);
     int rc = 0;
     if (!j->o->json)
-        printf("labels: %s; cuts tuned on %s for %.1f %% early stops%s\n", ggn_dataset_label_source(&j->set.images.data),
+        printf("labels: %s; split: %s; cuts tuned on %s for %.1f %% early stops%s\n",
+               ggn_dataset_label_source(&j->set.images.data), ggn_split_sources[j->set.images.split_source],
                ggn_split_names[j->tuning], 100.0 * j->o->early, skipped > 0 ? "; views without labels are left out" : "");
     for (int split = 0; split < GGN_SPLITS && !rc; split++) {
         if (ggn_eval_count(&j->set, (enum ggn_split)split) == 0)
@@ -363,14 +369,30 @@ static int report(struct evaluation *j, int skipped, struct base_err *err)
     return rc;
 }
 
+/* A scene that a model has met in training says nothing about scenes that it has not met. */
+static void warn_of_learned(const struct evaluation *j)
+{
+    const struct ggn_dataset *d = &j->set.images.data;
+    for (int i = 0; i < d->n && job_rank(ggn_cmd_job) == 0; i++)
+        for (int k = 0; k < j->o->n_models && ggn_dataset_first(d, i) == i; k++) {
+            const struct ggn_dataset_view *v = &d->views[i];
+            const enum ggn_split own = ggn_split_learned(j->learned[k], v->manifest.scene);
+            if (own < v->split && v->split != GGN_SPLIT_NONE && v->split != GGN_SPLIT_PEOPLE)
+                fprintf(stderr, "ggn evaluate: %s: scene '%s' is in %s here, and in %s of this model\n", j->o->models[k],
+                        v->manifest.scene, ggn_split_names[v->split], ggn_split_names[own]);
+        }
+}
+
 static int load(struct evaluation *j, struct base_threads *threads, int *skipped, struct base_err *err)
 {
     const struct options *o = j->o;
     const char *files[2 * MAX_FILES + MAX_MODELS + 1];
     int window, n = 0, rc = load_models(j, &window, err);
 
-    for (int i = 0; i < o->n_models; i++)
+    for (int i = 0; i < o->n_models && !rc; i++) {
         files[n++] = o->models[i];
+        j->learned[i] = cJSON_GetObjectItemCaseSensitive(j->models[i]->provenance, "data");
+    }
     for (int i = 0; i < o->n_thresholds; i++)
         files[n++] = o->thresholds[i];
     for (int i = 0; i < o->n_trained; i++)
@@ -378,6 +400,7 @@ static int load(struct evaluation *j, struct base_threads *threads, int *skipped
     if (o->observer)
         files[n++] = o->observer;
     struct ggn_eval_options eo = {.dir = o->data,
+                                  .split = {o->validation, o->test, j->learned, o->n_models},
                                   .window = window,
                                   .quality = !o->no_quality,
                                   .recorded = o->recorded,
@@ -396,7 +419,11 @@ static int load(struct evaluation *j, struct base_threads *threads, int *skipped
         if (j->models[i]->hyper.noise_map && j->models[i]->hyper.reach <= 0)
             rc = base_fail(err, BASE_EINVAL, "%s: it takes another noise picture than residual models; evaluate it apart",
                            o->models[i]);
-    return rc ? rc : ggn_eval_set_load(&j->set, &eo, threads, skipped, err);
+    if (!rc)
+        rc = ggn_eval_set_load(&j->set, &eo, threads, skipped, err);
+    if (!rc)
+        warn_of_learned(j);
+    return rc;
 }
 
 static int measure(struct evaluation *j, struct base_threads *threads, struct base_err *err)

@@ -98,25 +98,53 @@ static int scan_all(const char *path, struct ggn_dataset *d, struct base_err *er
     return rc;
 }
 
+static int apply_scene(const char *path, const char *scene, enum ggn_split split, struct ggn_dataset *d,
+                       struct base_err *err)
+{
+    const struct ggn_dataset_view *folder = NULL;
+    int found = 0;
+    for (int i = 0; i < d->n; i++) {
+        struct ggn_dataset_view *view = &d->views[i];
+        folder = strcmp(base_file_name(view->dir), scene) == 0 ? view : folder;
+        if (strcmp(view->manifest.scene, scene) != 0)
+            continue;
+        if (view->split != GGN_SPLIT_NONE && view->split != split)
+            return base_fail(err, BASE_EINVAL, "%s: scene '%s' is in %s and in %s", path, scene,
+                             ggn_split_names[view->split], ggn_split_names[split]);
+        view->split = split;
+        found = 1;
+    }
+    if (!found && folder)
+        return base_fail(err, BASE_EINVAL, "%s: %s: '%s' is a folder, whose scene is '%s'", path, ggn_split_names[split],
+                         scene, folder->manifest.scene);
+    return 0;
+}
+
+static int apply_list(const char *path, const cJSON *list, struct ggn_dataset *d, struct base_err *err)
+{
+    int s = 0, rc = 0;
+    const cJSON *scene;
+    while (s < GGN_SPLIT_NONE && strcmp(list->string, ggn_split_names[s]) != 0)
+        s++;
+    if (s == GGN_SPLIT_NONE)
+        return base_fail(err, BASE_EINVAL, "%s: '%s' is none of train, validation, test, people", path, list->string);
+    if (!cJSON_IsArray(list))
+        return base_fail(err, BASE_EINVAL, "%s: %s: expected a list of scenes", path, list->string);
+    cJSON_ArrayForEach (scene, list) {
+        if (!rc)
+            rc = cJSON_IsString(scene) ? apply_scene(path, scene->valuestring, (enum ggn_split)s, d, err)
+                                       : base_fail(err, BASE_EINVAL, "%s: %s: a scene is a string", path, list->string);
+    }
+    return rc;
+}
+
 static int apply_split(const char *path, const cJSON *root, struct ggn_dataset *d, struct base_err *err)
 {
-    for (int s = 0; s < GGN_SPLIT_NONE; s++) {
-        const cJSON *list = cJSON_GetObjectItemCaseSensitive(root, ggn_split_names[s]), *v;
-        cJSON_ArrayForEach (v, list) {
-            if (!cJSON_IsString(v))
-                return base_fail(err, BASE_EINVAL, "%s: %s: a scene is a string", path, ggn_split_names[s]);
-            for (int i = 0; i < d->n; i++) {
-                struct ggn_dataset_view *view = &d->views[i];
-                if (strcmp(view->manifest.scene, v->valuestring) != 0)
-                    continue;
-                if (view->split != GGN_SPLIT_NONE && view->split != (enum ggn_split)s)
-                    return base_fail(err, BASE_EINVAL, "%s: scene '%s' is in %s and in %s", path, v->valuestring,
-                                     ggn_split_names[view->split], ggn_split_names[s]);
-                view->split = (enum ggn_split)s;
-            }
-        }
-    }
-    return 0;
+    const cJSON *list;
+    int rc = cJSON_IsObject(root) ? 0 : base_fail(err, BASE_EINVAL, "%s: not a JSON object", path);
+    for (list = rc ? NULL : root->child; list && !rc; list = list->next)
+        rc = apply_list(path, list, d, err);
+    return rc;
 }
 
 static int read_split(const char *dir, struct ggn_dataset *d, struct base_err *err)
@@ -130,7 +158,7 @@ static int read_split(const char *dir, struct ggn_dataset *d, struct base_err *e
     if (rc)
         return rc;
     cJSON *root = cJSON_ParseWithLength(text, size);
-    rc = cJSON_IsObject(root) ? apply_split(path, root, d, err) : base_fail(err, BASE_EINVAL, "%s: not JSON", path);
+    rc = apply_split(path, root, d, err);
     cJSON_Delete(root);
     free(text);
     return rc;
@@ -159,6 +187,22 @@ int ggn_dataset_first(const struct ggn_dataset *data, int view)
     while (strcmp(data->views[i].manifest.scene, data->views[view].manifest.scene) != 0)
         i++;
     return i;
+}
+
+int ggn_dataset_scene(const struct ggn_dataset *data, int view)
+{
+    int n = 0;
+    for (int i = 0, first = ggn_dataset_first(data, view); i < first; i++)
+        n += ggn_dataset_first(data, i) == i;
+    return n;
+}
+
+int ggn_dataset_scenes(const struct ggn_dataset *data)
+{
+    int n = 0;
+    for (int i = 0; i < data->n; i++)
+        n += ggn_dataset_first(data, i) == i;
+    return n;
 }
 
 uint32_t ggn_dataset_tiles(const struct ggn_dataset_view *view)

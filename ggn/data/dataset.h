@@ -4,7 +4,8 @@
  * DATA/NAME/manifest.json (+ labels.json) for each view, and DATA/split.json:
  *     { "train": ["scene", …], "validation": ["scene", …], "test": ["scene", …] }
  * Instead of split.json the views may lie in DATA/train, DATA/validation, DATA/test and DATA/people (scripts/lab data-set
- * does so). A scene is on one side only; scenes that are on none are not used. DATA may also be one sequence itself.
+ * does so). A scene is on one side only; scenes that are on none are not used, and scenes of split.json that are not there
+ * do no harm. DATA may also be one sequence itself. What decides where a data set says nothing: data/split.h.
  */
 #ifndef GGN_DATA_DATASET_H
 #define GGN_DATA_DATASET_H
@@ -35,6 +36,9 @@ void ggn_dataset_release(struct ggn_dataset *data);
 
 /* The first view of this view's scene: the same index for all views of a scene. */
 int ggn_dataset_first(const struct ggn_dataset *data, int view);
+/* How many scenes there are, and the number of the view's one, in order of first appearance. */
+int ggn_dataset_scenes(const struct ggn_dataset *data);
+int ggn_dataset_scene(const struct ggn_dataset *data, int view);
 /* How many blocks the view has when it is whole: thresholds for it are as many. */
 uint32_t ggn_dataset_tiles(const struct ggn_dataset_view *view);
 

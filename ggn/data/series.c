@@ -60,58 +60,6 @@ struct ggn_level_series *ggn_series_set_append(struct ggn_series_set *set, struc
     return c;
 }
 
-/* --- split --- */
-
-/* Number of the scene among all, in order of first appearance. */
-static int scene_of(const struct ggn_dataset *data, int view)
-{
-    int n = 0;
-
-    for (int i = 0, first = ggn_dataset_first(data, view); i < first; i++)
-        n += ggn_dataset_first(data, i) == i;
-    return n;
-}
-
-static int split_list(struct ggn_dataset *data, const char *list, enum ggn_split split, struct base_err *err)
-{
-    while (*list) {
-        size_t n = strcspn(list, ",");
-        int found = 0;
-        for (int i = 0; i < data->n; i++) {
-            const char *scene = data->views[i].manifest.scene;
-            if (strlen(scene) == n && !memcmp(scene, list, n)) {
-                data->views[i].split = split;
-                found = 1;
-            }
-        }
-        if (!found)
-            return base_fail(err, BASE_EINVAL, "no scene '%.*s' in the data", (int)(n < 200 ? n : 200), list);
-        list += n + (list[n] == ',');
-    }
-    return 0;
-}
-
-static int choose_split(struct ggn_series_set *set, const struct ggn_series_set_options *o, struct base_err *err)
-{
-    struct ggn_dataset *data = &set->data;
-    int any = 0, rc = 0;
-
-    for (int i = 0; i < data->n; i++) {
-        any |= data->views[i].split != GGN_SPLIT_NONE;
-        int scene = scene_of(data, i);
-        set->n_scenes = scene + 1 > set->n_scenes ? scene + 1 : set->n_scenes;
-    }
-    for (int i = 0; i < data->n && !any; i++) {
-        int held_out = scene_of(data, i) % 5 == (set->n_scenes < 3 ? 1 : 2);
-        data->views[i].split = held_out && !o->validation ? GGN_SPLIT_VALIDATION : GGN_SPLIT_TRAIN;
-    }
-    if (o->validation)
-        rc = split_list(data, o->validation, GGN_SPLIT_VALIDATION, err);
-    if (!rc && o->test)
-        rc = split_list(data, o->test, GGN_SPLIT_TEST, err);
-    return rc;
-}
-
 /* --- series --- */
 
 int ggn_series_grow(const struct ggn_series_set *set, struct ggn_level_series *c, int levels, struct base_err *err)
@@ -271,7 +219,7 @@ static int load_block(struct ggn_series_set *set, int view, uint32_t index, cons
     if (!rc) {
         const struct ggn_label *label = v->has_labels ? ggn_labels_find(&v->labels, b.id) : NULL;
         c->view = view;
-        c->scene = scene_of(&set->data, view);
+        c->scene = ggn_dataset_scene(&set->data, view);
         c->split = v->split;
         c->block = b.id;
         c->has_label = label != NULL;
@@ -317,6 +265,15 @@ static void find_spacing(struct ggn_series_set *set)
     set->ratio = ratio[n / 2];
 }
 
+static int check_training(const struct ggn_dataset *data, const char *dir, struct base_err *err)
+{
+    for (int i = 0; i < data->n; i++)
+        if (data->views[i].split == GGN_SPLIT_TRAIN)
+            return 0;
+    return base_fail(err, BASE_EINVAL,
+                     "%s: no scene is left to train on: all are for validation, for test or not in the split", dir);
+}
+
 int ggn_series_set_load(struct ggn_series_set *set, const struct ggn_series_set_options *o, struct base_err *err)
 {
     struct ggn_series_set made = {.noise_maps = o->noise_maps, .keep_recorded = o->keep_recorded};
@@ -324,7 +281,10 @@ int ggn_series_set_load(struct ggn_series_set *set, const struct ggn_series_set_
 
     if (rc)
         return rc;
-    rc = choose_split(&made, o, err);
+    made.n_scenes = ggn_dataset_scenes(&made.data);
+    rc = ggn_split_choose(&made.data, &o->split, &made.split_source, err);
+    if (!rc && !o->with_test)
+        rc = check_training(&made.data, o->dir, err);
     for (int i = 0; !rc && i < made.data.n; i++) {
         const struct ggn_dataset_view *v = &made.data.views[i];
         int apart = v->split == GGN_SPLIT_TEST || v->split == GGN_SPLIT_PEOPLE;

@@ -11,7 +11,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "data/dataset.h"
+#include "data/split.h"
 #include "model/measure.h"
 
 struct ggn_level_series {
@@ -41,15 +41,14 @@ struct ggn_series_set {
     int keep_recorded;       /* see ggn_series_set_options */
     struct ggn_meter meter;  /* with memory: series have measures */
     int n, n_scenes;
+    enum ggn_split_source split_source;
     struct ggn_level_series *series;
     double first_spp, ratio, step_spp; /* how real levels are spaced: ratio, or (ratio 0) a constant step */
 };
 
 struct ggn_series_set_options {
     const char *dir; /* a data set (data/dataset.h) */
-    /* comma-separated scenes: over the data set's split; NULL: the split, or every fifth scene without */
-    const char *validation;
-    const char *test;  /* likewise; NULL: the split, or none */
+    struct ggn_split_options split;
     double ratio;      /* thin the levels to at least this ratio; 0: keep all */
     int noise_maps;    /* also make the noise maps */
     int measures;      /* also measure every level (model/measure.h) */
@@ -57,7 +56,7 @@ struct ggn_series_set_options {
     /* where there is no reference, the mean of the full level stands for it: as noisy as that many samples are, which
      * levels recorded below it share */
     int mean_for_reference;
-    int with_test; /* read the pixels of the test scenes and of the people's views too (training never does) */
+    int with_test; /* read the pixels of the test scenes and of the people's views too; else some must be for training */
 };
 
 /* Reads and checks everything. BASE_EINVAL names the file that does not fit. */

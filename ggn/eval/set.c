@@ -459,8 +459,12 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
                       struct base_err *err)
 {
     struct ggn_eval_set s = {.window = o->window, .job = o->job};
-    struct ggn_series_set_options co = {
-        .dir = o->dir, .ratio = o->ratio, .with_test = 1, .noise_maps = o->noise_maps, .measures = o->measures};
+    struct ggn_series_set_options co = {.dir = o->dir,
+                                        .split = o->split,
+                                        .ratio = o->ratio,
+                                        .with_test = 1,
+                                        .noise_maps = o->noise_maps,
+                                        .measures = o->measures};
     struct fill f = {&s, o->quality, o->no_ssim};
     struct ggn_eval_values columns[COLUMNS];
     int rc = ggn_series_set_load(&s.images, &co, err);

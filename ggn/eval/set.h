@@ -42,7 +42,8 @@ struct ggn_eval_set {
 };
 
 struct ggn_eval_options {
-    const char *dir;          /* data set */
+    const char *dir; /* data set */
+    struct ggn_split_options split;
     int window;               /* S */
     int quality;              /* also compute FLIP and SSIM of every case ... */
     int no_ssim;              /* ... but SSIM, which takes longer */

@@ -45,6 +45,35 @@ check "evaluate counts what another model decides differently" $?
 tr -d '\t\n' <"$tmp/report/figures.json" | grep -Eq "\"tiny.ggn\": *\{ *\"from\": *\"a.ggn\", *\"windows\": *[0-9]+, *\"verdicts_changed\": *[1-9][0-9]*, *\"blocks\": *9, *\"stops_changed\": *$changed, *\"p_moved_at_most\": *0\.[0-9]*[1-9]"
 check "  …in figures.json too" $?
 
+# The scenes that a model has learned from are its own: data without a split are judged by them, not by every fifth scene.
+cp -r $data "$tmp/unsplit" && rm "$tmp/unsplit/split.json" && sed -i 's/"scene":[^,]*,/"scene": "chess",/' "$tmp/unsplit/scene0/manifest.json" &&
+    $ggn train $tiny --data "$tmp/unsplit" -V chess -T scene2 --out "$tmp/v.ggn" -q 2>"$tmp/err" &&
+    $ggn evaluate -d "$tmp/unsplit" -m "$tmp/v.ggn" --no-quality --json >"$tmp/figures" 2>"$tmp/err" && [ ! -s "$tmp/err" ] &&
+    python3 - "$tmp/figures" <<'END'
+import json, sys
+figures = json.load(open(sys.argv[1]))
+assert figures["split"] == "the models' own", figures["split"]
+blocks = {split: methods["v.ggn"]["blocks"] for split, methods in figures["splits"].items()}
+assert blocks == {"train": 6, "validation": 3, "test": 3}, blocks
+END
+check "evaluate reads the split of the model" $?
+$ggn evaluate -d "$tmp/unsplit" -m "$tmp/v.ggn" --no-quality -V scene1 >"$tmp/out" 2>"$tmp/err" &&
+    [ "$(cat "$tmp/err")" = "ggn evaluate: $tmp/v.ggn: scene 'scene1' is in validation here, and in train of this model" ]
+check "  …says what it has learned from" $?
+judges() { # judges NAME PATTERN ARGS…: ggn evaluate refuses
+    name=$1 pattern=$2
+    shift 2
+    $ggn evaluate -d "$tmp/unsplit" "$@" >"$tmp/out" 2>"$tmp/err"
+    [ $? -eq 2 ] && [ "$(wc -l <"$tmp/err")" -eq 1 ] && grep -q "^ggn evaluate: .*$pattern" "$tmp/err"
+    check "$name" $?
+}
+mv "$tmp/unsplit/scene0" "$tmp/unsplit/chess-view0"
+judges "a folder instead of a scene" "no scene 'chess-view0' in the data: this folder's scene is 'chess'" -V chess-view0
+judges "a scene on both sides" "both list the scene 'chess'" -V chess,scene1 -T scene2,chess
+fails "  …for training too" "both list the scene 'chess'" $ggn train $tiny --data "$tmp/unsplit" -V chess -T chess
+fails "nothing to train on" "no scene is left to train on" $ggn train $tiny --data "$tmp/unsplit" -V chess,scene1,scene2,scene3
+fails "a folder instead of a scene to train" "this folder's scene is 'chess'" $ggn train $tiny --data "$tmp/unsplit" -T chess-view0
+
 # interrupted once in each phase: as soon as the curves have so many rows
 for rows in 2 4; do
     $ggn train $tiny --out "$tmp/d.ggn" --resume -q 2>"$tmp/err" &

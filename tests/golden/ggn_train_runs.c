@@ -211,7 +211,7 @@ static struct ggn_train_plan small(const char *name, enum ggn_preset preset)
 {
     struct ggn_train_plan p = ggn_train_plan_default(preset);
 
-    p.data = (struct ggn_series_set_options){.dir = data, .validation = "scene1"};
+    p.data = (struct ggn_series_set_options){.dir = data, .split.validation = "scene1"};
     p.out = path_of(name, "");
     p.window = 3;
     p.k_r = p.k_m = 3;
@@ -299,7 +299,7 @@ static void presets(void **state)
     again.steps = 4;
     run("again", again);
     again.init = NULL;
-    again.data.validation = "";
+    again.data.split.validation = "";
     run("blind", again);
 }
 
@@ -608,8 +608,8 @@ static void plans(void **state)
     TRY(good, data.dir = quiet);
     TRY(good, data.dir = loud);
     TRY(good, data.dir = "/nonexistent");
-    TRY(good, data.validation = "scene9");
-    TRY(good, data.validation = "scene0,scene1,scene2");
+    TRY(good, data.split.validation = "scene9");
+    TRY(good, data.split.validation = "scene0,scene1,scene2");
     TRY(paper, noise_map = 0.5);
     TRY(paper, average = 1);
     TRY(paper, crop = 1);

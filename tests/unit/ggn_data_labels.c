@@ -10,6 +10,8 @@
 #include <stddef.h>
 #include <cmocka.h>
 
+#include <cjson/cJSON.h>
+
 #include "support/ggn_near.h"
 
 #include "data/series.h"
@@ -372,6 +374,8 @@ static void datasets_are_told_word_by_word(void **state)
                                          "{\"train\": [\"a\"], \"test\": [\"a\"]}",
                                          "{\"train\": [7]}",
                                          "{\"train\": \"a\"}",
+                                         "{\"train\": [\"a-view0\"]}",
+                                         "{\"val\": [\"a\"]}",
                                          "{\"validation\": [\"c\", \"c\"]}",
                                          "[]",
                                          "",
@@ -435,7 +439,7 @@ static void scenes_are_held_out(void **state)
     assert_int_equal(mkdir(dir, 0777), 0);
     for (int n = 1; n <= 13; n++) {
         struct ggn_series_set set;
-        const struct ggn_series_set_options o = {.dir = dir, .validation = n == 4 ? "s2" : NULL};
+        const struct ggn_series_set_options o = {.dir = dir, .split.validation = n == 4 ? "s2" : NULL};
         snprintf(command, sizeof command,
                  "cp -r tests/data/recorded/test/three %s/s%02d && sed -i 's/\"scene\":.*/\"scene\": \"s%d\",/' "
                  "%s/s%02d/manifest.json",
@@ -452,6 +456,41 @@ static void scenes_are_held_out(void **state)
         ggn_series_set_release(&set);
     }
     transcript_end(&t, "data-scenes");
+}
+
+/* Without a split of the data, those of the models that are evaluated: the side nearest to training counts, and a scene that
+ * none has met is one to test on. */
+static void models_bring_their_split(void **state)
+{
+    static const char *const told[] = {"{\"train\": [\"s1\", \"elsewhere\"], \"validation\": [\"s2\"], \"test\": [\"s4\"]}",
+                                       "{\"train\": [\"s2\"], \"validation\": [\"s3\"], \"people\": [\"s5\"]}"};
+    static const enum ggn_split first[] = {GGN_SPLIT_TRAIN, GGN_SPLIT_VALIDATION, GGN_SPLIT_TEST, GGN_SPLIT_TEST,
+                                           GGN_SPLIT_TEST},
+                                both[] = {GGN_SPLIT_TRAIN, GGN_SPLIT_TRAIN, GGN_SPLIT_VALIDATION, GGN_SPLIT_TEST,
+                                          GGN_SPLIT_TEST},
+                                listed[] = {GGN_SPLIT_TEST, GGN_SPLIT_TRAIN, GGN_SPLIT_VALIDATION, GGN_SPLIT_TEST,
+                                            GGN_SPLIT_VALIDATION};
+    cJSON *learned[] = {cJSON_Parse(told[0]), cJSON_Parse(told[1])};
+    struct ggn_dataset_view views[5];
+    (void)state;
+    for (int how = 0; how < 4; how++) {
+        const struct ggn_split_options o = {how == 2 ? "s5" : NULL, how == 2 ? "s1" : NULL, (const cJSON *const *)learned,
+                                            how ? 2 : 1};
+        struct ggn_dataset d = {5, views};
+        enum ggn_split_source source;
+        for (int i = 0; i < 5; i++) {
+            views[i] = (struct ggn_dataset_view){.split = how == 3 && i == 0 ? GGN_SPLIT_PEOPLE : GGN_SPLIT_NONE};
+            snprintf(views[i].manifest.scene, sizeof views[i].manifest.scene, "s%d", i + 1);
+        }
+        assert_int_equal(ggn_split_choose(&d, &o, &source, NULL), 0);
+        assert_int_equal(source, how == 3 ? GGN_SPLIT_BY_DATA : GGN_SPLIT_BY_MODELS);
+        for (int i = 0; i < 5; i++) {
+            const enum ggn_split own = i ? GGN_SPLIT_NONE : GGN_SPLIT_PEOPLE; /* how 3: the data's split is all there is */
+            assert_int_equal(views[i].split, how == 0 ? first[i] : how == 1 ? both[i] : how == 2 ? listed[i] : own);
+        }
+    }
+    for (int i = 0; i < 2; i++)
+        cJSON_Delete(learned[i]);
 }
 
 /* --- series, windows and what training sees of them --- */
@@ -497,9 +536,12 @@ static void chains_are_as_they_were(void **state)
     static const struct ggn_series_set_options options[] = {
         {.dir = "tests/data/recorded", .with_test = 1, .noise_maps = 1},
         {.dir = "tests/data/recorded", .ratio = 2, .mean_for_reference = 1},
-        {.dir = "tests/data/recorded", .validation = "one", .test = "two,three"},
-        {.dir = "tests/data/recorded", .validation = "one,none"},
-        {.dir = "tests/data/train-demo", .validation = "scene1", .noise_maps = 1, .ratio = 3},
+        {.dir = "tests/data/recorded", .split = {.validation = "one", .test = "two,three"}, .with_test = 1},
+        {.dir = "tests/data/recorded", .split = {.validation = "one,two", .test = "three"}},
+        {.dir = "tests/data/recorded", .split = {.validation = "two,one", .test = "three,one"}},
+        {.dir = "tests/data/recorded", .split = {.test = "one-view0"}},
+        {.dir = "tests/data/recorded", .split.validation = "one,none"},
+        {.dir = "tests/data/train-demo", .split.validation = "scene1", .noise_maps = 1, .ratio = 3},
         {.dir = "tests/data/recorded/train/one-view1"}};
     struct transcript t;
     FILE *f = transcript_begin(&t);
@@ -630,7 +672,7 @@ int main(void)
                                        cmocka_unit_test(thresholds_are_told_word_by_word),
                                        cmocka_unit_test(datasets_are_told_word_by_word),
                                        cmocka_unit_test(chains_are_as_they_were),
-                                       cmocka_unit_test(scenes_are_held_out),
+                                       cmocka_unit_test(scenes_are_held_out), cmocka_unit_test(models_bring_their_split),
                                        cmocka_unit_test(windows_are_as_they_were)};
     return cmocka_run_group_tests_name("data_labels", tests, setup, teardown);
 }
