@@ -156,10 +156,7 @@ static int calibrate(struct ggn_baseline *b, const struct ggn_feature_set *t, co
 /* The first window of the LSTM begins at the first level; an SVM answers from where that window ends. */
 static void set_cadence(struct ggn_baseline *b, const struct ggn_eval_set *s)
 {
-    const struct ggn_series_set *c = &s->images;
-    b->policy.ratio = c->ratio > 1.001 ? c->ratio : 0;
-    b->policy.step_spp = c->step_spp;
-    b->policy.first_spp = c->first_spp;
+    ggn_series_set_pace(&s->images, &b->policy);
     for (int k = b->window; k < s->window; k++)
         b->policy.first_spp = ggn_policy_next(&b->policy, b->policy.first_spp);
 }

@@ -408,7 +408,7 @@ static int cost_models(struct job *j, struct base_threads *threads, struct base_
         if (!rc)
             rc = ggn_policy_of(model, &policy, err);
         if (j->o->cadence > 0)
-            policy.ratio = j->o->cadence;
+            policy.ratio = j->o->cadence, policy.n_levels = 0;
         if (j->o->no_noise_maps)
             ggn_policy_without_halves(&policy);
         if (!rc)
@@ -438,7 +438,7 @@ static int cost_baselines(struct job *j, struct base_threads *threads, struct ba
         if (rc)
             return rc;
         if (j->o->cadence > 0)
-            b.policy.ratio = j->o->cadence;
+            b.policy.ratio = j->o->cadence, b.policy.n_levels = 0;
         rc = b.window > j->set.window ? base_fail(err, BASE_EINVAL, "%s: it judges %d images, windows here have %d",
                                                   j->o->baselines[i], b.window, j->set.window)
                                       : ggn_feature_set_make(&features, &b, &j->set, threads, err);

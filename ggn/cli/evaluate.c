@@ -18,6 +18,7 @@
 #include "eval/strips.h"
 #include "eval/trained.h"
 #include "job/farm.h"
+#include "model/setting.h"
 #include "observer/observer.h"
 
 enum { MAX_MODELS = 8, MAX_FILES = 8, MAX_METHODS = 10 + 2 * MAX_FILES + 2 * MAX_MODELS, MAX_ADJUSTED = 8 };
@@ -383,6 +384,33 @@ static void warn_of_learned(const struct evaluation *j)
         }
 }
 
+/* A host asks a model at the samples that it has learned with, about blocks of its size. Where the recording has others, what
+ * is judged here is not what a host would stop by. */
+static int warn_of_setting(const struct evaluation *j, const char *path, const struct ggn_model *model, struct base_err *err)
+{
+    const struct ggn_series_set *s = &j->set.images;
+    struct ggn_policy policy;
+    char text[200];
+    double asked, nearest;
+    int halves = 1, rc = policy_of(j->o, model, &policy, err);
+    for (int b = 0; b < j->set.n_blocks && !j->o->no_noise_maps && !rc; b++)
+        halves &= !isnan(j->set.visible[j->set.blocks[b].end - 1]);
+    const struct ggn_setting learned = {model->hyper.width, model->hyper.height, GGN_TRANSFER_SRGB,
+                                        !j->o->no_noise_maps && (model->hyper.noise_map || policy.tail999 > 0)};
+    const struct ggn_setting here = {s->width, s->height, GGN_TRANSFER_SRGB, halves};
+    if (!rc && ggn_setting_difference(&learned, &here, text, sizeof text))
+        fprintf(stderr, "ggn evaluate: %s: the model is asked about what it has not learned: %s\n", path, text);
+    for (int i = 0; i < s->n && !rc; i++)
+        if (ggn_setting_levels_differ(&policy, s->series[i].spp, s->series[i].n_levels, &asked, &nearest)) {
+            fprintf(stderr,
+                    "ggn evaluate: %s: a host asks at %g samples, %s has %g next to it: other windows than a "
+                    "host's are judged\n",
+                    path, asked, s->data.views[s->series[i].view].dir, nearest);
+            break;
+        }
+    return rc;
+}
+
 static int load(struct evaluation *j, struct base_threads *threads, int *skipped, struct base_err *err)
 {
     const struct options *o = j->o;
@@ -423,6 +451,8 @@ static int load(struct evaluation *j, struct base_threads *threads, int *skipped
         rc = ggn_eval_set_load(&j->set, &eo, threads, skipped, err);
     if (!rc)
         warn_of_learned(j);
+    for (int i = 0; i < o->n_models && !rc && job_rank(ggn_cmd_job) == 0; i++)
+        rc = warn_of_setting(j, o->models[i], j->models[i], err);
     return rc;
 }
 

@@ -66,23 +66,21 @@ static int find_row(const char *csv, const char *name, const struct ggn_threshol
 
 /* --- labels --- */
 
-static int human_labels(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v,
+/* Of a recording: thresholds of the study, as samples at which no noise is seen at all. */
+static int study_labels(const struct options *o, const struct ggn_view *row, const struct ggn_dataset_view *v,
                         struct ggn_labels *out, struct base_err *err)
 {
     const struct seq_manifest *m = &v->manifest;
-    const struct ggn_view *row;
-    int rc = find_row(o->human, o->view ? o->view : v->name, t, &row, err);
-    if (!rc && (uint32_t)row->n != ggn_dataset_tiles(v))
-        rc = base_fail(err, BASE_EINVAL, "%s: '%s' has %d thresholds, %s has %u blocks", o->human, row->name, row->n, v->dir,
-                       ggn_dataset_tiles(v));
-    if (rc)
-        return rc;
+    if ((uint32_t)row->n != ggn_dataset_tiles(v))
+        return base_fail(err, BASE_EINVAL, "%s: '%s' has %d thresholds, %s has %u blocks", o->human, row->name, row->n,
+                         v->dir, ggn_dataset_tiles(v));
     struct ggn_labels l = {.source = "human",
                            .cap = SEQ_SIMULATED_CAP,
-                           .spread = o->spread > 0 ? o->spread : GGN_LABELS_SPREAD,
+                           .spread = GGN_LABELS_SPREAD,
                            .labels = malloc(m->n_blocks * sizeof *l.labels)};
     if (!l.labels)
         return base_fail_nomem(err, v->dir);
+    int rc = 0;
     for (uint32_t i = 0; i < m->n_blocks && !rc; i++) {
         uint32_t id = m->blocks[i].id;
         if (!(id < (uint32_t)row->n && row->spp[id] > 0))
@@ -95,6 +93,23 @@ static int human_labels(const struct options *o, const struct ggn_thresholds *t,
         ggn_labels_release(&l);
     else
         *out = l;
+    return rc;
+}
+
+/* The thresholds that the import of pictures would attach, where the sequence is one. */
+static int human_labels(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v,
+                        struct ggn_labels *out, struct base_err *err)
+{
+    const int own_pictures = !v->manifest.reference_independent && v->manifest.reference_spp > 0;
+    const struct ggn_view *row;
+    struct base_err why = {0};
+    int rc = find_row(o->human, o->view ? o->view : v->name, t, &row, err);
+    if (!rc && own_pictures && (rc = ggn_thresholds_label(row, &v->manifest, out, &why)) != 0)
+        return base_fail(err, why.code, "%s: %s", v->dir, why.text);
+    if (!rc && !own_pictures)
+        rc = study_labels(o, row, v, out, err);
+    if (!rc && o->spread > 0)
+        out->spread = o->spread;
     return rc;
 }
 

@@ -263,6 +263,20 @@ static void find_spacing(struct ggn_series_set *set)
         ratio[n++] = spp[i] / spp[i - 1];
     qsort(ratio, (size_t)n, sizeof ratio[0], by_value);
     set->ratio = ratio[n / 2];
+    struct ggn_policy pace = {0};
+    ggn_series_set_pace(set, &pace);
+    ggn_policy_set_levels(&pace, spp, count);
+    set->n_levels = pace.n_levels;
+    memcpy(set->level, pace.level, sizeof pace.level);
+}
+
+void ggn_series_set_pace(const struct ggn_series_set *set, struct ggn_policy *p)
+{
+    p->first_spp = set->first_spp;
+    p->ratio = set->ratio > 1.001 ? set->ratio : 0;
+    p->step_spp = set->step_spp;
+    p->n_levels = set->n_levels;
+    memcpy(p->level, set->level, sizeof p->level);
 }
 
 static int check_training(const struct ggn_dataset *data, const char *dir, struct base_err *err)

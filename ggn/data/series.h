@@ -13,6 +13,7 @@
 
 #include "data/split.h"
 #include "model/measure.h"
+#include "model/policy.h"
 
 struct ggn_level_series {
     int view, scene, synthetic;
@@ -44,6 +45,8 @@ struct ggn_series_set {
     enum ggn_split_source split_source;
     struct ggn_level_series *series;
     double first_spp, ratio, step_spp; /* how real levels are spaced: ratio, or (ratio 0) a constant step */
+    int n_levels;                      /* those that are not, see ggn_policy */
+    double level[GGN_POLICY_LEVELS];
 };
 
 struct ggn_series_set_options {
@@ -83,6 +86,9 @@ int ggn_series_set_paint(struct ggn_series_set *set, int per_series, double leve
 /* Makes every labelled series that has a full level anew, its levels `ratio` > 1 apart and up to SEQ_SIMULATED_CAP: from
  * the two halves alone, so that series with and without a reference are made alike. The same seed gives the same series. */
 int ggn_series_set_simulate(struct ggn_series_set *set, double ratio, uint32_t seed, struct base_err *err);
+
+/* How blocks are to be asked about: at the levels of the set. */
+void ggn_series_set_pace(const struct ggn_series_set *set, struct ggn_policy *policy);
 
 /* Series of a split, real ones only if real_only. */
 int ggn_series_set_count(const struct ggn_series_set *set, enum ggn_split split, int real_only);

@@ -295,17 +295,12 @@ static int attach_thresholds(const struct view *v, const char *out, const struct
     *labelled = row != NULL;
     if (!row)
         return 0;
-    uint32_t n = m->width / m->block * (m->height / m->block);
-    if ((uint32_t)row->n != n)
-        return base_fail(err, BASE_EINVAL, "%s: %u blocks, but %d thresholds for '%s'", v->dir, n, row->n, row->name);
-    struct ggn_labels labels = {.source = "human", .cap = m->levels[m->n_levels - 1], .spread = GGN_LABELS_SPREAD, .n = n};
-    snprintf(labels.detail, sizeof labels.detail, "thresholds of '%s'", row->name);
-    labels.labels = malloc(n * sizeof *labels.labels);
-    if (!labels.labels)
-        return base_fail_nomem(err, out);
-    for (uint32_t i = 0; i < n; i++)
-        labels.labels[i] = (struct ggn_label){i, row->spp[i], row->spp[i] >= labels.cap};
-    int rc = ggn_labels_write(out, &labels, 0, err);
+    struct ggn_labels labels;
+    struct base_err why = {0};
+    int rc = ggn_thresholds_label(row, m, &labels, &why);
+    if (rc)
+        return base_fail(err, why.code, "%s: %s", v->dir, why.text);
+    rc = ggn_labels_write(out, &labels, 0, err);
     ggn_labels_release(&labels);
     return rc;
 }

@@ -105,9 +105,9 @@ static void no_statistics(struct ggn_level_series *c, int from)
 }
 
 /* An empty series of the same block. */
-static void begin_copy(struct ggn_level_series *c, const struct ggn_level_series *real)
+static void begin_copy(struct ggn_level_series *c, const struct ggn_level_series *recorded)
 {
-    *c = *real;
+    *c = *recorded;
     c->synthetic = 1;
     c->n_levels = 0;
     c->spp = c->tail999 = c->gini = NULL;
@@ -116,7 +116,7 @@ static void begin_copy(struct ggn_level_series *c, const struct ggn_level_series
     c->measure = NULL;
 }
 
-static int make_series(struct ggn_series_set *set, const struct ggn_level_series *real, struct ggn_level_series *c,
+static int make_series(struct ggn_series_set *set, const struct ggn_level_series *recorded, struct ggn_level_series *c,
                        const struct source *s, uint32_t seed, struct base_err *err)
 {
     double spp[MAX_LEVELS];
@@ -124,7 +124,7 @@ static int make_series(struct ggn_series_set *set, const struct ggn_level_series
     const double ratio = set->ratio > 1.01 ? set->ratio : 1.15;
     int n = choose_levels(spp, 0, set->first_spp, ratio, HIGHEST_SHARE * s->n_reference, 1, seed);
 
-    begin_copy(c, real);
+    begin_copy(c, recorded);
     c->n_levels = n;
     int rc = noise ? ggn_series_grow(set, c, n ? n : 1, err) : base_fail_nomem(err, "synthetic images");
     if (!rc) {
@@ -187,9 +187,9 @@ static int source_init(struct source *s, const struct ggn_series_set *set, struc
 int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uint32_t seed, struct base_err *err)
 {
     struct source s = {0};
-    int rc = source_init(&s, set, err), real = set->n;
+    int rc = source_init(&s, set, err), recorded = set->n;
 
-    for (int i = 0; !rc && i < real; i++) {
+    for (int i = 0; !rc && i < recorded; i++) {
         int usable = 0;
         if (set->series[i].split != GGN_SPLIT_TRAIN)
             continue;
@@ -268,7 +268,7 @@ int ggn_series_set_extend(struct ggn_series_set *set, uint32_t seed, struct base
     struct source s = {0};
     int rc = source_init(&s, set, err);
 
-    for (int i = 0, real = set->n; !rc && i < real; i++) {
+    for (int i = 0, recorded = set->n; !rc && i < recorded; i++) {
         struct ggn_level_series *c = &set->series[i];
         int usable = 0;
         double last = c->n_levels ? c->spp[c->n_levels - 1] : 0;
@@ -303,6 +303,7 @@ int ggn_series_set_simulate(struct ggn_series_set *set, double ratio, uint32_t s
     }
     set->ratio = ratio;
     set->step_spp = 0;
+    set->n_levels = 0;
     free(s.base);
     return rc;
 }
@@ -385,8 +386,8 @@ int ggn_series_set_paint(struct ggn_series_set *set, int per_series, double leve
     struct source s = {0};
     int rc = source_init(&s, set, err);
 
-    for (int i = 0, real = set->n; !rc && i < real * per_series; i++) {
-        const struct ggn_level_series *from = &set->series[i % real];
+    for (int i = 0, recorded = set->n; !rc && i < recorded * per_series; i++) {
+        const struct ggn_level_series *from = &set->series[i % recorded];
         int usable = 0;
         if (from->synthetic || from->split != GGN_SPLIT_TRAIN)
             continue;
@@ -394,7 +395,7 @@ int ggn_series_set_paint(struct ggn_series_set *set, int per_series, double leve
         if (rc || !usable)
             continue;
         paint(&s, set->width, set->height, ggn_hash((uint32_t)i, seed + 2));
-        struct ggn_level_series *c = append_copy(set, i % real, err);
+        struct ggn_level_series *c = append_copy(set, i % recorded, err);
         rc = c ? simulate_series(set, c, &s, ratio, 1, ggn_hash((uint32_t)i, seed + 3), err) : BASE_ENOMEM;
         if (!rc) {
             c->reference = NULL; /* it shows the block unpainted */

@@ -228,3 +228,27 @@ int ggn_thresholds_read(const char *path, int block, struct ggn_thresholds *out,
     free(text);
     return rc;
 }
+
+int ggn_thresholds_label(const struct ggn_view *row, const struct seq_manifest *m, struct ggn_labels *out,
+                         struct base_err *err)
+{
+    const uint32_t tiles = (m->width + m->block - 1) / m->block * ((m->height + m->block - 1) / m->block);
+    struct ggn_labels l = {.source = "human", .cap = m->levels[m->n_levels - 1], .spread = GGN_LABELS_SPREAD};
+    if ((uint32_t)row->n != tiles)
+        return base_fail(err, BASE_EINVAL, "%u blocks, but %d thresholds for '%s'", tiles, row->n, row->name);
+    l.labels = malloc((m->n_blocks ? m->n_blocks : 1) * sizeof *l.labels);
+    if (!l.labels)
+        return base_fail_nomem(err, "labels");
+    for (uint32_t i = 0; i < m->n_blocks; i++) {
+        const uint32_t id = m->blocks[i].id;
+        const double spp = id < (uint32_t)row->n ? row->spp[id] : (double)NAN;
+        if (!(spp > 0)) {
+            free(l.labels);
+            return base_fail(err, BASE_EINVAL, "block %u has no threshold in '%s'", id, row->name);
+        }
+        l.labels[l.n++] = (struct ggn_label){id, spp, spp >= l.cap};
+    }
+    snprintf(l.detail, sizeof l.detail, "thresholds of '%s'", row->name);
+    *out = l;
+    return 0;
+}

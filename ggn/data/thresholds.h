@@ -10,6 +10,8 @@
 #define GGN_DATA_THRESHOLDS_H
 
 #include "base/err.h"
+#include "data/labels.h"
+#include "sequence/manifest.h"
 
 enum { GGN_VIEW_NAME = 128, GGN_VIEW_BLOCKS = 65536 };
 
@@ -34,5 +36,10 @@ void ggn_thresholds_release(struct ggn_thresholds *t);
 const struct ggn_view *ggn_thresholds_find(const struct ggn_thresholds *t, const char *name);
 /* The same for a recorded view: its folder's name, or that with the ending _part6 of SIN3D's own files. */
 const struct ggn_view *ggn_thresholds_of(const struct ggn_thresholds *t, const char *view);
+
+/* Labels of a sequence whose own pictures people judged, of which the last was taken for the truth: thresholds as they are,
+ * censored from the last level on. BASE_EINVAL when the row is of another number of blocks or lacks one. */
+int ggn_thresholds_label(const struct ggn_view *row, const struct seq_manifest *manifest, struct ggn_labels *labels,
+                         struct base_err *err);
 
 #endif

@@ -49,6 +49,11 @@ int ggn_policy_check(const struct ggn_policy *p, struct base_err *err)
     }
     if (p->passes < 1 || p->passes > PASSES_MAX)
         return base_fail(err, BASE_EINVAL, "policy: passes = %d is not in 1..%d", p->passes, PASSES_MAX);
+    if (p->n_levels < 0 || p->n_levels > GGN_POLICY_LEVELS)
+        return base_fail(err, BASE_EINVAL, "policy: %d levels are not in 0..%d", p->n_levels, GGN_POLICY_LEVELS);
+    for (int i = 0; i < p->n_levels; i++)
+        if (!(p->level[i] >= (i ? p->level[i - 1] + 1 : 1) && p->level[i] <= 1e9))
+            return base_fail(err, BASE_EINVAL, "policy: level %d, %g samples, does not follow", i, p->level[i]);
     if (p->ratio <= 1.001 && p->step_spp < 1)
         return base_fail(err, BASE_EINVAL, "policy: neither a ratio above 1 nor a step says how levels are spaced");
     return 0;
@@ -94,9 +99,39 @@ double ggn_policy_p(const struct ggn_policy *p, double logit)
 
 double ggn_policy_next(const struct ggn_policy *p, double spp)
 {
+    for (int i = 0; i < p->n_levels; i++)
+        if (p->level[i] > spp)
+            return fmax(p->level[i], spp + 1);
     double next = p->ratio > 1.001 ? floor(spp * p->ratio + 0.5) : spp + p->step_spp;
 
     return fmax(next, spp + 1);
+}
+
+double ggn_policy_level_below(const struct ggn_policy *p, double spp)
+{
+    int i = p->n_levels - 1;
+
+    if (i < 0 || spp >= p->level[i])
+        return spp;
+    while (i > 0 && p->level[i] > spp)
+        i--;
+    return fmin(p->level[i], spp);
+}
+
+/* A quarter of a step, or the sample that rounding to whole ones moves a level. */
+static int follows(const struct ggn_policy *p, double from, double to)
+{
+    return fabs(ggn_policy_next(p, from) - to) <= fmax(0.25 * (to - from), 1);
+}
+
+void ggn_policy_set_levels(struct ggn_policy *p, const double *spp, int n)
+{
+    p->n_levels = 0;
+    while (n > 1 && follows(p, spp[n - 2], spp[n - 1]))
+        n--;
+    p->n_levels = n < 2 ? 0 : n < GGN_POLICY_LEVELS ? n : GGN_POLICY_LEVELS;
+    for (int i = 0; i < p->n_levels; i++)
+        p->level[i] = spp[i];
 }
 
 double ggn_policy_predict(const struct ggn_policy *policy, double p, double threshold, double spp)
@@ -113,6 +148,23 @@ static void put_fields(cJSON *to, const struct ggn_policy *policy, int only_own,
     for (int i = 0; i < N_FIELDS; i++)
         if (fields[i].own || !only_own)
             base_json_number(to, fields[i].name, get(policy, i), failed);
+    cJSON *levels = policy->n_levels ? base_json_array(to, "levels", failed) : NULL;
+    for (int i = 0; i < policy->n_levels; i++)
+        base_json_number(levels, NULL, policy->level[i], failed);
+}
+
+static int get_levels(const cJSON *list, struct ggn_policy *policy, struct base_err *err)
+{
+    const cJSON *item;
+
+    if (list && (!cJSON_IsArray(list) || cJSON_GetArraySize(list) > GGN_POLICY_LEVELS))
+        return base_fail(err, BASE_EINVAL, "policy: levels: expected a list of at most %d numbers", GGN_POLICY_LEVELS);
+    cJSON_ArrayForEach (item, list) {
+        if (!cJSON_IsNumber(item))
+            return base_fail(err, BASE_EINVAL, "policy: levels: expected numbers");
+        policy->level[policy->n_levels++] = item->valuedouble;
+    }
+    return 0;
 }
 
 static int get_fields(const cJSON *from, struct ggn_policy *policy, int only_own, struct base_err *err)
@@ -124,7 +176,8 @@ static int get_fields(const cJSON *from, struct ggn_policy *policy, int only_own
         if (item)
             memcpy((char *)policy + fields[i].offset, &item->valuedouble, sizeof item->valuedouble);
     }
-    return ggn_policy_check(policy, err);
+    int rc = get_levels(cJSON_GetObjectItemCaseSensitive(from, "levels"), policy, err);
+    return rc ? rc : ggn_policy_check(policy, err);
 }
 
 void ggn_policy_print(cJSON *to, const struct ggn_policy *policy, int *failed)

@@ -9,6 +9,8 @@
 
 #include "model/model.h"
 
+enum { GGN_POLICY_LEVELS = 256 };
+
 struct ggn_policy {
     double first_spp; /* samples of the first image of a window */
     double ratio;     /* samples of one image to those of the one before, > 1; 0: levels are step_spp apart */
@@ -18,6 +20,10 @@ struct ggn_policy {
     int passes;          /* ... in so many checks in a row */
     double gate_noise; /* above this window noise (ggn_window_noise) a block is plainly noisy: no network needed; 0: never */
     double slope;      /* by how much the calibrated logit falls when the samples double; for predictions; 0: not known */
+    /* The samples of the images that were learned, rising, as far as they are not `ratio` or `step_spp` apart: evenly spaced
+     * levels that were thinned are both in turn. Beyond the last of them ratio or step say how it goes on. */
+    int n_levels;
+    double level[GGN_POLICY_LEVELS];
     double tail999, gini; /* a block whose half buffer exceeds either is held back, see the criterion; 0: no guard */
 };
 
@@ -33,6 +39,10 @@ int ggn_policy_adjust(struct ggn_policy *policy, const char *name, double value)
 double ggn_policy_p(const struct ggn_policy *policy, double logit);
 /* Samples at which a block last judged at `spp` is to be judged again; > spp. */
 double ggn_policy_next(const struct ggn_policy *policy, double spp);
+/* The last level of the list at or below spp; spp itself beyond the list, or without one. */
+double ggn_policy_level_below(const struct ggn_policy *policy, double spp);
+/* The policy's levels are those of images with so many samples, rising, as far as ratio and step do not tell them. */
+void ggn_policy_set_levels(struct ggn_policy *policy, const double *spp, int n);
 /* Samples at which p is expected to fall below `threshold`, from p at spp; at least spp. NaN if the slope is not known. */
 double ggn_policy_predict(const struct ggn_policy *policy, double p, double threshold, double spp);
 
@@ -45,7 +55,7 @@ void ggn_policy_without_halves(struct ggn_policy *policy);
 
 /* What the model says, defaults elsewhere. BASE_EINVAL when a field is out of range. */
 int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct base_err *err);
-/* Puts the policy into the model. */
+/* Puts the policy into the model; its levels as "levels" where it has any. */
 int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct base_err *err);
 
 /* A whole policy as members of a JSON object, for models that are no networks. */

@@ -77,6 +77,7 @@ static void schedule(const struct ggn_stop_rule *rule, struct ggn_stopper *s, do
 
     if (gate_opens > 0 && p->ratio > 1.001) {
         double leap = fmin(0.5 * gate_opens / pow(p->ratio, rule->window - 1), 4 * spp);
+        leap = ggn_policy_level_below(p, leap); /* a window of the images that were learned */
         s->leapt = leap > 1.5 * next;
         next = s->leapt ? leap : next;
     }

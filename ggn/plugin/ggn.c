@@ -305,11 +305,8 @@ static int32_t load(struct lull_instance *in, int kind, const char *path, struct
     in->rule.reach = model->hyper.reach;
     if (in->rule.window < 2 || in->rule.window > GGN_WINDOW_MAX)
         return lull_kit_fail(err, LULL_E_IO, "model: %.200s: windows of %d images", path, in->rule.window);
-    if (model->hyper.noise_map && in->rule.reach <= 0) {
+    if (model->hyper.noise_map)
         in->kit.need.planes_used |= LULL_PLANE_BIT(LULL_PLANE_HALF);
-        in->half_wanted = "this model judges by half buffers too, which the host does not give: how well it decides without "
-                          "them depends on how it was trained (ggn evaluate --no-pictures)";
-    }
     if (ggn_precision_is_slow((enum ggn_precision)in->kit.value[P_PRECISION]))
         in->slow = "precision bf16: this processor has no instruction for such products, and software makes them slowly; "
                    "f32 is faster";

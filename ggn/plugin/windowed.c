@@ -1,5 +1,6 @@
 #include "plugin/windowed.h"
 
+#include "model/setting.h"
 #include "plugin/model_path.h"
 #include "plugin/translate.h"
 
@@ -59,6 +60,8 @@ void gp_windowed_ready(struct lull_instance *in, const struct lull_param *params
     for (uint32_t i = 0; i < count; i++)
         if (!isnan(in->kit.value[i]))
             ggn_policy_adjust(policy, params[i].name, in->kit.value[i]);
+    if (policy->n_levels)
+        gp_windowed_hash(in, policy->level, (size_t)policy->n_levels * sizeof *policy->level);
     const double numbers[] = {policy->threshold, policy->passes,    policy->gate_noise, policy->tail999,
                               policy->gini,      policy->first_spp, in->rule.reach};
     gp_windowed_hash(in, numbers, sizeof numbers);
@@ -114,6 +117,29 @@ static void frame_release(struct lull_instance *in)
     workers_release(in->ops, in->worker, in->workers);
 }
 
+/* What the model has not learned with. A residual model begins with what the observer measures here, whatever it is: with
+ * halves or without, which is told anyway. */
+static void tell_setting(const struct lull_instance *in, const struct lull_frame *frame)
+{
+    const struct lull_requirements *need = &in->kit.need;
+    const uint32_t half = LULL_PLANE_BIT(LULL_PLANE_HALF);
+    const struct ggn_setting learned = {(int)need->block_width, (int)need->block_height, GGN_TRANSFER_SRGB,
+                                        (need->planes_used & half) && !(in->rule.reach > 0)};
+    struct ggn_setting here = {0, 0, in->display.transfer, (frame->planes & half) != 0};
+    char difference[200], text[400];
+
+    for (uint32_t i = 0; i < frame->block_count; i++) {
+        const struct lull_rect *r = lull_kit_rect(frame, i);
+        here.width = r->x1 - r->x0 > here.width ? r->x1 - r->x0 : here.width;
+        here.height = r->y1 - r->y0 > here.height ? r->y1 - r->y0 : here.height;
+    }
+    if (!ggn_setting_difference(&learned, &here, difference, sizeof difference))
+        return;
+    snprintf(text, sizeof text, "the model is asked about what it has not learned: %s%s", difference,
+             learned.halves && !here.halves ? " (ggn evaluate --no-pictures says how well it decides)" : "");
+    gp_log(&in->kit, in->rule.reach > 0 ? LULL_LOG_INFO : LULL_LOG_WARNING, text);
+}
+
 int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
 {
     struct gp_history history = {0};
@@ -142,17 +168,17 @@ int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_fram
     in->history = history;
     in->means = means;
     atomic_flag_clear(&in->warned);
+    atomic_flag_clear(&in->late);
     in->worker = worker;
     in->workers = count;
     lull_kit_frame_open(in, frame);
-    if (in->half_wanted && !(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)))
-        gp_log(&in->kit, LULL_LOG_WARNING, in->half_wanted);
     if (in->means.count)
         gp_log(&in->kit, LULL_LOG_INFO, "ggn: no plane HALF: noise is told from how the mean changes between checks");
     if (in->slow)
         gp_log(&in->kit, LULL_LOG_WARNING, in->slow);
     in->rule.spp_max = frame->spp_max;
     in->display = gp_display_of(&in->kit);
+    tell_setting(in, frame);
     return LULL_OK;
 }
 
@@ -194,6 +220,23 @@ long gp_windowed_read(const struct gp_block_view *seen, uint8_t *out)
     return ggn_pixel_counts_bad(&counts);
 }
 
+/* Says once that a host asks further apart than the model has learned: its windows show other images. The law of a residual
+ * model needs none. */
+static void tell_late(struct lull_instance *in, const struct ggn_stopper *before, uint64_t spp)
+{
+    if (in->rule.reach > 0 || !before->used || before->leapt)
+        return;
+    const double last = (double)before->spp[before->used - 1], next = ggn_policy_next(&in->rule.policy, last);
+    if ((double)spp - last <= 1.5 * (next - last))
+        return;
+    char text[200];
+    snprintf(
+        text, sizeof text,
+        "the model is asked at %llu samples behind %.0f, where it has learned %.0f: the host's checks are further apart",
+        (unsigned long long)spp, last, next);
+    gp_warn_once(&in->kit, &in->late, text);
+}
+
 /* Fills in->history.pending[b->id] with the verdict on a checked block. */
 static void read_block(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, uint32_t worker)
 {
@@ -203,15 +246,17 @@ static void read_block(struct lull_instance *in, const struct lull_view *view, c
 
     evidence.data = &seen;
     *head = in->history.head[b->id];
-    uint32_t before = head->stopper.used;
+    const struct ggn_stopper before = head->stopper;
     const int what = ggn_stopper_ask(&in->rule, &head->stopper, b->spp);
+    if (what == GGN_LOOK_IMAGE)
+        tell_late(in, &before, b->spp);
     head->measured = what != GGN_LOOK_NONE;
     if (what == GGN_LOOK_NONE)
         return;
     if (in->ops->measure)
         in->ops->measure(&seen);
     if (what == GGN_LOOK_IMAGE) {
-        uint32_t slot = gp_head_push(head, in->rule.window, before);
+        uint32_t slot = gp_head_push(head, in->rule.window, before.used);
         head->bad = in->ops->read(&seen, slot) > 0;
     }
     ggn_stopper_decide(&in->rule, &head->stopper, &evidence);

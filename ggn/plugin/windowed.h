@@ -49,7 +49,6 @@ struct lull_instance {
     struct lull_kit kit;
     const struct gp_block_view_ops *ops;
     void *model;               /* owns, by ops->model_destroy */
-    const char *half_wanted;   /* logged when a frame has no half buffer; static text, NULL: nothing is lost */
     const char *slow;          /* logged with each frame; static text, NULL: nothing is */
     struct ggn_stop_rule rule; /* the model's policy, with the parameters over it */
     uint32_t key;              /* of saved state: a hash of model and policy */
@@ -57,6 +56,7 @@ struct lull_instance {
     struct gp_history history; /* of the open frame */
     struct gp_means means;     /* likewise; with rule.reach, without HALF */
     atomic_flag warned;        /* of planes that say nothing about noise: once per frame */
+    atomic_flag late;          /* of checks that are too far apart: likewise */
     uint32_t workers;
     void **worker;
 };

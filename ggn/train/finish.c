@@ -27,7 +27,7 @@ static cJSON *describe_run(const struct ggn_session *s, int *failed)
                    {"epochs", p->epochs},
                    {"batch_denoiser", p->batch_r},
                    {"batch", p->batch},
-                   {"crop", p->crop},
+                   {"crop", s->crop},
                    {"lr_denoiser", p->lr_r},
                    {"lr", p->lr},
                    {"difference", p->difference},
@@ -184,9 +184,7 @@ int ggn_session_finish(struct ggn_session *s, struct base_err *err)
         accuracy = (double)right / v.n;
         policy.slope = ggn_calibrate_slope(&s->validation, v.logit, &policy);
     }
-    policy.first_spp = s->set.first_spp;
-    policy.ratio = s->set.ratio > 1.001 ? s->set.ratio : 0;
-    policy.step_spp = s->set.step_spp;
+    ggn_series_set_pace(&s->set, &policy);
     if (s->hyper.reach > 0) { /* like the law that it corrects: whose spread is known, where a few scenes tell little */
         policy.first_spp = fmax(policy.first_spp, FIRST_SPP);
         policy.threshold = GGN_OBSERVER_VISIBLE;

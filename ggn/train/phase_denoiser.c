@@ -36,7 +36,7 @@ static int nth_series(const struct ggn_session *s, enum ggn_split split, int k)
 
 static struct crop draw_crop(const struct ggn_session *s, enum ggn_split split, uint64_t step, int i, uint32_t seed)
 {
-    const int size = s->plan->crop, series = nth_series(s, split, -1);
+    const int size = s->crop, series = nth_series(s, split, -1);
     struct crop c = {.series = nth_series(s, split, (int)(draw(21, step, i, seed) * series)), .augment = ggn_augment_none()};
 
     c.level = (int)(draw(22, step, i, seed) * s->set.series[c.series].n_levels);
@@ -59,7 +59,7 @@ struct fill {
 static void fill_sample(void *data, long i, int worker)
 {
     const struct fill *f = data;
-    const int size = f->s->plan->crop;
+    const int size = f->s->crop;
     const size_t values = 3 * (size_t)size * (size_t)size;
     struct crop c = draw_crop(f->s, f->split, f->step, f->first + (int)i, f->seed);
     float *noisy = f->s->buffer + 2 * (size_t)i * values;
@@ -80,7 +80,7 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
                       struct base_err *err)
 {
     const int n = s->plan->batch_r;
-    const size_t plane = (size_t)s->plan->crop * (size_t)s->plan->crop;
+    const size_t plane = (size_t)s->crop * (size_t)s->crop;
     const float **x = s->planes, **y = s->planes + 3 * (size_t)n;
     int mine, first = ggn_session_first(s, n, &mine);
 
@@ -100,7 +100,7 @@ static void evaluate(struct ggn_session *s, int count, double *loss)
     struct ggn_trainer *t = s->trainer;
     const struct ggn_value *in = &t->r->graph->value[0];
     const int out = t->r->graph->n_values - 1;
-    const size_t plane = (size_t)s->plan->crop * (size_t)s->plan->crop;
+    const size_t plane = (size_t)s->crop * (size_t)s->crop;
 
     for (int i = 0; i < count; i++)
         for (int c = 0; c < 3; c++) {
@@ -144,7 +144,7 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_
 static int begin(struct ggn_session *s, struct base_err *err)
 {
     s->progress.phase = GGN_PHASE_DENOISER;
-    int rc = ggn_session_begin(s, GGN_TRAIN_R, s->plan->batch_r, s->plan->crop, s->plan->crop, err);
+    int rc = ggn_session_begin(s, GGN_TRAIN_R, s->plan->batch_r, s->crop, s->crop, err);
     if (rc)
         return rc;
     struct ggn_weights *w = s->trainer->weights[GGN_NET_R];

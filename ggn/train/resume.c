@@ -19,7 +19,7 @@ uint32_t ggn_resume_key(const struct ggn_session *s)
                               p->k_r,
                               p->k_m,
                               p->k_d,
-                              p->crop,
+                              s->crop,
                               p->batch_r,
                               p->batch,
                               p->steps_r,

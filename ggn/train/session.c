@@ -54,6 +54,8 @@ int ggn_session_first(const struct ggn_session *s, int n, int *mine)
     return first;
 }
 
+static int side_of(const struct ggn_session *s) { return s->set.width < s->set.height ? s->set.width : s->set.height; }
+
 static int check_plan(const struct ggn_session *s, struct base_err *err)
 {
     const struct ggn_train_plan *p = s->plan;
@@ -61,9 +63,8 @@ static int check_plan(const struct ggn_session *s, struct base_err *err)
 
     if (p->batch < 1 || p->batch > GGN_BATCH_MAX || p->batch_r < 1 || p->batch_r > GGN_BATCH_MAX)
         return base_fail(err, BASE_EINVAL, "a batch has 1 to 1024 samples");
-    if (!paper && (p->crop < 16 || p->crop > s->set.width || p->crop > s->set.height))
-        return base_fail(err, BASE_EINVAL, "crop %d is not in 16..%d, the side of the blocks", p->crop,
-                         s->set.width < s->set.height ? s->set.width : s->set.height);
+    if (!paper && (s->crop < 16 || s->crop > s->set.width || s->crop > s->set.height))
+        return base_fail(err, BASE_EINVAL, "crop %d is not in 16..%d, the side of the blocks", s->crop, side_of(s));
     if (paper && (p->noise_map > 0 || p->average > 0 || p->reach > 0))
         return base_fail(err, BASE_EINVAL, "preset paper has neither noise pictures, averaged weights nor a residual");
     if (p->k_r < 3)
@@ -98,6 +99,7 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     data.mean_for_reference = 1;
     int rc = s->threads ? ggn_series_set_load(&s->set, &data, err) : BASE_ENOMEM;
 
+    s->crop = p->crop || paper ? p->crop : side_of(s) < GGN_TRAIN_CROP ? side_of(s) : GGN_TRAIN_CROP;
     if (!rc && p->synthetic > 0)
         rc = ggn_series_set_add_synthetic(&s->set, p->synthetic, p->seed, err);
     if (!rc && p->extend)
@@ -131,7 +133,7 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     s->r = rc ? NULL : ggn_weights_create(&s->r_graph, NULL, 0, err);
     if (!s->r)
         return rc ? rc : BASE_ENOMEM;
-    size_t crops = 6 * (size_t)job_most(p->job, p->batch_r) * (size_t)p->crop * (size_t)p->crop;
+    size_t crops = 6 * (size_t)job_most(p->job, p->batch_r) * (size_t)s->crop * (size_t)s->crop;
     size_t windows = (size_t)job_most(p->job, p->batch) * (2 * (size_t)p->window + 1) * ggn_series_set_values(&s->set);
     size_t pointers = 6 * (size_t)p->batch_r + (6 * (size_t)p->window + 2) * (size_t)p->batch;
     s->buffer = malloc((crops > windows ? crops : windows) * sizeof *s->buffer);

@@ -28,6 +28,7 @@ struct ggn_session {
     struct base_threads *threads;
     struct ggn_series_set set;
     struct ggn_windows train, validation;
+    int crop;                    /* side of the denoiser's samples */
     struct ggn_hyper hyper;      /* of the model */
     struct ggn_model *init;      /* where to start from, or NULL */
     struct ggn_graph r_graph;    /* the denoiser at full size */

@@ -15,11 +15,12 @@ static void announce(const struct ggn_session *s)
         return;
     fprintf(s->plan->progress,
             "%d scenes; blocks: %d training (+ %d synthetic), %d validation; windows: %d training, %d validation; levels "
-            "from %g, %s %g\n",
+            "from %g, %s %g%s\n",
             s->set.n_scenes, ggn_series_set_count(&s->set, GGN_SPLIT_TRAIN, 1),
             ggn_series_set_count(&s->set, GGN_SPLIT_TRAIN, 0) - ggn_series_set_count(&s->set, GGN_SPLIT_TRAIN, 1),
             ggn_series_set_count(&s->set, GGN_SPLIT_VALIDATION, 1), s->train.n, s->validation.n, s->set.first_spp,
-            s->set.ratio > 0 ? "ratio" : "step", s->set.ratio > 0 ? s->set.ratio : s->set.step_spp);
+            s->set.ratio > 0 ? "ratio" : "step", s->set.ratio > 0 ? s->set.ratio : s->set.step_spp,
+            s->set.n_levels ? " behind those of the recording" : "");
     if (!s->validation.n)
         fprintf(s->plan->progress, "no validation windows: the last epoch counts and p stays uncalibrated\n");
 }

@@ -11,7 +11,6 @@ struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset)
         .k_r = lull ? 8 : 16,
         .k_m = lull ? 10 : 20,
         .k_d = lull ? 32 : 64,
-        .crop = lull ? 96 : 0,
         .batch_r = 16,
         .batch = lull ? 16 : 64,
         .steps_r = lull ? 2000 : 0,

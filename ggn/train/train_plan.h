@@ -9,6 +9,7 @@
 #include "data/series.h"
 #include "model/networks.h"
 
+enum { GGN_TRAIN_CROP = 96 };
 enum { GGN_TRAIN_INTERRUPTED = 1 }; /* returned by ggn_train and its phases beside 0 and errors */
 
 struct ggn_train_plan {
@@ -18,7 +19,8 @@ struct ggn_train_plan {
     int resume;       /* continue from OUT.ckpt if it is there */
     enum ggn_preset preset;
     int window, k_r, k_m, k_d; /* network sizes; the block size comes from the data */
-    int crop, batch_r, batch;  /* crop side of the denoiser's samples; samples per step */
+    int crop;                  /* side of the denoiser's samples; 0: GGN_TRAIN_CROP, or the side of smaller blocks */
+    int batch_r, batch;        /* samples per step */
     int steps_r, steps;        /* steps of the two phases; preset paper: of its one phase, 0 = epochs · windows / batch */
     int epochs;                /* preset paper */
     int epoch_steps;           /* steps between validations and checkpoints */

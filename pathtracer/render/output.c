@@ -346,13 +346,19 @@ void pt_output_or_keep(pt_output_writer *write, const char *path, const struct p
                        const struct pt_output_info *info, struct base_err *err)
 {
     struct base_err why = {0}, again = {0};
+    const struct base_err before = *err; /* of the files that could not be written either */
     char kept[4096];
     if (!path || write(path, r, info, &why) == 0)
         return;
-    *err = why;
     const char *folder = getenv("TMPDIR");
     int n = snprintf(kept, sizeof kept, "%s/lull-%ld-%s", folder && folder[0] != '\0' ? folder : "/tmp", (long)getpid(),
                      base_file_name(path));
-    if (n < (int)sizeof kept && write(kept, r, info, &again) == 0)
+    const int is_kept = n < (int)sizeof kept && write(kept, r, info, &again) == 0;
+    if (before.code)
+        base_fail(err, before.code, "%.400s; %.100s%s%.100s", before.text, path, is_kept ? " kept as " : " is lost",
+                  is_kept ? kept : "");
+    else if (is_kept)
         base_fail(err, why.code, "%.320s; kept as %.160s", why.text, kept);
+    else
+        *err = why;
 }

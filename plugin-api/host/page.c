@@ -1,4 +1,5 @@
 /* The report as a page: page.html, which is compiled in, with the report and the pictures in its places. */
+#include <math.h>
 #include <png.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,6 +41,14 @@ static int find_size(const cJSON *report, double size[2])
     return size[0] >= 1.0 && size[0] <= INT32_MAX && size[1] >= 1.0 && size[1] <= INT32_MAX;
 }
 
+/* Whether there can be a picture of this size. */
+static int is_size(const double size[2])
+{
+    static const double MOST = INT32_MAX;
+    return size[0] >= 1 && size[0] <= MOST && size[1] >= 1 && size[1] <= MOST && size[0] == floor(size[0]) &&
+           size[1] == floor(size[1]);
+}
+
 /* Takes report and quote over. Text that may stand in a script element, the caller's; NULL: no memory. */
 static char *make_data(cJSON *report, cJSON *quote)
 {
@@ -65,6 +74,9 @@ static int32_t parse(const char *report, const char *quote, uint32_t layer_count
     int32_t code = LULL_OK;
     if (!find_size(r, wanted))
         code = lull_error_set(err, LULL_E_INVALID, "no report (expected what lull-render --report writes)");
+    else if (!is_size(wanted))
+        code =
+            lull_error_set(err, LULL_E_INVALID, "a report of %gx%g pixels: no picture has this size", wanted[0], wanted[1]);
     else if (quote && !cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(q, "rows")))
         code = lull_error_set(err, LULL_E_INVALID, "no quote (expected what lull-render --quote --json prints)");
     else if (layer_count > 0 && (size[0] != wanted[0] || size[1] != wanted[1]))

@@ -13,7 +13,7 @@
 
 #include "support/api_folders.h"
 
-enum { SIDE = 64 };
+static int32_t side = 200, transfer = LULL_TRANSFER_SRGB; /* of the frame */
 
 static const char with_picture[] = "tests/data/tiny.ggn",
                   without_picture[] = "tests/data/no-picture.ggn"; /* a step or two */
@@ -37,16 +37,16 @@ static const char *warned(const char *model, uint32_t planes)
     struct lull_error err = {.struct_size = sizeof err};
     struct lull_instance *in = NULL;
     struct lull_pair pair = {"model", model};
-    struct lull_rect rect = {0, 0, SIDE, SIDE};
+    struct lull_rect rect = {0, 0, side, side};
     struct lull_frame frame = {.struct_size = sizeof frame,
-                               .width = SIDE,
-                               .height = SIDE,
+                               .width = (uint32_t)side,
+                               .height = (uint32_t)side,
                                .blocks = &rect,
                                .block_count = 1,
                                .block_stride = sizeof rect,
                                .planes = planes,
                                .exposure = 1,
-                               .transfer = LULL_TRANSFER_SRGB,
+                               .transfer = transfer,
                                .rgb_to_xyz = {0, 0, 0, 0.2, 0.7, 0.1, 0, 0, 0}};
     warning[0] = '\0';
     if (lull_open(&search, "ggn", &found, &err) != LULL_OK ||
@@ -64,11 +64,29 @@ static void a_missing_half_is_told(void **state)
     assert_string_equal(warned(NULL, color | half), "");
     assert_non_null(strstr(warned(NULL, color), "no plane HALF: noise is told from how the mean changes"));
     assert_int_equal(warning_level, LULL_LOG_INFO);
+    side = 16;
     assert_string_equal(warned(with_picture, color | half), "");
-    assert_non_null(strstr(warned(with_picture, color), "half buffers"));
-    assert_non_null(strstr(warning, "--no-pictures"));
+    assert_string_equal(warned(with_picture, color), "the model is asked about what it has not learned: no half buffers "
+                                                     "(ggn evaluate --no-pictures says how well it decides)");
     assert_int_equal(warning_level, LULL_LOG_WARNING);
+    side = 40;
+    assert_string_equal(warned(without_picture, color | half), "");
     assert_string_equal(warned(without_picture, color), "");
+}
+
+/* Blocks of another size and another display are told, too: as a note where the model begins with the observer. */
+static void another_setting_is_told(void **state)
+{
+    const uint32_t both = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF);
+    (void)state;
+    side = 64;
+    transfer = LULL_TRANSFER_LINEAR;
+    assert_string_equal(warned(without_picture, both), "the model is asked about what it has not learned: blocks of 64x64 "
+                                                       "pixels instead of 40x40, linear codes instead of sRGB");
+    assert_int_equal(warning_level, LULL_LOG_WARNING);
+    assert_string_equal(warned(NULL, both), "the model is asked about what it has not learned: blocks of 64x64 "
+                                            "pixels instead of 200x200, linear codes instead of sRGB");
+    assert_int_equal(warning_level, LULL_LOG_INFO);
 }
 
 /* The last value that each parameter takes, and the first that it does not. */
@@ -101,6 +119,7 @@ int main(void)
 {
     if (api_folder(criteria, sizeof criteria, API_CRITERIA) != 0)
         return 1;
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_missing_half_is_told), cmocka_unit_test(ends_of_ranges)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_missing_half_is_told), cmocka_unit_test(another_setting_is_told),
+                                       cmocka_unit_test(ends_of_ranges)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

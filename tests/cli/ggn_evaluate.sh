@@ -34,6 +34,8 @@ fails "evaluate: not a model" 'human.csv' $ggn evaluate -d "$tmp/data" -m "$tmp/
 
 cp "$d/labels.json" "$tmp/people.json"
 fails "label: people's thresholds stay" "labels.json: thresholds of people would be lost; ggn label --replace-human" $ggn label --source levels "$tmp/data"
+$ggn label "$tmp/data" --human "$tmp/human.csv" >"$tmp/out" 2>"$tmp/err" && cmp -s "$d/labels.json" "$tmp/people.json"
+check "label --human: the thresholds that are there are the same labels" $?
 printf 'p3d_toy-view0_part6;90;161;\n' >"$tmp/other.csv"
 fails "label --human: other people's too" "thresholds of people would be lost" $ggn label "$tmp/data" --human "$tmp/other.csv"
 fails "import: so does it" "thresholds of people would be lost" $ggn import-sin3d "$tmp/sin3d" -o "$tmp/data" --block 32 -t "$tmp/other.csv"

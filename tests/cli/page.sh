@@ -92,6 +92,10 @@ done
 refused "the picture has 16x16 pixels, the report is of 48x32" r.json other.exr -o x.html
 echo '{"blocks": 1, "width": 1, "height": 1}' >no.json
 refused "no.json: no report (expected what lull-render --report writes)" no.json -o x.html
+for size in -1 0 2.5 1e300; do
+    echo "{\"width\": $size, \"height\": 8, \"blocks\": []}" >size.json
+    refused "pixels: no picture has this size" size.json -o x.html
+done
 refused "nowhere.json" nowhere.json -o x.html
 refused "not an image" r.json no.json -o x.html
 ln -s r.json r.html

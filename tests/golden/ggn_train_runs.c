@@ -710,7 +710,7 @@ static void keys_of_runs(void **state)
     OTHER(k_r += 1);
     OTHER(k_m += 1);
     OTHER(k_d += 1);
-    OTHER(crop += 1);
+    OTHER_SET(s.crop, s.crop + 1);
     OTHER(batch_r += 1);
     OTHER(batch += 1);
     OTHER(steps_r += 1);

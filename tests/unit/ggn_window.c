@@ -12,6 +12,7 @@
 
 #include "sequence/tail.h"
 #include "model/policy.h"
+#include "model/setting.h"
 #include "base/colour.h"
 #include "model/window.h"
 #include "nn/hash.h"
@@ -393,6 +394,75 @@ static void policies_are_adjusted(void **state)
     (void)state;
 }
 
+/* Evenly spaced levels that were thinned to a ratio are both in turn: the list says the first, the ratio goes on. */
+static void policies_list_their_levels(void **state)
+{
+    static const double thinned[] = {16, 32, 48, 64, 80, 96, 112, 128, 144, 160, 176, 208, 240},
+                        geometric[] = {4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40}, even[] = {16, 32, 48, 64, 80, 96};
+    struct ggn_policy p = ggn_policy_default(), q;
+    struct base_err err = {0};
+    cJSON *root = cJSON_CreateObject();
+    int failed = 0;
+
+    p.ratio = 8.0 / 7;
+    ggn_policy_set_levels(&p, thinned, 13);
+    assert_true(p.n_levels >= 8 && p.n_levels <= 13);
+    double spp = 0;
+    for (int i = 0; i < 10; i++) {
+        assert_true(ggn_policy_next(&p, spp) == thinned[i]);
+        spp = ggn_policy_next(&p, spp);
+    }
+    assert_true(ggn_policy_next(&p, 17) == 32 && ggn_policy_next(&p, 700) == 800);
+    assert_true(ggn_policy_level_below(&p, 100) == 96 && ggn_policy_level_below(&p, 96) == 96);
+    assert_true(ggn_policy_level_below(&p, 5) == 5 && ggn_policy_level_below(&p, 1000) == 1000);
+    ggn_policy_print(root, &p, &failed);
+    assert_int_equal(ggn_policy_parse(root, &q, &err), 0);
+    same_policy(&p, &q);
+    assert_true(q.n_levels == p.n_levels && !memcmp(q.level, p.level, (size_t)p.n_levels * sizeof p.level[0]));
+    cJSON_ReplaceItemInObject(root, "levels", cJSON_Parse("[16, 32, 32.5]"));
+    assert_int_equal(ggn_policy_parse(root, &q, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "policy: level 2, 32.5 samples, does not follow");
+    cJSON_ReplaceItemInObject(root, "levels", cJSON_Parse("16"));
+    assert_int_equal(ggn_policy_parse(root, &q, &err), BASE_EINVAL);
+    cJSON_Delete(root);
+    /* what ratio or step tell by themselves needs no list */
+    p.ratio = 1.26;
+    ggn_policy_set_levels(&p, geometric, 11);
+    assert_int_equal(p.n_levels, 0);
+    p.ratio = 0;
+    p.step_spp = 16;
+    ggn_policy_set_levels(&p, even, 6);
+    assert_int_equal(p.n_levels, 0);
+    (void)state;
+}
+
+static void settings_are_compared(void **state)
+{
+    static const double even[] = {16, 32, 48, 64, 80, 96}, geometric[] = {16, 18, 20, 23, 26, 30};
+    const struct ggn_setting learned = {200, 200, GGN_TRANSFER_SRGB, 1};
+    struct ggn_setting here = learned;
+    struct ggn_policy p = ggn_policy_default();
+    char text[200];
+    double asked = 0, nearest = 0;
+
+    assert_true(ggn_setting_difference(&learned, &here, text, sizeof text) == 0 && text[0] == '\0');
+    here = (struct ggn_setting){64, 32, GGN_TRANSFER_LINEAR, 0};
+    assert_true(ggn_setting_difference(&learned, &here, text, sizeof text) == strlen(text));
+    assert_string_equal(text, "blocks of 64x32 pixels instead of 200x200, linear codes instead of sRGB, no half buffers");
+    assert_true(ggn_setting_difference(&learned, &here, text, 20) == 19 && strlen(text) == 19);
+    assert_true(ggn_setting_difference(&here, &learned, text, sizeof text) > 0); /* more than it needs is no difference */
+    assert_string_equal(text, "blocks of 200x200 pixels instead of 64x32, sRGB instead of linear codes");
+    p.first_spp = 16;
+    p.ratio = 1.14;
+    assert_true(ggn_setting_levels_differ(&p, even, 6, &asked, &nearest) && asked == 18 && nearest == 32);
+    assert_false(ggn_setting_levels_differ(&p, geometric, 6, &asked, &nearest));
+    memcpy(p.level, even, sizeof even);
+    p.n_levels = 6;
+    assert_false(ggn_setting_levels_differ(&p, even, 6, &asked, &nearest));
+    assert_true(ggn_setting_levels_differ(&p, geometric, 6, &asked, &nearest) == 0); /* its last level is before the next */
+    (void)state;
+}
+
 /* As JSON, whole; what is missing keeps its default, but for passes. */
 static void policies_are_written_down(void **state)
 {
@@ -485,6 +555,8 @@ int main(void)
         cmocka_unit_test(tiles_begin_anywhere),
         cmocka_unit_test(policies_have_limits),
         cmocka_unit_test(policies_are_adjusted),
+        cmocka_unit_test(policies_list_their_levels),
+        cmocka_unit_test(settings_are_compared),
         cmocka_unit_test(policies_are_written_down),
         cmocka_unit_test(policies_of_models),
     };

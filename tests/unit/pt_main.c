@@ -498,6 +498,7 @@ static void outputs_are_kept(void **state)
     for (int k = 1; k < 3; k++) { /* at first only here, then there too */
         write_count = 0;
         fails_until = k;
+        err = (struct base_err){0};
         pt_output_or_keep(write_nothing, "a/b.exr", NULL, &none, &err);
         assert_int_equal(write_count, 2);
         snprintf(name, sizeof name, "/elsewhere/lull-%ld-b.exr", (long)getpid());
@@ -506,6 +507,18 @@ static void outputs_are_kept(void **state)
         assert_string_equal(err.text, line);
         assert_int_equal(err.code, BASE_EIO);
     }
+    err = (struct base_err){0};
+    for (int k = 0; k < 3; k++) { /* each of several files is named: kept, kept, and lost */
+        static const char *const paths[] = {"a/b.exr", "c.png", "d.json"};
+        write_count = 0;
+        fails_until = k < 2 ? 1 : 2;
+        pt_output_or_keep(write_nothing, paths[k], NULL, &none, &err);
+    }
+    snprintf(line, sizeof line,
+             "a/b.exr: no paper; kept as /elsewhere/lull-%ld-b.exr; c.png kept as /elsewhere/lull-%ld-c.png; d.json is lost",
+             (long)getpid(), (long)getpid());
+    assert_string_equal(err.text, line);
+    err = (struct base_err){0};
     setenv("TMPDIR", "", 1);
     write_count = 0;
     pt_output_or_keep(write_nothing, "b.exr", NULL, &none, &err);
