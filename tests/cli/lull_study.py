@@ -397,8 +397,9 @@ check(
     status == 200
     and b"main.js" in page
     and "default-src 'none'" in headers["Content-Security-Policy"]
-    and headers["Referrer-Policy"] == "no-referrer",
-    "the page, with a policy that lets nothing in from outside",
+    and headers["Referrer-Policy"] == "no-referrer"
+    and b'<link rel="icon" href="data:image/svg+xml,' in page,
+    "the page, with its icon and a policy that lets nothing in from outside",
 )
 for name in ("main.js", "study.css", "texts.json", "vendor/jspsych.js", "vendor/questplus.js"):
     check(server.request("GET", name)[0] == 200, f"GET {name}")

@@ -32,6 +32,7 @@ EOF
     idiff -q -fail 0 q.png p.png"
 t "a scene's name ends no element" look "'<' not in block and page.count('<script') == 2 and 'alert(1)' in block and report['scene'].startswith('x<!--<script>alert(1)&')"
 t "nothing comes from elsewhere" look "not re.findall(r'(?:src|href)=\"(?!data:)', page) and 'url(' not in page and '@import' not in page and set(re.findall(r'https?://[^\" ]*', page)) <= {'http://www.w3.org/2000/svg'}"
+t "it brings its icon, so that no browser asks for one" look "page.count('<link rel=\"icon\" href=\"data:image/svg+xml,') == 1"
 t "the page without its pictures is small" look "len(page) - sum(4 * len(p) / 3 for p in pictures.values()) < 2e6"
 t "a crop has its pictures' size" sh -c "$R $scene --crop 20,3,41,30 --html c.html && grep -q '\"crop\":\[20,3,41,30\]' c.html"
 t "many blocks: the page stays within 2 MB" sh -c "$P $scene -q --size 400x300 --block 4 -c halfbuf -p first-spp=2 -p threshold=1e-9 --spp-min 2 --spp-max 16 --html m.html --preview m.png &&

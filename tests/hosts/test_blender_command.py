@@ -1,8 +1,10 @@
 """The command line of the Blender host: what it writes, refuses, tells and keeps; run like test_blender.py."""
+import base64
 import contextlib
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -205,6 +207,47 @@ def test_quote():
     assert Path(tmp("after.exr")).read_bytes() == Path(tmp("plain.exr")).read_bytes()
 
 
+def test_quote_of_frames():
+    """--frames --quote ends with the price of all frames together"""
+    scene = cube(24, 24)
+    scene.frame_start, scene.frame_end, scene.frame_step = 1, 5, 2
+    blend, output = saved(scene, "shot.blend"), io.StringIO()
+    with contextlib.redirect_stdout(output):
+        assert command(blend, "--frames", "all", "--quote", "--spp-max", "64", "-q") == (0, "")
+    lines = output.getvalue().splitlines()
+    means = [float(r.split("/")[1].replace(",", "")) for r in lines if r.endswith("chosen")]
+    assert len(means) == 3 and re.fullmatch(r"3 frames, by 3 pilots: (about|at most) [0-9.]+ (s|min), [0-9,]+ spp on average",
+                                            lines[-1]), lines
+    assert abs(float(re.search(r"([0-9,]+) spp on", lines[-1])[1].replace(",", "")) - sum(means) / 3) <= 1, lines
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
+        assert command(blend, "-c", "fixed", "--frames", "1-2", "--quote", "--spp-max", "64", "-q") == (0, "")
+    assert output.getvalue().endswith("2 frames: the criterion cannot tell what they cost\n"), output.getvalue()
+
+
+def test_watching():
+    """--html writes the page, its picture as the view shows it, as lull-report does of the EXR; --display-server shows it in a viewer"""
+    scene = cube(48, 32)
+    scene.view_settings.view_transform, scene.view_settings.exposure = "Filmic", 1.5
+    blend = saved(scene, "page.blend")
+    with subprocess.Popen([os.environ.get("PYTHON", sys.executable), "tests/cli/viewer.py", tmp("port"), tmp("seen.json")]) as viewer:
+        while not os.path.exists(tmp("port")) or not Path(tmp("port")).read_text().strip():
+            time.sleep(.05)
+        port = Path(tmp("port")).read_text().strip()
+        assert command(blend, "-q", "--spp-max", "32", "--block", "16", "--html", tmp("page.html"), "-o", tmp("page.exr"), "--preview",
+                       tmp("page.png"), "--display-server", f"127.0.0.1:{port}") == (0, "")
+        viewer.wait(20)
+    seen = json.loads(Path(tmp("seen.json")).read_text())
+    assert seen["updates"] > 0, seen
+    subprocess.run([f"{os.environ.get('BUILD', 'build')}/bin/lull-report", tmp("page.exr"), "-o", tmp("later.html")], check=True)
+    for page in ("page.html", "later.html"):
+        text = Path(tmp(page)).read_text()
+        picture = re.search(r'data-layer="picture" src="data:image/png;base64,([^"]*)"', text)
+        Path(tmp("inside.png")).write_bytes(base64.b64decode(picture[1]))
+        assert abs(read_grey(tmp("inside.png")) - read_grey(tmp("page.png"))).max() <= 1.001 / 255, page
+        assert re.search(r'"visible":"[0-9.]+"', text), page
+
+
 def test_denoise():
     """--denoise keeps the blend, by Cycles' own denoising passes, and stops by it; the noisy picture is there if that fails"""
     scene = cube(48, 32)
@@ -353,6 +396,7 @@ def test_bad_input():
                               ([tmp("cube.blend"), "-c", "halfbuf", "--mask", tmp("mask.png")], "mask of shape (4, 4)"),
                               ([tmp("cube.blend"), "-c", "halfbuf", "--mask", tmp("none.png")], "none.png"),
                               ([tmp("cube.blend"), "-c", "halfbuf", "--frames", "b-a"], "--frames"),
+                              ([tmp("cube.blend"), "-c", "halfbuf", "--frames", "1- 2"], "--frames"),
                               ([tmp("cube.blend"), "-c", "halfbuf", "--scene", "None"], "--scene"),
                               ([tmp("cube.blend"), "-c", "halfbuf", "--spp-min", "9", "--spp-max", "3"], "spp_min"),
                               ([tmp("none.blend")], "none.blend")):

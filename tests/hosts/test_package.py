@@ -1,8 +1,10 @@
 """The Python package lull: the ABI's layout, finding criteria, the driver with a renderer in numpy, the path tracer's stops,
 files, and bad input. BUILD names the build folder."""
 import base64
+import contextlib
 import copy
 import ctypes
+import io
 import json
 import os
 import pickle
@@ -646,6 +648,21 @@ def test_modules_by_name():
             "try: lull.nothing\nexcept AttributeError as e: print(e)")
     done = subprocess.run([sys.executable, "-c", code], text=True, capture_output=True)
     assert done.stdout == "module 'lull' has no attribute 'nothing'\n", done
+
+
+def test_numbers_of_a_command_line():
+    """numbers on the Blender host's command line have no blanks and no underscores, as those of the programs"""
+    from lull.blender import cli
+    assert cli.parser().parse_args(["--spp-max", "8", "--time-budget", "2.5e1", "--block=+16"]).time_budget == 25
+    for option, value in (("--spp-max", " 8"), ("--spp-min", "8 "), ("--block", "1_6"), ("--time-budget", "\t2"), ("--spp-max", "8.0"),
+                          ("--checkpoint-every", "nan"), ("--time-budget", "1_0"), ("--checkpoint-every", " 60")):
+        said = io.StringIO()
+        with contextlib.redirect_stderr(said):
+            try:
+                cli.parser().parse_args([f"{option}={value}"])
+                raise AssertionError(f"{option}={value!r} was taken")
+            except SystemExit as end:
+                assert end.code == 2 and option in said.getvalue() and said.getvalue().count("\n") == 1, said.getvalue()
 
 
 def test_progress():

@@ -73,6 +73,7 @@ HostQuoteRow: Any = _struct("HostQuoteRow", "ptr blocks; f64 spp_min spp_mean sp
                                             "unknown unmet capped; i32 asked")
 HostDenoising: Any = _struct("HostDenoising", "u32 struct_size flags threads zero; text library; ptr context cancelled")
 HostPicture: Any = _struct("HostPicture", "u32 struct_size zero; ptr rgb denoised weight")
+HostLayer: Any = _struct("HostLayer", "text name; ptr rgb")
 HostOutput: Any = _struct("HostOutput", "text option path")
 
 

@@ -18,7 +18,7 @@ from .driver import Driver
 from .files import file_call, srgb, srgb_encoded, write_png
 from .frame import Frame
 from .host import HostFrame, reasons
-from .library import library
+from .library import bytes_of, library
 
 
 def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull for Python 1.0",
@@ -96,14 +96,34 @@ def write_stop_map(path: str, frame: HostFrame, scene: str = "") -> None:
 def write_report(path: str, driver: Driver, scene: str = "", kernel: str = "", interrupted: bool = False,
                  mask: Optional[str] = None, denoised: Optional[Denoised] = None) -> None:
     """Everything about the run as JSON, as the path tracer's --report; null: not known. mask: its file."""
+    file_call("host_report_write", driver.frame.handle.pointer,
+              C.byref(_report(driver, scene, kernel, interrupted, mask, denoised)), os.fsencode(path))
+
+
+def _report(driver: Driver, scene: str, kernel: str, interrupted: bool, mask: Optional[str],
+            denoised: Optional[Denoised]) -> abi.HostReport:
     frame = driver.frame
     flags = abi.REPORT_NO_RAYS | abi.REPORT_INTERRUPTED * interrupted | abi.REPORT_DENOISED * (denoised is not None)
     kept = {"noisy_weight": denoised.weight.mean(dtype=float), "noisy_error": denoised.noisy_error.ctypes.data} \
         if denoised else {}
-    file_call("host_report_write", frame.handle.pointer, C.byref(abi.sized(
+    return abi.sized(
         abi.HostReport, flags=flags, scene=os.fsencode(scene), mask=None if mask is None else os.fsencode(mask),
         kernel=kernel.encode(), threads=driver.threads, processes=1, film_pixels=frame.view.pixels, scene_bytes=math.nan,
-        film_bytes=sum(a.nbytes for a in frame.arrays().values()), **kept)), os.fsencode(path))
+        film_bytes=sum(a.nbytes for a in frame.arrays().values()), **kept)
+
+
+def write_page(path: str, driver: Driver, scene: str = "", kernel: str = "", interrupted: bool = False,
+               mask: Optional[str] = None, denoised: Optional[Denoised] = None) -> None:
+    """The report as a page for people with the pictures in it, one HTML file, as the path tracer's --html."""
+    frame, pictures = driver.frame, {"picture": shown(driver.frame, denoised)}
+    if denoised:
+        pictures |= {name: srgb(frame.displayed(frame.cropped(rgb))) for name, rgb in
+                     (("noisy", frame.mean()), ("denoised", denoised.denoised))}
+    report = bytes_of("host_report_text", frame.handle.pointer, C.byref(_report(driver, scene, kernel, interrupted, mask,
+                                                                                denoised)))
+    layers = (abi.HostLayer * len(pictures))(*((name.encode(), rgb.ctypes.data) for name, rgb in pictures.items()))
+    height, width = pictures["picture"].shape[:2]
+    file_call("host_page", report, None, layers, len(layers), width, height, os.fsencode(path))
 
 
 def progress_text(driver: Driver) -> str:

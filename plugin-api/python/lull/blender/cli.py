@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -41,6 +42,20 @@ class _Parser(argparse.ArgumentParser):
         sys.exit(2)
 
 
+def _whole(text: str) -> int:
+    """As the programs in C take it: digits, no blanks, no underscores."""
+    if not re.fullmatch(r"[+-]?[0-9]+", text):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
+    return int(text)
+
+
+def _real(text: str) -> float:
+    """A decimal number without blanks or underscores."""
+    if not re.fullmatch(r"[+-]?([0-9]+[.]?|[0-9]*[.][0-9]+)([eE][+-]?[0-9]+)?", text):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number")
+    return float(text)
+
+
 def parser() -> argparse.ArgumentParser:
     """Of the options, with their help."""
     p = _Parser("python3 -m lull.blender", description="Render a Blender scene with Cycles, block by "
@@ -53,11 +68,11 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--denoise", default="", choices=denoising.KINDS, metavar="[=blend|full]", help="keep the denoised "
                    "picture, and stop blocks by what is seen of it: blend (default) keeps as much of the noisy one as the "
                    "denoiser is wrong, full none; needs Open Image Denoise 2")
-    p.add_argument("--spp-min", type=int, default=16, metavar="N", help="samples before the first check (default 16)")
-    p.add_argument("--spp-max", type=int, metavar="N", help="most samples of a block (default: the scene's Max Samples)")
-    p.add_argument("--time-budget", type=float, metavar="SECONDS", help="per frame; 0 = no limit (default: the scene's Time "
+    p.add_argument("--spp-min", type=_whole, default=16, metavar="N", help="samples before the first check (default 16)")
+    p.add_argument("--spp-max", type=_whole, metavar="N", help="most samples of a block (default: the scene's Max Samples)")
+    p.add_argument("--time-budget", type=_real, metavar="SECONDS", help="per frame; 0 = no limit (default: the scene's Time "
                    "Limit)")
-    p.add_argument("--block", type=int, metavar="N", help="block size in pixels (default: the criterion's own, else 200, "
+    p.add_argument("--block", type=_whole, metavar="N", help="block size in pixels (default: the criterion's own, else 200, "
                    "less where that would be fewer than 12 blocks)")
     p.add_argument("--mask", default="", metavar="FILE.png", help="lighter regions are rendered better")
     p.add_argument("--frames", metavar="FIRST-LAST", help="an animation; 'all' = the scene's range (default: current frame)")
@@ -69,9 +84,12 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--preview", default="", metavar="FILE.png", help="as it is shown (curve per channel)")
     p.add_argument("--stop-map", default="", metavar="FILE.png|FILE.csv", help="samples per block")
     p.add_argument("--report", default="", metavar="FILE.json", help="everything about the run")
+    p.add_argument("--html", default="", metavar="FILE.html", help="the same as a page for people, with the picture")
+    p.add_argument("--display-server", default="", metavar="HOST[:PORT]", help="show the picture in an image viewer while it "
+                   "is made: tev or HDRView (port 14158)")
     p.add_argument("--checkpoint", default="", metavar="FILE", help="keep the state there now and then, and when the "
                    "render ends or is interrupted")
-    p.add_argument("--checkpoint-every", type=float, default=60, metavar="SECONDS", help="how often (default 60)")
+    p.add_argument("--checkpoint-every", type=_real, default=60, metavar="SECONDS", help="how often (default 60)")
     p.add_argument("--resume", action="store_true", help="go on from the checkpoint, if it is there; with a higher "
                    "--spp-max a finished picture gets more samples")
     p.add_argument("--quote", action="store_true", help="render a pilot of 128 samples or 30 seconds, print what the "
@@ -109,11 +127,8 @@ def _frames(text: Optional[str], scene: bpy.types.Scene) -> list[Optional[int]]:
         return [None]
     if text == "all":
         return list(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
-    first, _, last = text.partition("-")
-    try:
-        frames: list[Optional[int]] = list(range(int(first), int(last or first) + 1))
-    except ValueError:
-        frames = []
+    ends = re.fullmatch(r"(-?[0-9]+)(?:-(-?[0-9]+))?", text)
+    frames: list[Optional[int]] = list(range(int(ends[1]), int(ends[2] or ends[1]) + 1)) if ends else []
     if not frames:
         raise ValueError(f"--frames {text}: expected FIRST-LAST or all")
     return frames
@@ -163,8 +178,9 @@ def _settings(options: argparse.Namespace, scene: bpy.types.Scene, frame: Option
         parameters["visible"] = options.visible
     settings = Settings(options.criterion, parameters, options.spp_min, options.spp_max, options.time_budget, options.block,
                         mask=options.mask, output=options.output, preview=options.preview, stop_map=options.stop_map,
-                        report=options.report, checkpoint=options.checkpoint, denoise=options.denoise).numbered(frame)
-    if not (options.quote or settings.output or settings.preview or settings.stop_map or settings.report):
+                        report=options.report, page=options.html, checkpoint=options.checkpoint,
+                        display_server=options.display_server, denoise=options.denoise).numbered(frame)
+    if not (options.quote or settings.output or settings.preview or settings.stop_map or settings.report or settings.page):
         stem = Path(options.file or bpy.data.filepath or "untitled").stem
         settings.output = default_output(scene, frame, f"{stem}.exr")
     return settings
@@ -178,21 +194,24 @@ def _render(options: argparse.Namespace, stopping: Stopping) -> int:
         raise ValueError(f"--checkpoint-every {options.checkpoint_every}: expected a number from 0")
     scene = _scene(options)
     frames = [(frame, _settings(options, scene, frame)) for frame in _frames(options.frames, scene)]
-    status = 0
+    status, costs = 0, []
     with load(frames[0][1].criterion, **frames[0][1].parameters) as criterion:
         check_files([settings for _, settings in frames], criterion)
         for frame, settings in frames:
             if frame is not None:
                 scene.frame_set(frame)
-            status = max(status, _render_frame(options, scene, settings, criterion, stopping))
+            status = max(status, _render_frame(options, scene, settings, criterion, stopping, costs))
             if status in (1, EXIT_STATUS) or stopping.asked:
                 return EXIT_STATUS if stopping.asked and status in (0, EXIT_STATUS) else status
+    if options.quote and len(frames) > 1:
+        unknown = f"{len(frames)} frames: the criterion cannot tell what they cost"
+        print(quote.shot(list(enumerate(costs)), len(frames)) or unknown, flush=True)
     return status
 
 
 def _render_frame(options: argparse.Namespace, scene: bpy.types.Scene, settings: Settings, criterion: Criterion,
-                  stopping: Stopping) -> int:
-    """The exit status of one frame."""
+                  stopping: Stopping, costs: list[Optional[quote.Row]]) -> int:
+    """The exit status of one frame. costs: gets what a quote tells."""
     from .session import Session
     progress = None if options.quiet else Progress()
 
@@ -217,7 +236,7 @@ def _render_frame(options: argparse.Namespace, scene: bpy.types.Scene, settings:
                 warned = True
                 note(f"{session.unsaved}; the render goes on")
         if options.quote or result is None:
-            return _tell_quote(session, result, progress)
+            return _tell_quote(session, result, progress, costs)
         written, failed = session.write(result)
     if progress:
         progress.clear()
@@ -225,11 +244,13 @@ def _render_frame(options: argparse.Namespace, scene: bpy.types.Scene, settings:
     return _end(session, result, failed)
 
 
-def _tell_quote(session: Session, result: Optional[Result], progress: Optional[Progress]) -> int:
+def _tell_quote(session: Session, result: Optional[Result], progress: Optional[Progress],
+                costs: list[Optional[quote.Row]]) -> int:
     if progress:
         progress.clear()
     if result is not None and result.outcome in ("interrupt", "failed"):
         return _end(session, result, [])
+    costs.append(quote.chosen(session.driver))
     print(quote.table(session.driver), flush=True)
     if session.keeper:
         session.keeper.save(session.driver)

@@ -38,7 +38,9 @@ class Settings:
     preview: str = ""
     stop_map: str = ""
     report: str = ""
+    page: str = ""
     checkpoint: str = ""
+    display_server: str = ""  # "HOST" or "HOST:PORT" of an image viewer; "": none
     denoise: str = ""  # of lull.denoising.KINDS; "": the noisy picture is kept
 
     def __post_init__(self) -> None:
@@ -49,7 +51,7 @@ class Settings:
         """The same with the frame's number before the ending of every file."""
         if frame is None:
             return self
-        names = ("output", "preview", "stop_map", "report", "checkpoint")
+        names = ("output", "preview", "stop_map", "report", "page", "checkpoint")
         files: dict[str, Any] = {name: _numbered(getattr(self, name), f"_{frame:04}") for name in names}
         return replace(self, **files)
 
@@ -57,7 +59,7 @@ class Settings:
         """The files, each with the option that names it and its endings."""
         return [Output("--output", self.output, (".exr",)), Output("--preview", self.preview, (".png",)),
                 Output("--stop-map", self.stop_map, (".png", ".csv")), Output("--report", self.report, (".json",)),
-                Output("--checkpoint", self.checkpoint)]
+                Output("--html", self.page, (".html", ".htm")), Output("--checkpoint", self.checkpoint)]
 
 
 def _numbered(path: str, suffix: str) -> str:
@@ -154,6 +156,7 @@ class Session:
                                mask=read_grey(settings.mask) if settings.mask else None, seed=scene.cycles.seed,
                                exposure=exposure, display=display)
             self.driver = Driver(self.frame, self.host.render, threads=self.host.threads, after_call=after_call,
+                                 display_server=settings.display_server,
                                  identity=_identity(scene, self.host) if settings.checkpoint else None)
         except BaseException:
             self.host.__exit__()
@@ -205,7 +208,8 @@ class Session:
                                                     self.host.passes.finished(self.frame, rgb), kept)),
             (s.preview, lambda p: outputs.write_preview(p, self.driver, kept)),
             (s.stop_map, lambda p: outputs.write_stop_map(p, self.frame, scene)),
-            (s.report, lambda p: outputs.write_report(p, self.driver, scene, kernel, interrupted, s.mask or None, kept))))
+            (s.report, lambda p: outputs.write_report(p, self.driver, scene, kernel, interrupted, s.mask or None, kept)),
+            (s.page, lambda p: outputs.write_page(p, self.driver, scene, kernel, interrupted, s.mask or None, kept))))
         return written, failed + unwritten
 
     def _denoise(self) -> list[str]:
