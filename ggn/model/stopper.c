@@ -82,8 +82,6 @@ static void schedule(const struct ggn_stop_rule *rule, struct ggn_stopper *s, do
         next = s->leapt ? leap : next;
     }
     ask_at(s, to_spp(ceil(fmax(next, p->first_spp))));
-    if (rule->spp_max > s->asked_spp && s->verdict.next_spp > rule->spp_max)
-        s->verdict.next_spp = rule->spp_max;
 }
 
 int ggn_stopper_pass(struct ggn_stopper *s, int passes, int below)
@@ -140,8 +138,6 @@ static void decide_by_law(const struct ggn_stop_rule *rule, struct ggn_stopper *
     double predicted = spp * fmax(exp2(fmin(2 * (logit - stops_at), 20)), LEAST_STEP); /* noise falls as 1/sqrt(spp) */
     next = predicted < joins ? predicted : fmin(fmax(predicted, joins), next);
     ask_at(s, to_spp(ceil(next)));
-    if (rule->spp_max > s->asked_spp && v->next_spp > rule->spp_max)
-        v->next_spp = rule->spp_max;
     v->predicted_spp = fmax(predicted, (double)v->next_spp);
 }
 

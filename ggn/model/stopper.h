@@ -29,7 +29,6 @@ enum { GGN_WINDOW_MAX = 16 };
 struct ggn_stop_rule {
     struct ggn_policy policy; /* gate_noise 0: no gate; tail999, gini 0: no guard */
     int window;               /* images per window, S; 1 .. GGN_WINDOW_MAX */
-    uint64_t spp_max;         /* no question comes beyond; 0: no limit */
     double reach;             /* octaves of noise; 0: the network answers alone */
 };
 

@@ -309,9 +309,10 @@ static const struct base_option options[] = {
     {"quiet", 'q', NULL, TO(quiet), .help = "No progress, no notes"},
     {.help = "Interrupting and going on:"},
     {"checkpoint", 0, "FILE", TO(checkpoint.path), .output = BASE_FILE, .kind = &pt_checkpoint_kind,
-     .help = "Save the state of the render now and then, and when it is interrupted"},
+     .help = "Save the state of the render now and then, when it is interrupted, and at its end"},
     {"checkpoint-every", 0, "SECONDS", TO(checkpoint.every_s), 0, 1e9, .help = "How often (default 60)"},
-    {"resume", 0, NULL, TO(checkpoint.resume), .help = "Go on from the checkpoint"},
+    {"resume", 0, NULL, TO(checkpoint.resume),
+     .help = "Go on from the checkpoint, also of a finished render, to more samples or by another --visible"},
     {.help = "What it will cost:"},
     {"quote", 0, NULL, TO(quote),
      .help = "Render a pilot only, say what samples and time the whole image will take, and exit; a --checkpoint of the "

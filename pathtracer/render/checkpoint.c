@@ -88,20 +88,76 @@ static int take(struct source *s, void *data, size_t size, struct base_err *err)
     return 0;
 }
 
-static int take_settings(struct source *s, const char *settings, struct base_err *err)
+/* Settings that do not change samples, only how many there are. */
+static const char *const free_keys[] = {"spp-min", "spp-max", "max-seam", "param"};
+enum { SPP_MAX = 1, PARAM = 3, FREE_KEYS };
+
+struct settings {
+    char *fixed, *free[FREE_KEYS]; /* lines by key, in memory that `fixed` owns */
+};
+
+/* Appends the lines of text[0, size) whose key is free_keys[which], or none of them. */
+static char *copy_lines(char *to, const char *text, size_t size, int which)
+{
+    for (const char *at = text, *end = text + size, *next; at < end; at = next) {
+        const char *newline = memchr(at, '\n', (size_t)(end - at));
+        int key = 0;
+        next = newline ? newline + 1 : end;
+        while (key < FREE_KEYS && strncmp(at, free_keys[key], strlen(free_keys[key])) != 0)
+            key++;
+        if (key != which)
+            continue;
+        memcpy(to, at, (size_t)(next - at));
+        to += next - at;
+    }
+    *to = '\0';
+    return to + 1;
+}
+
+static int split_settings(const char *text, size_t size, struct settings *out, struct base_err *err)
+{
+    char *at = out->fixed = malloc(size + FREE_KEYS + 1);
+    if (!at)
+        return base_fail_nomem(err, "settings");
+    at = copy_lines(at, text, size, FREE_KEYS);
+    for (int key = 0; key < FREE_KEYS; key++)
+        at = copy_lines(out->free[key] = at, text, size, key);
+    return 0;
+}
+
+/* others: PT_RENDER_OTHER_ */
+static int compare_settings(const char *path, const struct settings *saved, const struct settings *present, int *others,
+                            struct base_err *err)
+{
+    struct lull_error e = {.struct_size = sizeof e};
+    int32_t code = lull_host_same_identity(saved->fixed, strlen(saved->fixed), present->fixed, path, &e);
+    if (code != LULL_OK)
+        return pt_host_fail(code, &e, err);
+    *others = 0;
+    for (int key = 0; key < FREE_KEYS; key++)
+        if (key != SPP_MAX && strcmp(saved->free[key], present->free[key]) != 0)
+            *others |= key == PARAM ? PT_RENDER_OTHER_RULE : PT_RENDER_OTHER_LIMITS;
+    return 0;
+}
+
+static int take_settings(struct source *s, const char *text, int *others, struct base_err *err)
 {
     uint64_t n = 0;
+    struct settings saved = {0}, present = {0};
     int rc = take(s, &n, sizeof n, err);
     if (rc)
         return rc;
     if (n > s->size - s->at)
         return base_fail(err, BASE_EINVAL, "%s: the checkpoint is too short", s->path);
-    struct lull_error e = {.struct_size = sizeof e};
-    int32_t code = lull_host_same_identity((const char *)s->data + s->at, n, settings, s->path, &e);
-    if (code != LULL_OK)
-        return pt_host_fail(code, &e, err);
+    rc = split_settings((const char *)s->data + s->at, (size_t)n, &saved, err);
+    if (!rc)
+        rc = split_settings(text, strlen(text), &present, err);
+    if (!rc)
+        rc = compare_settings(s->path, &saved, &present, others, err);
+    free(saved.fixed);
+    free(present.fixed);
     s->at += (size_t)n;
-    return 0;
+    return rc;
 }
 
 static int take_film(struct source *s, const struct pt_film *film, struct base_err *err)
@@ -117,10 +173,12 @@ static int take_film(struct source *s, const struct pt_film *film, struct base_e
     return rc;
 }
 
-static int take_state(struct source *s, struct lull_host_frame *frame, struct base_err *err)
+/* Other parameters of the criterion may not understand its history: it begins anew. */
+static int take_state(struct source *s, struct lull_host_frame *frame, int others, struct base_err *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
-    int32_t code = lull_host_load(frame, s->data + s->at, s->size - s->at, s->path, &e);
+    int32_t code = (others & PT_RENDER_OTHER_RULE ? lull_host_load_blocks : lull_host_load)(frame, s->data + s->at,
+                                                                                            s->size - s->at, s->path, &e);
     return code == LULL_OK ? 0 : pt_host_fail(code, &e, err);
 }
 
@@ -143,11 +201,15 @@ int pt_checkpoint_load(const char *path, struct pt_render *r, const char *settin
         goto out;
     }
     struct source s = {.path = path, .data = (const unsigned char *)data, .at = begin, .size = size - sizeof crc};
-    rc = take_settings(&s, settings, err);
+    const uint64_t first_spp = r->blocks->list[0].next_spp;
+    int others = 0;
+    rc = take_settings(&s, settings, &others, err);
     if (!rc)
         rc = take_film(&s, &r->film, err);
     if (!rc)
-        rc = take_state(&s, r->frame, err);
+        rc = take_state(&s, r->frame, others, err);
+    if (!rc)
+        pt_render_go_on(r, others, first_spp);
 out:
     free(data);
     return rc;

@@ -1,8 +1,9 @@
 /*
- * A render in the middle, as a file: film, blocks, totals and the criterion's history. Continued from it, the image is byte
- * for byte that of a render that was never interrupted. The file is replaced atomically, guarded by a CRC, and holds the
- * settings as text: it is refused (BASE_EINVAL, saying which setting) by a render that would make another image. Byte order
- * and number formats are those of the machine: a checkpoint is not for exchange.
+ * A render in the middle, as a file: film, blocks, totals and the criterion's history. Continued from it, the image is
+ * byte for byte that of a render that was never interrupted. The file is replaced atomically, guarded by a CRC, and
+ * holds the settings as text: it is refused (BASE_EINVAL, saying which setting) by a render whose samples are others.
+ * Limits of samples and the criterion's parameters may differ (pt_render_go_on). Byte order and number formats are those
+ * of the machine: a checkpoint is not for exchange.
  */
 #ifndef PT_RENDER_CHECKPOINT_H
 #define PT_RENDER_CHECKPOINT_H

@@ -94,7 +94,7 @@ static int begin_frame(struct pt_render *r, uint32_t film_planes, struct base_er
     int independent = c->integrator.sampler == PT_SAMPLER_INDEPENDENT;
     struct lull_host_config config = {
         .struct_size = sizeof config,
-        .flags = LULL_HOST_HALF_KNOWN | (c->uniform ? LULL_HOST_UNIFORM : 0) |
+        .flags = LULL_HOST_HALF_KNOWN | (c->cell > 0 ? 0 : LULL_HOST_OPEN_ENDED) | (c->uniform ? LULL_HOST_UNIFORM : 0) |
                  (deterministic ? LULL_FRAME_DETERMINISTIC : 0) | (independent ? LULL_FRAME_INDEPENDENT : 0),
         .width = (uint32_t)c->width,
         .height = (uint32_t)c->height,
@@ -175,6 +175,39 @@ void pt_render_plan(struct pt_render *r, const uint32_t *spp)
     }
 }
 
+/* Another rule is asked about every block as it is, in the place of the last answer if that was about as many samples. */
+static void reschedule(const struct lull_host_blocks *blocks, struct lull_host_block *b, int others, uint64_t first_spp)
+{
+    const int judged = b->reason == LULL_REASON_CRITERION || b->reason == LULL_REASON_DROPPED;
+    const int asks = (others & PT_RENDER_OTHER_RULE) && b->checks > 0;
+    if (judged && (asks || b->spp < blocks->spp_min))
+        b->reason = LULL_REASON_NONE;
+    if (b->reason != LULL_REASON_NONE)
+        return;
+    if (b->checks == 0)
+        b->next_spp = first_spp;
+    else if (asks || judged)
+        b->next_spp = b->spp;
+    if (b->next_spp == b->spp && b->asked_spp == b->spp) {
+        b->checks -= b->checks > 0;
+        b->stop_votes -= b->stop_votes > 0;
+    }
+    if (b->next_spp < blocks->spp_min)
+        b->next_spp = blocks->spp_min;
+    if (b->next_spp < b->spp)
+        b->next_spp = b->spp;
+}
+
+void pt_render_go_on(struct pt_render *r, int others, uint64_t first_spp)
+{
+    struct lull_host_blocks *blocks = r->blocks;
+    lull_host_extend(blocks);
+    for (uint32_t i = 0; others && i < blocks->count && !r->config.uniform; i++)
+        reschedule(blocks, &blocks->list[i], others, first_spp);
+    if ((others & PT_RENDER_OTHER_LIMITS) && r->config.max_seam >= 1.0)
+        lull_host_reopen(blocks, r->config.max_seam);
+}
+
 /* --- one slice ------------------------------------------------------------------------------------------------------ */
 
 static void sample_row(void *data, long n, int worker)
@@ -208,8 +241,10 @@ static uint64_t whole_steps(const struct pt_render *r, uint64_t spp)
 /* Samples up to which a block goes now. */
 static uint64_t goal(const struct pt_render *r, const struct lull_host_block *b)
 {
-    uint64_t most = whole_steps(r, r->config.pilot_spp);
-    return most > 0 && b->next_spp > most ? most : b->next_spp;
+    uint64_t most = whole_steps(r, r->config.pilot_spp), end = b->next_spp;
+    if (end > r->blocks->spp_max)
+        end = r->blocks->spp_max;
+    return most > 0 && end > most ? most : end;
 }
 
 static int octave_of(uint64_t spp)
@@ -456,9 +491,44 @@ static int lost(struct pt_render *r, const struct pt_render_hooks *hooks, const 
 static int pilot_is_over(const struct pt_render *r)
 {
     int held = 0;
-    for (uint32_t i = 0; i < r->blocks->count; i++)
-        held |= r->blocks->list[i].reason == LULL_REASON_NONE && r->blocks->list[i].spp < r->blocks->list[i].next_spp;
+    for (uint32_t i = 0; i < r->blocks->count; i++) {
+        const struct lull_host_block *b = &r->blocks->list[i];
+        held |= b->reason == LULL_REASON_NONE && b->spp < b->next_spp && b->spp < r->blocks->spp_max;
+    }
     return held;
+}
+
+/* Every active block has all the samples that it may get. */
+static int is_whole(const struct pt_render *r)
+{
+    int whole = 1;
+    for (uint32_t i = 0; i < r->blocks->count; i++)
+        whole &= r->blocks->list[i].reason != LULL_REASON_NONE || r->blocks->list[i].spp >= r->blocks->spp_max;
+    return whole;
+}
+
+enum kept { NOT_KEPT, KEPT, NOT_TO_KEEP };
+
+/* A picture that is whole can be gone on with under other limits. */
+static void keep(struct pt_render *r, const struct pt_render_hooks *hooks, enum kept *kept, struct base_err *err)
+{
+    if (*kept == NOT_KEPT && hooks->suspend)
+        *kept = hooks->suspend(hooks->data, r, err) == 0 ? KEPT : NOT_TO_KEEP;
+}
+
+/* The wave is sampled: asks about its blocks. */
+static int end_wave(struct pt_render *r, const struct pt_render_hooks *hooks, enum kept *kept, struct base_err *why,
+                    struct base_err *err)
+{
+    if (is_whole(r))
+        keep(r, hooks, kept, err);
+    int rc = check(r, hooks, why);
+    if (!rc && r->config.max_seam >= 1.0)
+        lull_host_reopen(r->blocks, r->config.max_seam);
+    if (lull_host_active(r->blocks) > 0 && *kept == KEPT)
+        *kept = NOT_KEPT;
+    plan_cells(r);
+    return rc;
 }
 
 int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
@@ -466,6 +536,7 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
 {
     struct base_err why = {0};
     int rc = 0, more = 0;
+    enum kept kept = NOT_KEPT;
     *outcome = PT_RENDER_DONE;
     plan_cells(r);
     while (lull_host_active(r->blocks) > 0) {
@@ -475,10 +546,7 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
                 *outcome = PT_RENDER_PILOT;
                 break;
             }
-            given_up = check(r, hooks, &why);
-            if (!given_up && r->config.max_seam >= 1.0)
-                lull_host_reopen(r->blocks, r->config.max_seam);
-            plan_cells(r);
+            given_up = end_wave(r, hooks, &kept, &why, err);
             if (!given_up)
                 continue;
         }
@@ -504,7 +572,9 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
             break;
         }
     }
-    return rc;
+    if (!rc && *outcome == PT_RENDER_DONE)
+        keep(r, hooks, &kept, err);
+    return kept == NOT_TO_KEEP && !rc ? err->code : rc;
 }
 
 int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_hooks *hooks, int *stopped,

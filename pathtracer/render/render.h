@@ -73,8 +73,8 @@ struct pt_render_hooks {
     void (*judged)(void *data, struct pt_render *render, const uint32_t *due, uint32_t count);
     /* Not 0: end after this slice. May be NULL. */
     const volatile sig_atomic_t *interrupted;
-    /* Called once before the blocks still active are closed for time or interrupt, while everything is as a later run needs
-     * it to go on. May be NULL. */
+    /* Called before the blocks still active are closed for a limit or an interrupt, or when none is left, while everything
+     * is as a later run needs it to go on. May be NULL. */
     int (*suspend)(void *data, struct pt_render *render, struct base_err *err);
     struct base_log *log; /* may be NULL */
     void *data;
@@ -89,6 +89,13 @@ void pt_render_destroy(struct pt_render *render);
 
 /* Of a uniform render: block i gets spp[i] samples instead, 1 … spp_max. To be said again after a state was loaded. */
 void pt_render_plan(struct pt_render *render, const uint32_t *spp);
+
+/* What differs from the settings that a loaded state was made with. */
+#define PT_RENDER_OTHER_LIMITS 1 /* besides the most samples and the time */
+#define PT_RENDER_OTHER_RULE 2   /* parameters of the criterion */
+/* After a state was loaded, whose most samples may have been others: what these settings would not have stopped is active
+ * again. first_spp: where a fresh render of these settings has its first check. */
+void pt_render_go_on(struct pt_render *render, int others, uint64_t first_spp);
 
 /* Renders until all blocks are stopped, time is up, a pilot is over, or *interrupted is set. A pilot leaves the render
  * as it is between two slices: going on gives what it would have been without. */

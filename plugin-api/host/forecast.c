@@ -37,7 +37,7 @@ struct lull_host_stop_at lull_host_expect_block(const struct lull_host_blocks *b
         return (struct lull_host_stop_at){end, end, end, 1};
     }
     struct lull_host_stop_at stop = lull_host_expect(&said, b->spp, blocks->spp_max);
-    stop.spp = fmax(stop.spp, (double)b->next_spp); /* nobody asks before */
+    stop.spp = fmax(stop.spp, (double)lull_host_goal(blocks, b)); /* nobody asks before */
     return stop;
 }
 

@@ -11,11 +11,15 @@
 #include "picture/font.h"
 
 enum { LULL_HOST_STEPS = 8 }; /* of a mask */
+static const uint64_t LULL_HOST_MOST_SPP = INT32_MAX;
 
 /* Planes that the library makes where a criterion requires one of them. */
 #define LULL_HOST_COUNTS (LULL_PLANE_BIT(LULL_PLANE_SPP) | LULL_PLANE_BIT(LULL_PLANE_WEIGHT))
 
 struct lull_host_frame;
+
+/* Samples that an active block gets before it is asked about again. */
+uint64_t lull_host_goal(const struct lull_host_blocks *blocks, const struct lull_host_block *block);
 
 struct lull_host_criterion {
     const struct lull_criterion *table;

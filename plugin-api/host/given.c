@@ -5,7 +5,6 @@
 #include <stdarg.h>
 #include <stdlib.h>
 
-static const uint64_t MOST_SPP = INT32_MAX;
 /* More threads are a mistake; the operating system's own limit is lower. */
 enum { MOST_THREADS = 1 << 20 };
 
@@ -91,8 +90,8 @@ static int32_t check_colour(const struct lull_host_config *g, struct lull_error 
 
 static int32_t check_masks(const struct lull_host_config *g, struct lull_error *err)
 {
-    const uint32_t flags = LULL_HOST_UNIFORM | LULL_HOST_HALF_KNOWN | LULL_FRAME_DETERMINISTIC | LULL_FRAME_INDEPENDENT |
-                           LULL_FRAME_SHARED,
+    const uint32_t flags = LULL_HOST_UNIFORM | LULL_HOST_HALF_KNOWN | LULL_HOST_OPEN_ENDED | LULL_FRAME_DETERMINISTIC |
+                           LULL_FRAME_INDEPENDENT | LULL_FRAME_SHARED,
                    planes = LULL_PLANE_BIT(LULL_PLANE_COUNT) - 1;
     if (g->flags & ~flags)
         return lull_error_set(err, LULL_E_INVALID, "flags %#x: %#x is unknown", g->flags, g->flags & ~flags);
@@ -105,7 +104,7 @@ int32_t lull_host_check_config(const struct lull_host_config *g, const struct lu
 {
     if (g->struct_size < sizeof *g)
         return lull_error_set(err, LULL_E_VERSION, "the config is smaller than in version 1.0");
-    if (!(1 <= g->spp_min && g->spp_min <= g->spp_max && g->spp_max <= MOST_SPP))
+    if (!(1 <= g->spp_min && g->spp_min <= g->spp_max && g->spp_max <= LULL_HOST_MOST_SPP))
         return lull_error_set(err, LULL_E_INVALID, "spp_min %llu, spp_max %llu: expected 1 <= spp_min <= spp_max < 2^31",
                               (unsigned long long)g->spp_min, (unsigned long long)g->spp_max);
     int32_t code = check_numbers(g, err);
@@ -274,7 +273,7 @@ static int32_t check_block(const struct lull_host_block *b, uint32_t index, stru
 {
     const uint64_t pixels = (uint64_t)(b->x1 - b->x0) * (uint64_t)(b->y1 - b->y0);
     const unsigned long long spp = b->spp, half_spp = b->half_spp, asked_spp = b->asked_spp, dropped = b->dropped;
-    if (b->spp > MOST_SPP)
+    if (b->spp > LULL_HOST_MOST_SPP)
         return lull_error_set(err, LULL_E_INVALID, "block %u: spp %llu: expected less than 2^31", index, spp);
     if (b->half_spp > b->spp)
         return lull_error_set(err, LULL_E_INVALID, "block %u: half_spp %llu, but spp is %llu", index, half_spp, spp);

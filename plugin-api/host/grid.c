@@ -144,7 +144,7 @@ int32_t lull_host_lay_out(const struct lull_host_config *g, const struct lull_re
                           struct lull_host_blocks *out, struct lull_error *err)
 {
     struct lull_host_blocks b = {.struct_size = sizeof b,
-                                 .flags = g->flags & LULL_HOST_UNIFORM,
+                                 .flags = g->flags & (LULL_HOST_UNIFORM | LULL_HOST_OPEN_ENDED),
                                  .spp_min = g->spp_min,
                                  .spp_max = g->spp_max,
                                  .check_step = g->check_step > 0 ? g->check_step : 1};

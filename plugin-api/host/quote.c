@@ -269,7 +269,7 @@ static struct lull_host_stop_at stop_of(const struct lull_host_blocks *blocks, c
         return lull_host_expect_block(blocks, b);
     if (said.stopped)
         said.predicted = (double)b->next_spp;
-    return lull_host_expect(&said, b->next_spp, blocks->spp_max);
+    return lull_host_expect(&said, lull_host_goal(blocks, b), blocks->spp_max);
 }
 
 static void add_up(const struct lull_host_quote *q, const struct lull_host_quote_asked *a, struct lull_host_quote_row *row,

@@ -35,11 +35,17 @@ uint64_t lull_host_next_check(const struct lull_host_blocks *b, uint64_t spp, ui
     uint64_t next = asked > spp ? asked : (uint64_t)ceil((double)spp * CHECK_RATIO);
     if (next <= spp)
         next = spp + 1;
-    if (next > b->spp_max)
-        return b->spp_max;
+    uint64_t most = b->flags & LULL_HOST_OPEN_ENDED ? LULL_HOST_MOST_SPP : b->spp_max;
+    if (next > most)
+        return most;
     uint64_t step = b->check_step > 0 ? b->check_step : 1, beyond = next % step;
     next += beyond > 0 ? step - beyond : 0;
-    return next > b->spp_max ? b->spp_max : next;
+    return next > most ? most : next;
+}
+
+uint64_t lull_host_goal(const struct lull_host_blocks *b, const struct lull_host_block *block)
+{
+    return block->next_spp > b->spp_max ? b->spp_max : block->next_spp;
 }
 
 /* --- re-opening ----------------------------------------------------------------------------------------------------- */
@@ -95,6 +101,9 @@ uint32_t lull_host_extend(struct lull_host_blocks *b)
     uint32_t reopened = 0;
     for (uint32_t i = 0; i < b->count; i++) {
         struct lull_host_block *block = &b->list[i];
+        const uint64_t most = larger(block->spp, b->spp_max);
+        if (b->flags & LULL_HOST_UNIFORM || (block->next_spp > most && !(b->flags & LULL_HOST_OPEN_ENDED)))
+            block->next_spp = most;
         int limit = block->reason == LULL_REASON_SPP_MAX || block->reason == LULL_REASON_TIME ||
                     block->reason == LULL_REASON_INTERRUPT || block->reason == LULL_REASON_UNIFORM;
         if (!limit || block->spp >= b->spp_max)
@@ -137,6 +146,12 @@ void lull_host_note(struct lull_host_frame *f, const uint32_t *due, uint32_t cou
     }
 }
 
+/* Of a block that has all the samples that it may get. */
+static int32_t reason_at_most(const struct lull_host_blocks *blocks)
+{
+    return blocks->flags & LULL_HOST_UNIFORM ? LULL_REASON_UNIFORM : LULL_REASON_SPP_MAX;
+}
+
 /* A block that dropped samples stops at the second STOP in a row, and never counts as converged. */
 static void apply_one(const struct lull_host_blocks *blocks, struct lull_host_block *b, const struct lull_decision *d)
 {
@@ -149,7 +164,7 @@ static void apply_one(const struct lull_host_blocks *blocks, struct lull_host_bl
     else if (stop && b->stop_votes > 1)
         b->reason = LULL_REASON_DROPPED;
     else if (b->spp >= blocks->spp_max)
-        b->reason = LULL_REASON_SPP_MAX;
+        b->reason = reason_at_most(blocks);
     else {
         b->reason = LULL_REASON_NONE;
         b->next_spp = lull_host_next_check(blocks, b->spp, d->next_spp);
@@ -170,13 +185,22 @@ static int too_expensive(const struct lull_host_frame *f)
     return share > 0.0 && f->totals.criterion_s > share * lull_host_elapsed_s(f);
 }
 
+/* Blocks at spp_max are asked for the last time, and together: what was before can be gone on with. */
+static int waits(const struct lull_host_blocks *blocks)
+{
+    int waits = 0;
+    for (uint32_t i = 0; i < blocks->count && (blocks->flags & LULL_HOST_OPEN_ENDED); i++)
+        waits |= blocks->list[i].reason == LULL_REASON_NONE && blocks->list[i].spp < blocks->spp_max;
+    return waits;
+}
+
 uint32_t lull_host_due(struct lull_host_frame *f, uint32_t *due, uint8_t *final)
 {
     const struct lull_decision undecided = lull_host_undecided();
     struct lull_host_blocks *blocks = &f->blocks;
     int reopens =
         f->criterion && !(blocks->flags & LULL_HOST_UNIFORM) && (f->criterion->table->capabilities & LULL_CAP_REOPENS);
-    int skip = !f->criterion || too_expensive(f);
+    int skip = !f->criterion || too_expensive(f), wait = waits(blocks);
     uint32_t n = 0, active = 0;
     for (uint32_t i = 0; i < blocks->count; i++) {
         struct lull_host_block *b = &blocks->list[i];
@@ -185,6 +209,8 @@ uint32_t lull_host_due(struct lull_host_frame *f, uint32_t *due, uint8_t *final)
         if (!is_active && !again)
             continue;
         int last = is_active && b->spp >= blocks->spp_max;
+        if (last && wait)
+            continue;
         if (skip && !(last && f->criterion)) {
             if (is_active)
                 apply_one(blocks, b, &undecided);
@@ -244,8 +270,14 @@ int32_t lull_host_stop(struct lull_host_frame *f, int32_t reason, const struct l
         code = lull_host_ask(f, view, f->due, f->final, n, f->decisions, err);
         lull_host_note(f, f->due, n, f->decisions);
     }
-    for (uint32_t i = 0; i < f->blocks.count; i++)
-        if (f->blocks.list[i].reason == LULL_REASON_NONE)
-            f->blocks.list[i].reason = reason;
+    const int open_ended = (f->blocks.flags & LULL_HOST_OPEN_ENDED) != 0;
+    for (uint32_t k = 0; k < n && f->criterion && view && open_ended; k++)
+        if (f->blocks.list[f->due[k]].spp >= f->blocks.spp_max)
+            apply_one(&f->blocks, &f->blocks.list[f->due[k]], &f->decisions[k]);
+    for (uint32_t i = 0; i < f->blocks.count; i++) {
+        struct lull_host_block *b = &f->blocks.list[i];
+        if (b->reason == LULL_REASON_NONE)
+            b->reason = open_ended && b->spp >= f->blocks.spp_max ? reason_at_most(&f->blocks) : reason;
+    }
     return code;
 }

@@ -181,7 +181,7 @@ static int32_t take_blocks(struct source *s, const struct lull_host_blocks *bloc
         struct lull_host_block *b = &list[i];
         if ((code = take(s, &record, sizeof record)) != LULL_OK)
             break;
-        if (record.spp > blocks->spp_max || record.next_spp > blocks->spp_max || record.reason < 0 ||
+        if (record.spp > LULL_HOST_MOST_SPP || record.next_spp > LULL_HOST_MOST_SPP || record.reason < 0 ||
             record.reason >= LULL_REASON_COUNT)
             return lull_error_set(s->err, LULL_E_IO, "%s: block %u of the checkpoint makes no sense", s->name, b->id);
         b->spp = record.spp;
@@ -237,7 +237,8 @@ static int32_t take_parts(struct source *s, const struct lull_host_frame *f, str
     return code;
 }
 
-int32_t lull_host_load(struct lull_host_frame *f, const void *data, uint64_t size, const char *name, struct lull_error *err)
+static int32_t load(struct lull_host_frame *f, const void *data, uint64_t size, const char *name, int history,
+                    struct lull_error *err)
 {
     struct source s = {.name = name, .bytes = {.data = data, .size = (size_t)size}, .err = err};
     struct parts p = {0};
@@ -251,7 +252,7 @@ int32_t lull_host_load(struct lull_host_frame *f, const void *data, uint64_t siz
     code = take_blocks(&s, &f->blocks, list);
     if (code == LULL_OK)
         code = take_parts(&s, f, list, &p);
-    if (code == LULL_OK && f->criterion)
+    if (code == LULL_OK && f->criterion && history)
         code = lull_host_load_history(f->criterion, p.history, p.history_size, err);
     if (code == LULL_OK) {
         memcpy(f->blocks.list, list, f->blocks.count * sizeof *list);
@@ -261,4 +262,15 @@ int32_t lull_host_load(struct lull_host_frame *f, const void *data, uint64_t siz
     }
     free(list);
     return code;
+}
+
+int32_t lull_host_load(struct lull_host_frame *f, const void *data, uint64_t size, const char *name, struct lull_error *err)
+{
+    return load(f, data, size, name, 1, err);
+}
+
+int32_t lull_host_load_blocks(struct lull_host_frame *f, const void *data, uint64_t size, const char *name,
+                              struct lull_error *err)
+{
+    return load(f, data, size, name, 0, err);
 }

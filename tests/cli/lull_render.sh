@@ -206,9 +206,6 @@ cat >options <<'O'
 size=96x64, but this render has size=96x65|--size 96x65
 crop=0,0,96,64, but this render has crop=0,0,90,60|--crop 0,0,90,60
 block=32x32, but this render has block=16x16|--block 16
-spp-min=4, but this render has spp-min=5|--spp-min 5
-spp-max=300, but this render has spp-max=301|--spp-max 301
-max-seam=0, but this render has max-seam=2|--max-seam 2
 aov=0, but this render has aov=|--aov depth
 seed=0, but this render has seed=9|--seed 9
 sampler=0, but this render has sampler=1|--sampler sobol
@@ -223,9 +220,25 @@ O
 while IFS='|' read -r words option; do # every option that makes another image is refused by its name
     eval "refused \"made with \$words\" $long --checkpoint c.ckp --resume -o part2.exr $option"
 done <options
-"$P" $scene -q --spp-min 4 --spp-max 8 --checkpoint dial.ckp --checkpoint-every 0 -o part2.exr
-refused "dial.ckp: made without param, but this render has param=visible=0.5" "$scene" -q --spp-min 4 --spp-max 8 --checkpoint dial.ckp --resume --visible 0.5
 rm -f part2.exr
+# A finished render goes on, to the bytes of one that was asked for more at once.
+more="$scene -q --size 64x48 --block 16 --reproducible --spp-min 4"
+for criterion in observer halfbuf; do
+    "$P" $more -c $criterion --spp-max 150 -o at_once.exr
+    t "$criterion: a finished render leaves its checkpoint" sh -c "rm -f e.ckp; '$P' $more -c $criterion --spp-max 21 --checkpoint e.ckp -o first.exr && test -s e.ckp"
+    t "  …and goes on as if asked for more at once" sh -c "'$P' $more -c $criterion --spp-max 150 --checkpoint e.ckp --resume -t 1 -o more.exr --report more.json && cmp at_once.exr more.exr"
+    t "  …at its end nothing is rendered" sh -c "'$P' $more -c $criterion --spp-max 150 --checkpoint e.ckp --resume -o again.exr && cmp more.exr again.exr"
+    t "  …nor with a lower end" "$P" $more -c $criterion --spp-max 30 --checkpoint e.ckp --resume -o less.exr --report less.json
+    t "  …what is there stays" holds "$(total less.json spp) == $(total more.json spp)"
+done
+same="$scene -q --size 64x48 --block 16 --reproducible --spp"
+"$P" $same 40 -o at_once.exr
+t "--spp goes on, too" sh -c "'$P' $same 7 --checkpoint u.ckp -o first.exr && '$P' $same 40 --checkpoint u.ckp --resume -o more.exr && cmp at_once.exr more.exr"
+"$P" $more --spp-max 150 --visible 0.5 --checkpoint v.ckp -o first.exr --report coarse.json
+t "another --visible goes on" "$P" $more --spp-max 150 --visible 0.05 --checkpoint v.ckp --resume -o more.exr --report fine.json
+t "  …to more samples" holds "$(total fine.json spp) > $(total coarse.json spp)"
+t "  …and so does a coarser one, without one more" "$P" $more --spp-max 150 --visible 0.9 --checkpoint v.ckp --resume -o more.exr --report after.json
+t "  …since it sees nothing any more" holds "$(total fine.json spp) == $(total after.json spp)"
 head -c 5000 c.ckp >short.ckp
 refused "damaged or cut off" $long --checkpoint short.ckp --resume
 cp c.ckp flip.ckp && printf 'X' | dd of=flip.ckp bs=1 seek=3000 conv=notrunc 2>/dev/null

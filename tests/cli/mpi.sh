@@ -105,6 +105,9 @@ t "  …to the same image" same long.exr part.exr
 "$P" $long --time-budget 0.3 --checkpoint c.ckp -o part.exr
 t "a checkpoint of one process goes on with three" mpi 3 "$P" $long --checkpoint c.ckp --resume -o part.exr
 t "  …to the same image" same long.exr part.exr
+"$P" $long --spp-max 70 --checkpoint c.ckp -o part.exr
+t "a finished render goes on with three to more samples" mpi 3 "$P" $long --checkpoint c.ckp --resume -o part.exr
+t "  …to the same image" same long.exr part.exr
 t "a time budget ends all of them" mpi 3 "$P" $long --time-budget 0.2 -o part.exr --report part.json
 t "  …and the report says so" grep -q '"reason":[[:space:]]*"time"' part.json
 

@@ -172,6 +172,18 @@ static void closed_blocks_are_extended(void **state)
         int open = i == LULL_REASON_NONE || i == LULL_REASON_SPP_MAX || i == LULL_REASON_UNIFORM || i == LULL_REASON_TIME;
         assert_true((list[i].reason == LULL_REASON_NONE) == open && list[i].next_spp == next[i]);
     }
+    /* A uniform frame has one check; one with a lower limit gets no more samples. */
+    static const uint64_t limits[3] = {10, 20, 90};
+    for (int k = 0; k < 6; k++) {
+        struct lull_host_block one = {.reason = k % 2 ? LULL_REASON_UNIFORM : LULL_REASON_NONE, .spp = 20, .next_spp = 50};
+        b = (struct lull_host_blocks){.list = &one, .count = 1, .spp_max = limits[k / 2], .flags = LULL_HOST_UNIFORM};
+        assert_int_equal(lull_host_extend(&b), k == 5);
+        assert_int_equal(one.next_spp, k / 2 == 2 ? 90 : 20);
+        one = (struct lull_host_block){.spp = 20, .next_spp = 50};
+        b.flags = 0;
+        assert_int_equal(lull_host_extend(&b), 0);
+        assert_int_equal(one.next_spp, k / 2 == 2 ? 50 : 20);
+    }
 }
 
 static void configs_that_make_no_sense(void **state)

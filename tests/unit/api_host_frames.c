@@ -193,6 +193,55 @@ static void blocks_stop_one_by_one(void **state)
     end();
 }
 
+/* Open-ended: the checks are those of a frame without a limit, and who is at the limit is asked with all others that are. */
+static void open_ended_frames_ask_last_together(void **state)
+{
+    (void)state;
+    begin(0, LULL_HOST_OPEN_ENDED);
+    answer[0].next_spp = 1000;
+    answer[1].next_spp = 101;
+    answer[2].next_spp = 100;
+    check(15, 0);
+    expect(0, LULL_REASON_NONE, 1000);
+    expect(1, LULL_REASON_NONE, 101);
+    expect(2, LULL_REASON_NONE, 100);
+    for (int i = 0; i < 3; i++)
+        list[i].spp = 100;
+    list[3].spp = list[3].next_spp;
+    answer[3].action = LULL_STOP;
+    was_due = was_final = 0;
+    assert_int_equal(lull_host_check(frame, &view, &fault), LULL_OK);
+    assert_true(was_due == 8 && was_final == 0);
+    answer[1].action = LULL_STOP;
+    was_due = was_final = 0;
+    assert_int_equal(lull_host_check(frame, &view, &fault), LULL_OK);
+    assert_true(was_due == 7 && was_final == 7);
+    expect(0, LULL_REASON_SPP_MAX, 1000);
+    expect(1, LULL_REASON_CRITERION, 101);
+    expect(2, LULL_REASON_SPP_MAX, 100);
+    end();
+}
+
+/* Who is at the limit when time is up is there for the limit. */
+static void open_ended_frames_are_stopped(void **state)
+{
+    (void)state;
+    begin(0, LULL_HOST_OPEN_ENDED);
+    for (int i = 0; i < BLOCKS; i++) {
+        list[i].spp = i < 3 ? 100 : 50;
+        list[i].next_spp = 120;
+    }
+    list[2].asked = 1;
+    list[2].asked_spp = 100;
+    answer[0].action = LULL_STOP;
+    assert_int_equal(lull_host_stop(frame, LULL_REASON_TIME, &view, &fault), LULL_OK);
+    expect(0, LULL_REASON_CRITERION, 120);
+    expect(1, LULL_REASON_SPP_MAX, 120);
+    expect(2, LULL_REASON_SPP_MAX, 120);
+    expect(3, LULL_REASON_TIME, 120);
+    end();
+}
+
 static void nobody_stops_before_the_least(void **state)
 {
     (void)state;
@@ -444,8 +493,8 @@ static void bad_states_are_refused(void **state)
         const char *words;
     } faults[] = {
         {0, BLOCKS + 1, "x.ckp: the checkpoint has another number of blocks"},
-        {8 + 88 * 3, 101, "x.ckp: block 3 of the checkpoint makes no sense"},
-        {8 + 88 * 2 + 8, 101, "x.ckp: block 2 of the checkpoint makes no sense"},
+        {8 + 88 * 3, UINT64_C(1) << 31, "x.ckp: block 3 of the checkpoint makes no sense"},
+        {8 + 88 * 2 + 8, UINT64_C(1) << 31, "x.ckp: block 2 of the checkpoint makes no sense"},
         {8 + 72, 7, "x.ckp: block 0 of the checkpoint makes no sense"},
         {8 + BLOCKS * 88 + 72, 17, "x.ckp: the checkpoint makes no sense"},
         {history, sizeof(struct lull_instance) - 1, "x.ckp: the checkpoint has a wrong length"},
@@ -547,12 +596,20 @@ static void reports_as_text(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(blocks_stop_one_by_one), cmocka_unit_test(nobody_stops_before_the_least),
-        cmocka_unit_test(a_criterion_may_reopen), cmocka_unit_test(seams_are_mended_at_a_check),
-        cmocka_unit_test(checks_may_be_too_dear), cmocka_unit_test(uniform_frames_are_asked_once),
-        cmocka_unit_test(the_first_limit_wins),   cmocka_unit_test(one_frame_at_a_time),
-        cmocka_unit_test(a_frame_is_forecast),    cmocka_unit_test(states_go_on),
-        cmocka_unit_test(bad_states_are_refused), cmocka_unit_test(identities_by_name),
+        cmocka_unit_test(blocks_stop_one_by_one),
+        cmocka_unit_test(open_ended_frames_ask_last_together),
+        cmocka_unit_test(open_ended_frames_are_stopped),
+        cmocka_unit_test(nobody_stops_before_the_least),
+        cmocka_unit_test(a_criterion_may_reopen),
+        cmocka_unit_test(seams_are_mended_at_a_check),
+        cmocka_unit_test(checks_may_be_too_dear),
+        cmocka_unit_test(uniform_frames_are_asked_once),
+        cmocka_unit_test(the_first_limit_wins),
+        cmocka_unit_test(one_frame_at_a_time),
+        cmocka_unit_test(a_frame_is_forecast),
+        cmocka_unit_test(states_go_on),
+        cmocka_unit_test(bad_states_are_refused),
+        cmocka_unit_test(identities_by_name),
         cmocka_unit_test(reports_as_text),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

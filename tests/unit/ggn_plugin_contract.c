@@ -210,7 +210,7 @@ static void follow(const struct lull_criterion *c, const char *path, int is_netw
         assert_int_equal(c->begin_frame(other, &frame, NULL), LULL_OK);
         frame.flags = LULL_FRAME_RESTART;
         for (int id = 0; id < GP_HOST_BLOCKS; id++)
-            others[id] = (struct other){.rule = {.policy = *p, .window = is_network ? WINDOW : 1, .spp_max = spp_max},
+            others[id] = (struct other){.rule = {.policy = *p, .window = is_network ? WINDOW : 1},
                                         .display = *display,
                                         .r = &gp_host_rects[id],
                                         .is_network = is_network};

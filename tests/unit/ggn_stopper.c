@@ -151,19 +151,6 @@ static void noise_between_two_passes_begins_anew(void **state)
     assert_true(s.verdict.stop);
 }
 
-static void nobody_is_sent_beyond_the_limit(void **state)
-{
-    struct ggn_stop_rule rule = make_rule();
-    struct ggn_stopper s = {0};
-    struct show show = {.noise = 0.01, .logit = 5};
-    (void)state;
-    rule.spp_max = 30;
-    fill(&rule, &s, &show);
-    assert_int_equal(s.verdict.next_spp, 30);
-    ask(&rule, &s, 30, &show);
-    assert_true(!s.verdict.stop && s.verdict.next_spp == 45); /* the host ends it */
-}
-
 /* 2^63 samples and more fit a uint64_t, but no double and no schedule: what it says is never in the past. */
 static void it_asks_again_later_however_many_samples_there_are(void **state)
 {
@@ -243,8 +230,6 @@ static void oracle_schedule(const struct ggn_stop_rule *rule, struct oracle *o, 
     }
     next = next > rule->policy.first_spp ? next : rule->policy.first_spp;
     o->next = next >= 1e18 ? UINT64_C(1000000000000000000) : (uint64_t)ceil(next);
-    if (rule->spp_max > o->asked && o->next > rule->spp_max)
-        o->next = rule->spp_max;
 }
 
 /* One question; whether the image was looked at. */
@@ -341,7 +326,6 @@ static void any_history_is_that_of_the_words(void **state)
         p->slope = draw() < 0.3 ? 0 : 1 + draw();
         p->tail999 = draw() < 0.5 ? 0 : 1;
         p->gini = draw() < 0.5 ? 0 : 0.5;
-        rule.spp_max = draw() < 0.5 ? 0 : 100;
         struct ggn_stopper s = {0};
         struct oracle o = {.next = (uint64_t)p->first_spp};
         for (int k = 0; k < 25 && !s.verdict.stop; k++) {
@@ -412,7 +396,6 @@ int main(void)
         cmocka_unit_test(a_guard_holds_and_leaves_the_passes),
         cmocka_unit_test(a_gate_spares_the_network_forgets_passes_and_leaps),
         cmocka_unit_test(noise_between_two_passes_begins_anew),
-        cmocka_unit_test(nobody_is_sent_beyond_the_limit),
         cmocka_unit_test(a_damaged_stopper_is_told),
         cmocka_unit_test(any_history_is_that_of_the_words),
         cmocka_unit_test(far_and_damaged),

@@ -72,6 +72,150 @@ static void resumed_render_is_identical(void **state)
     unlink(path);
 }
 
+/* --- other limits, another rule ------------------------------------------------------------------------------------- */
+
+struct settings {
+    uint64_t spp_min, spp_max;
+    const char *at; /* of the fake criterion; NULL: uniform */
+    double max_seam;
+};
+
+struct keeper {
+    const char *path, *text;
+    int saved;
+};
+
+static int keep(void *data, struct pt_render *r, struct base_err *err)
+{
+    struct keeper *k = data;
+    k->saved++;
+    return pt_checkpoint_save(k->path, r, k->text, err);
+}
+
+/* To its end by these settings, from path if `resume`, kept there; pilot_spp ends it before, 0: does not. */
+static struct pt_fake_run go_on(const struct settings *s, const char *path, int resume, uint64_t pilot_spp)
+{
+    struct pt_render_config config = pt_fake_config();
+    struct base_err err = {0};
+    struct lull_pair pair = {"at", s->at};
+    enum pt_render_outcome outcome;
+    char text[100];
+    struct pt_fake_run r = {.pool = base_threads_create(2, &err)};
+    snprintf(text, sizeof text, "a=1\nspp-min=%d\nspp-max=%d\nmax-seam=%g\n%s%s\n", (int)s->spp_min, (int)s->spp_max,
+             s->max_seam, s->at ? "param=at=" : "", s->at ? s->at : "b=2");
+    struct keeper keeper = {path, text, 0};
+    const struct pt_render_hooks hooks = {.suspend = keep, .data = &keeper};
+    config.spp_min = s->spp_min;
+    config.spp_max = s->spp_max;
+    config.uniform = !s->at;
+    config.max_seam = s->max_seam;
+    config.planes = PT_FILM_ALL;
+    config.pilot_spp = pilot_spp;
+    config.pilot_s = 1e9;
+    if (s->at)
+        assert_int_equal(pt_criterion_create(pt_fake_criterion(), &pair, 1, r.pool, NULL, &r.criterion, &err), 0);
+    assert_int_equal(pt_render_create(&config, NULL, pt_fake_nan, r.pool, r.criterion, &r.render, &err), 0);
+    if (resume && pt_checkpoint_load(path, r.render, text, &err) != 0)
+        fail_msg("%s", err.text);
+    assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), 0);
+    if (outcome == PT_RENDER_PILOT)
+        assert_int_equal(pt_checkpoint_save(path, r.render, text, &err), 0);
+    else
+        assert_true(keeper.saved == 1 || (s->max_seam > 0 && keeper.saved > 0));
+    return r;
+}
+
+static void run_and_forget(const struct settings *s, const char *path, uint64_t pilot_spp)
+{
+    struct pt_fake_run r = go_on(s, path, 0, pilot_spp);
+    pt_fake_release(&r);
+}
+
+/* A finished render of at most `first` samples goes on to `then`, or there, as if it had been asked for that at once. */
+static void check_limits(const char *path, const char *at, uint64_t first, uint64_t then)
+{
+    const struct settings low = {at ? 8 : first, first, at, 0}, high = {at ? 8 : then, then, at, 0};
+    struct pt_fake_run whole = go_on(&high, path, 0, 0), part = go_on(&low, path, 0, 0), r = go_on(&high, path, 1, 0);
+    for (uint32_t i = 0; i < part.render->blocks->count; i++)
+        assert_true(part.render->blocks->list[i].spp <= first && part.render->blocks->list[i].reason != LULL_REASON_NONE);
+    pt_fake_assert_same(whole.render, r.render);
+    assert_true(whole.render->totals->samples == r.render->totals->samples);
+    pt_fake_release(&r);
+    r = go_on(&low, path, 1, 0); /* back: it has more, and keeps it */
+    assert_true(whole.render->totals->samples == r.render->totals->samples);
+    pt_fake_release(&r);
+    pt_fake_release(&part);
+    pt_fake_release(&whole);
+}
+
+static void finished_renders_go_on(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/pt_render_test_XXXXXX";
+    close(mkstemp(path));
+    static const uint64_t limits[] = {8, 9, 10, 30, 37, 64, 100, 255, 256}; /* checks are at 8, 10, 12, 14, 17, 20 … */
+    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++)
+        for (size_t k = i; k < sizeof limits / sizeof limits[0]; k += 1 + i % 2) {
+            check_limits(path, "32", limits[i], limits[k]);
+            check_limits(path, NULL, limits[i], limits[k]);
+        }
+    unlink(path);
+}
+
+static void assert_same_picture(const struct pt_render *a, const struct pt_render *b)
+{
+    assert_memory_equal(a->film.color, b->film.color, a->film.pixels * 3 * sizeof(double));
+    for (uint32_t i = 0; i < a->blocks->count; i++)
+        assert_true(a->blocks->list[i].spp == b->blocks->list[i].spp &&
+                    a->blocks->list[i].reason == b->blocks->list[i].reason &&
+                    a->blocks->list[i].checks == b->blocks->list[i].checks);
+}
+
+/* Where the rule only says when to stop, another one goes on to the picture that it would have made at once. */
+static void another_rule_goes_on(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/pt_render_test_XXXXXX";
+    close(mkstemp(path));
+    static const char *const at[] = {"16", "17", "40", "63"};
+    for (int i = 0; i < 4; i++)
+        for (int k = i; k < 4; k++) {
+            const struct settings first = {8, 256, at[i], 0}, then = {8, 256, at[k], 0};
+            struct pt_fake_run whole = go_on(&then, path, 0, 0), part = go_on(&first, path, 0, 0);
+            struct pt_fake_run r = go_on(&then, path, 1, 0), back = go_on(&first, path, 1, 0);
+            assert_same_picture(whole.render, r.render);
+            assert_true(back.render->totals->samples == r.render->totals->samples);
+            pt_fake_release(&back);
+            pt_fake_release(&r);
+            pt_fake_release(&part);
+            pt_fake_release(&whole);
+        }
+    unlink(path);
+}
+
+/* More samples at least, and smaller steps between neighbours, for blocks that were stopped and for those under way. */
+static void other_limits_go_on(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/pt_render_test_XXXXXX";
+    close(mkstemp(path));
+    const struct settings usual = {8, 256, "16", 0}, least = {50, 256, "16", 0}, even = {8, 256, "16", 1.25};
+    for (uint64_t pilot_spp = 0; pilot_spp < 40; pilot_spp += 13) {
+        run_and_forget(&usual, path, pilot_spp);
+        struct pt_fake_run r = go_on(&least, path, 1, 0);
+        for (uint32_t i = 0; i < r.render->blocks->count; i++)
+            assert_true(r.render->blocks->list[i].spp >= 50);
+        pt_fake_release(&r);
+        run_and_forget(&usual, path, pilot_spp);
+        r = go_on(&even, path, 1, 0);
+        const struct lull_host_block *b = r.render->blocks->list;
+        for (uint32_t i = 0; i + 1 < r.render->blocks->count; i++) /* rows of four */
+            assert_true(i % 4 == 3 || (double)b[i + 1].spp <= 1.25 * (double)b[i].spp);
+        pt_fake_release(&r);
+    }
+    unlink(path);
+}
+
 static void bad_checkpoints_are_refused(void **state)
 {
     (void)state;
@@ -183,8 +327,8 @@ static void checkpoints_have_a_layout(void **state)
     } const faults[] = {
         {(size_t)(film - data), f->bytes, f->bytes + 1, "the checkpoint has another number of bytes of pixels"},
         {(size_t)(list - data), 12, 11, "the checkpoint has another number of blocks"},
-        {(size_t)(list - data) + 8 + 88 * 5, 256, 257, "block 5 of the checkpoint makes no sense"},
-        {(size_t)(list - data) + 16 + 88 * 11, 256, 257, "block 11 of the checkpoint makes no sense"},
+        {(size_t)(list - data) + 8 + 88 * 5, 256, UINT64_C(1) << 31, "block 5 of the checkpoint makes no sense"},
+        {(size_t)(list - data) + 16 + 88 * 11, 256, UINT64_C(1) << 31, "block 11 of the checkpoint makes no sense"},
         {(size_t)(drops - data), 16, 17, "the checkpoint makes no sense"},
         {(size_t)(history - data), 256, 255, "the checkpoint has a wrong length"},
         {8, 8, 9, "made with other settings"},
@@ -228,9 +372,9 @@ static void checkpoints_have_a_layout(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(resumed_render_is_identical),
-        cmocka_unit_test(bad_checkpoints_are_refused),
-        cmocka_unit_test(checkpoints_have_a_layout),
+        cmocka_unit_test(resumed_render_is_identical), cmocka_unit_test(finished_renders_go_on),
+        cmocka_unit_test(another_rule_goes_on),        cmocka_unit_test(other_limits_go_on),
+        cmocka_unit_test(bad_checkpoints_are_refused), cmocka_unit_test(checkpoints_have_a_layout),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -581,7 +581,7 @@ static inline int32_t lull_kit_evaluate(struct lull_instance *in, const struct l
 
 static inline uint64_t lull_kit_spp(double spp) { return spp >= 1e18 ? UINT64_C(1000000000000000000) : (uint64_t)spp; }
 
-/* CONTINUE, next check at `next` samples: rounded up, later than now, within the host's limit. More samples than a double
+/* CONTINUE, next check at `next` samples: rounded up, later than now; the host minds its limit. More samples than a double
  * or lull_kit_spp can count: when the host likes. */
 static inline void lull_kit_continue(const struct lull_kit *kit, const struct lull_block *block, double next,
                                      struct lull_decision *decision)
@@ -589,8 +589,6 @@ static inline void lull_kit_continue(const struct lull_kit *kit, const struct lu
     double first = fmax((double)block->spp + 1, (double)kit->need.first_spp);
     decision->action = LULL_CONTINUE;
     decision->next_spp = lull_kit_spp(ceil(fmax(next, first)));
-    if (kit->spp_max > block->spp && decision->next_spp > kit->spp_max)
-        decision->next_spp = kit->spp_max;
     if (decision->next_spp <= block->spp)
         decision->next_spp = 0;
 }

@@ -90,6 +90,10 @@ LULL_EXPORT const char *lull_host_parameter(const struct lull_criterion *table, 
 
 #define LULL_HOST_UNIFORM UINT32_C(0x100)    /* every block gets spp_max samples, and is asked about once at the end */
 #define LULL_HOST_HALF_KNOWN UINT32_C(0x200) /* half_spp follows from spp: the renderer sets it, and no state holds it */
+/* Checks are where they would be without spp_max: next_spp may lie beyond it. The renderer stops a block at spp_max all the
+ * same, and saves the state when every active block is there, before it asks about them for the last time: a frame with
+ * another spp_max goes on from that state as if it had begun with it. */
+#define LULL_HOST_OPEN_ENDED UINT32_C(0x400)
 
 /* Copied by lull_host_begin. Everything that may be 0 is so in a zeroed struct. */
 struct lull_host_config {
@@ -164,7 +168,7 @@ struct lull_host_blocks {
     struct lull_host_block *list; /* owned by the frame; the index is the block's id for the criterion */
     uint32_t columns, rows;       /* of the whole picture's grid; 0: a layout of one's own */
     uint32_t list_columns;        /* of the part that is in the list, which is a rectangle of blocks */
-    uint32_t flags;               /* LULL_HOST_UNIFORM */
+    uint32_t flags;               /* LULL_HOST_UNIFORM, LULL_HOST_OPEN_ENDED */
     int32_t block_width, block_height;
     int32_t x0, y0, x1, y1; /* the smallest rectangle that holds them */
     uint64_t spp_min, spp_max, check_step;
@@ -229,8 +233,9 @@ struct lull_host_view {
     const struct lull_plane *dropped_half;
 };
 
-/* To be called when every active block is at its next_spp. Asks about them, stops or schedules each, and re-opens blocks if
- * the config says so. When the criterion fails its error is returned, and all blocks go on. */
+/* To be called when every active block is at its next_spp (open-ended: or at spp_max). Asks about them, stops or
+ * schedules each, and re-opens blocks if the config says so. When the criterion fails its error is returned, and all
+ * blocks go on. */
 LULL_EXPORT int32_t lull_host_check(struct lull_host_frame *frame, const struct lull_host_view *view,
                                     struct lull_error *err);
 
@@ -544,10 +549,13 @@ LULL_EXPORT int32_t lull_host_write_png(const char *path, uint32_t width, uint32
  * Byte order and number formats are those of the machine. */
 LULL_EXPORT int32_t lull_host_save(const struct lull_host_frame *frame, const struct lull_writer *writer,
                                    struct lull_error *err);
-/* Into a frame that was begun like the saved one, the limits spp_max and time aside. Nothing is believed of the bytes; a
+/* Into a frame that was begun like the saved one, the limits aside. Nothing is believed of the bytes; a
  * refused state (LULL_E_IO) changes nothing in the frame. name: of the file, for messages. */
 LULL_EXPORT int32_t lull_host_load(struct lull_host_frame *frame, const void *data, uint64_t size, const char *name,
                                    struct lull_error *err);
+/* The same without the criterion's history, which it may not understand when its parameters are others. */
+LULL_EXPORT int32_t lull_host_load_blocks(struct lull_host_frame *frame, const void *data, uint64_t size, const char *name,
+                                          struct lull_error *err);
 /* Only the criterion's history. */
 LULL_EXPORT int32_t lull_host_save_history(const struct lull_host_criterion *criterion, const struct lull_writer *writer,
                                            struct lull_error *err);
