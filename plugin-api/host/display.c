@@ -23,9 +23,10 @@ static const char PORT[] = "14158";
 
 /* Between two copies there is so much time, and more where a copy would take more than that share of it. */
 static const double EVERY_S = 0.25, COPY_SHARE = 0.02;
-/* Who does not answer is asked again after RETRY_S. Who takes no byte for PATIENCE_S is left, at the end sooner, and
+/* Who does not answer is asked again after RETRY_S. Who takes no byte for so long is left, at the end sooner, and
  * FAREWELL_S after the end in any case. */
-static const double CONNECT_S = 0.5, RETRY_S = 1.0, PATIENCE_S = 5.0, LAST_PATIENCE_S = 1.0, FAREWELL_S = 2.0, STEP_S = 0.05;
+static const double CONNECT_S = 0.5, RETRY_S = 1.0, LAST_PATIENCE_S = 1.0, FAREWELL_S = 2.0, STEP_S = 0.05;
+double viewer_patience_s = 5.0;
 
 enum { TILE_PIXELS = 1 << 15 };
 
@@ -137,7 +138,7 @@ static int is_patient(struct lull_host_display *d, double idle_s)
     const int over = d->over;
     const double past_s = base_clock_wall_s() - d->over_s;
     pthread_mutex_unlock(&d->lock);
-    return over ? fmin(idle_s, past_s) < LAST_PATIENCE_S && past_s < FAREWELL_S : idle_s < PATIENCE_S;
+    return over ? fmin(idle_s, past_s) < LAST_PATIENCE_S && past_s < FAREWELL_S : idle_s < viewer_patience_s;
 }
 
 /* Without the lock, which is free meanwhile. */

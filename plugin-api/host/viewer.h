@@ -14,6 +14,9 @@ enum { VIEWER_CHANNELS = 6 };
 /* Blocks beyond so many are not drawn: they would be smaller than their lines. */
 enum { VIEWER_MARKED_BLOCKS = 4096 };
 
+/* How long one who takes nothing is waited for; a test waits for ever, to see that the renderer does not. */
+extern double viewer_patience_s;
+
 struct viewer_packet {
     char *name;  /* owns; of the image */
     uint8_t *at; /* owns */

@@ -8,10 +8,10 @@ shown() { # shown MODE OUT ARGUMENTS...: renders for the viewer of viewer.py
     mode=$1 out=$2
     shift 2
     rm -f port
-    timeout 60 python3 "$here/viewer.py" port "$out" $mode &
+    python3 "$here/viewer.py" port "$out" $mode &
     viewer=$!
-    while [ ! -e port ]; do sleep 0.05; done
-    timeout 60 "$@" --display-server "127.0.0.1:$(cat port)"
+    while [ ! -e port ] && kill -0 $viewer; do sleep 0.05; done
+    "$@" --display-server "127.0.0.1:$(cat port)"
     status=$?
     [ "$mode" = silent ] && kill $viewer
     wait $viewer 2>/dev/null

@@ -197,9 +197,12 @@ t "resumed, stopped again" "$P" $long --time-budget 0.2 --checkpoint c.ckp --res
 t "resumed and finished" "$P" $long --checkpoint c.ckp --resume -o part.exr
 t "the resumed image is the uninterrupted one, byte for byte" same full.exr part.exr
 endless="$long --spp-max 100000 --checkpoint endless.ckp -o endless.exr"
-"$P" $endless --time-budget 0.5 --report before.json
+"$P" $endless --checkpoint-every 0 --report before.json & pid=$!
+until [ -s endless.ckp ] || ! kill -0 $pid; do sleep 0.1; done
+kill -INT $pid
+wait $pid
 t "resumed and stopped at once" "$P" $endless --time-budget 0.0001 --resume --report after.json
-t "  …where it was, and not at the beginning" holds "$(total before.json spp) > 6 * 4 && $(total after.json spp) >= $(total before.json spp)"
+t "  …where it was, and not at the beginning" holds "$(total before.json spp) > 0 && $(total after.json spp) >= $(total before.json spp)"
 t "--checkpoint-every" "$P" $long --checkpoint d.ckp --checkpoint-every 0.1 -o part.exr
 t "  …wrote one" test -s d.ckp
 cat >options <<'O'

@@ -5,11 +5,11 @@ import json
 import os
 import pty
 import re
+import select
 import signal
 import struct
 import sys
 import termios
-import time
 
 split = sys.argv.index("--")
 columns, lines = int(sys.argv[1]), int(sys.argv[2])
@@ -53,13 +53,23 @@ def resize(fd, columns):
     fcntl.ioctl(fd, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
 
 
+def unread(fd):
+    """What has been written to the terminal by a child that is stopped."""
+    text = b""
+    while select.select([fd], [], [], 0)[0]:
+        text += os.read(fd, 65536)
+    return text
+
+
+sized, has_size = os.pipe()
 child, fd = pty.fork()
 if child == 0:
-    time.sleep(0.2)  # until it has its size
+    os.read(sized, 1)  # until the terminal has its size
     os.execvp(command[0], command)
 resize(fd, columns)
+os.write(has_size, b".")
 before = termios.tcgetattr(fd)
-screen, fullest, rest, begin, widths = Screen(), [], b"", time.monotonic(), []
+screen, fullest, rest, widths = Screen(), [], b"", []
 while True:
     try:
         rest += os.read(fd, 65536)
@@ -74,8 +84,12 @@ while True:
     if sum(row.count("\u2580") for row in screen.rows) >= sum(row.count("\u2580") for row in fullest):
         fullest = list(screen.rows)
     if "narrow" in options and "\u2580" in "".join(screen.rows):
+        os.kill(child, signal.SIGSTOP)  # what was written for the old width is none of the new one
+        os.waitpid(child, os.WUNTRACED)
+        screen.write((rest + unread(fd)).decode())
         resize(fd, int(options.pop("narrow")))
-        widths, screen.widest = [screen.widest], 0
+        widths, screen.widest, rest = [screen.widest], 0, b""
+        os.kill(child, signal.SIGCONT)
     elif "interrupt" in options and "\u2580" in "".join(screen.rows):
         options.pop("interrupt")
         os.kill(child, signal.SIGINT)

@@ -5,7 +5,7 @@
 export LC_ALL=C.UTF-8 TERM=xterm-256color
 unset NO_COLOR
 R="$P $scene --size 96x64 --block 16 -c fixed -p spp=400 -t 2 -o a.exr"
-on() { timeout 100 python3 "$here/terminal.py" "$@" >said.json; }
+on() { python3 "$here/terminal.py" "$@" >said.json; }
 said() { python3 -c "
 import json
 s = json.load(open('said.json'))

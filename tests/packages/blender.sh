@@ -15,7 +15,7 @@ try() { # try NAME COMMAND...: in a home of its own
     home=$tmp/$(echo "$1" | tr -d ' .'); name=$1
     mkdir "$home"
     shift
-    start() { (cd / && env -i HOME="$home" PATH=/usr/bin:/bin timeout 200 "$@" >"$tmp/said" 2>&1); }
+    start() { (cd / && env -i HOME="$home" PATH=/usr/bin:/bin timeout 3600 "$@" >"$tmp/said" 2>&1); }
     start "$@" install "$zip" "$home"
     t "$name: it is installed" held installed
     start "$@" use "$home"

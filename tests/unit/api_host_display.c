@@ -5,7 +5,6 @@
 #include <stdint.h>
 
 #include <arpa/inet.h>
-#include <math.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <pthread.h>
@@ -18,7 +17,6 @@
 
 #include <cmocka.h>
 
-#include "base/clock.h"
 #include "base/files.h"
 #include "host/frame.h"
 #include "host/viewer.h"
@@ -217,11 +215,13 @@ static void a_viewer_gets_the_last_picture(void **state)
 }
 
 /* One that takes nothing, one that is not there, one that leaves. Each round of samples is new, so that far more must be sent
- * than any buffer holds. */
+ * than any buffer holds. Who takes nothing would be waited for without end: an update that waits never returns, and no clock
+ * is asked. */
 static void no_viewer_holds_the_renderer(void **state)
 {
-    const double most_s = 20.0; /* 10 are one wait of PATIENCE_S and a farewell, on a busy machine */
+    const double usual_s = viewer_patience_s;
     (void)state;
+    viewer_patience_s = 1e9;
     for (int kind = 0; kind < 3; kind++) {
         struct lull_host_display *display;
         int server = listen_somewhere(1 << 12), client = -1;
@@ -232,22 +232,18 @@ static void no_viewer_holds_the_renderer(void **state)
             client = accept(server, NULL, NULL);
         if (kind == 2)
             close(client);
-        double longest_s = 0.0, start_s = base_clock_wall_s();
         for (uint64_t n = 1; n <= 12; n++) {
             sample(n, 1.0f);
-            double before_s = base_clock_wall_s();
             assert_int_equal(lull_host_display_update(display, &view, &fault), LULL_OK);
-            longest_s = fmax(longest_s, base_clock_wall_s() - before_s);
             nanosleep(&moment, NULL);
         }
-        assert_true(longest_s < 2.0);
         assert_int_equal(lull_host_display_close(display, &view), 0);
-        assert_true(base_clock_wall_s() - start_s < most_s);
         if (kind == 0)
             close(client);
         if (kind != 1)
             close(server);
     }
+    viewer_patience_s = usual_s;
 }
 
 /* Who comes, leaves and comes again gets all, also what has not changed since. */
