@@ -313,6 +313,12 @@ PT_KERNEL_INLINE void pt_path_aux(pt_effects fx, const struct pt_path *path, con
         out->normal_world = v3_dot(frame->n, path->ray.direction) > 0.0f ? v3_neg(frame->n) : frame->n;
 }
 
+/* Whether the directions wo and wi, away from a surface, are on different sides of it. */
+PT_KERNEL_INLINE int pt_path_crosses(const struct pt_place *at, pt_vec3 wo, pt_vec3 wi)
+{
+    return v3_dot(wo, at->s.n_geometric) * v3_dot(wi, at->s.n_geometric) < 0.0f;
+}
+
 /* The next direction: its ray replaces the path's. 0: the path ends. */
 PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const struct pt_place *at,
                                      const struct pt_frame *frame, const struct pt_bsdf *bsdf, pt_vec3 wo,
@@ -327,9 +333,12 @@ PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const 
         return 0;
     int delta = (fx & PT_FX_BSDF) && (next.flags & PT_SCATTER_DELTA);
     path->pdf_prev = delta ? 0.0f : next.pdf_solid;
-    if (fx & PT_FX_TRANSMISSION)
-        path->eta_scale /= next.eta_scale;
     pt_vec3 wi = pt_frame_to_world(frame, next.wi);
+    if (fx & PT_FX_TRANSMISSION) {
+        float side = pt_bsdf_side_factor(fx, bsdf, wo, next.wi, pt_path_crosses(at, v3_neg(path->ray.direction), wi));
+        path->throughput = v3_scale(path->throughput, side);
+        path->eta_scale /= next.eta_scale * side;
+    }
     if (fx & PT_FX_MEDIA)
         path->medium = pt_medium_towards(at, wi, path->medium);
     path->ray =
@@ -358,7 +367,8 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
     pt_material_bsdf(fx, path->scene, material, &at->s, &bsdf);
     if (fx & PT_FX_COATED)
         bsdf.walk_key = pt_sampler_bits(&path->sampler, PT_DIM_BSDF_WALK);
-    pt_vec3 wo = pt_frame_to_local(&frame, v3_neg(path->ray.direction));
+    pt_vec3 wo_world = v3_neg(path->ray.direction), wo = pt_frame_to_local(&frame, wo_world);
+    pt_bsdf_face(fx, &bsdf, wo, v3_dot(wo_world, at->s.n_geometric));
     if (path->settings->want_aux)
         pt_path_aux(fx, path, &bsdf, wo, &frame);
     if (path->trace)
@@ -368,7 +378,10 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
     path->prev = pt_path_receiver(fx, at->p, &frame, &bsdf, wo);
     if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, &path->prev, u_light, &plan->light)) {
         float pdf;
-        pt_vec3 wi = plan->light.wi, f = pt_bsdf_eval(fx, &bsdf, wo, pt_frame_to_local(&frame, wi), &pdf);
+        pt_vec3 wi = plan->light.wi, wi_local = pt_frame_to_local(&frame, wi);
+        pt_vec3 f = pt_bsdf_eval(fx, &bsdf, wo, wi_local, &pdf);
+        if (fx & PT_FX_TRANSMISSION)
+            f = v3_scale(f, pt_bsdf_side_factor(fx, &bsdf, wo, wi_local, pt_path_crosses(at, wo_world, wi)));
         pt_path_plan_light(fx, path, f, pdf, pt_offset_point(at->p, at->s.n_geometric, at->error, wi),
                            fx & PT_FX_MEDIA ? pt_medium_towards(at, wi, path->medium) : -1, plan);
     }

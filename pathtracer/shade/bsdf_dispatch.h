@@ -34,6 +34,22 @@ static inline void pt_material_bsdf(pt_effects fx, const struct pt_scene *scene,
 #undef PT_BSDF_CASE
 }
 
+/* To be called once for a closure, before it is evaluated; cos_geometric: of wo with the geometric normal. */
+static inline void pt_bsdf_face(pt_effects fx, struct pt_bsdf *b, pt_vec3 wo, float cos_geometric)
+{
+    if ((fx & PT_FX_TRANSMISSION) && b->kind == PT_BSDF_DIELECTRIC)
+        pt_dielectric_face(b, wo, cos_geometric);
+}
+
+/* Factor on what pt_bsdf_eval and pt_bsdf_sample say of wi; 1 where the shading normal sees wo and wi on the sides that they
+ * are on. `crosses`: these are different ones. */
+static inline float pt_bsdf_side_factor(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, int crosses)
+{
+    if (!(fx & PT_FX_TRANSMISSION) || b->kind != PT_BSDF_DIELECTRIC)
+        return 1.0f;
+    return pt_dielectric_side_factor(b, wo, wi, crosses);
+}
+
 /* Whether any part of *b is not a delta distribution: next-event estimation is of no use when it returns 0. */
 static inline int pt_bsdf_has_smooth(pt_effects fx, const struct pt_bsdf *b)
 {
