@@ -400,7 +400,7 @@ train-demo: all ## train a tiny model on a tiny bundled data set and show that i
 libdir := $(if $(filter /%,$(LIBDIR)),$(LIBDIR),$(PREFIX)/$(LIBDIR))
 share := $(PREFIX)/share
 put = $(foreach f,$(3),$(1):$(2):$(f))
-INSTALLED = $(call put,$(PREFIX)/bin,755,$(PROGRAMS)) \
+INSTALLED = $(call put,$(PREFIX)/bin,755,$(PROGRAMS) scripts/packages/lull-denoiser-setup) \
     $(call put,$(PREFIX)/include/lull,644,$(wildcard plugin-api/include/lull/*.h)) \
     $(call put,$(libdir),755,$(HOST_LIB) $(HOST_LIB:.1=)) $(call put,$(libdir)/pkgconfig,644,$(PC_FILES)) \
     $(call put,$(libdir)/cmake/lull,644,$(CMAKE_FILES)) \

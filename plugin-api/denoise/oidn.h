@@ -9,7 +9,8 @@
  * - the path given, a file or a folder that holds one;
  * - the environment's LULL_OIDN, likewise;
  * - the loader's own path;
- * - lib/ of a folder oidn beside the program or up to five folders above it: scripts/setup --denoiser makes build/oidn.
+ * - lib/ of a folder oidn beside the program or up to five folders above it: scripts/setup --denoiser makes build/oidn;
+ * - lib/ of lull/oidn in XDG_DATA_HOME (~/.local/share) and of /usr/local/lib/lull/oidn: lull-denoiser-setup makes them.
  *
  * The same bits for every number of threads and for every run on one processor, but not for every instruction set. A crop
  * gives the bits of the whole picture inside if its corner lies on a multiple of LULL_OIDN_GRID of the frame and it has

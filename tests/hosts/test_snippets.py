@@ -3,6 +3,7 @@ written; shell lines are run where RUN says so, with small pictures, and all of 
 there. A snippet that no table lists fails, so that a new one is thought of."""
 import contextlib
 import functools
+import json
 import os
 import re
 import shlex
@@ -24,7 +25,7 @@ PAGES = ["README.md", *map(str, sorted(Path("docs").glob("*.md"))), "plugin-api/
 VENV = ROOT / "build/hosts/venv/bin/python3"
 
 # Shell snippets, by page and place: what is run of them. A regular expression: lines that are not, and why.
-NOT_HERE = r"tev|scripts/setup|python3 -m lull\.blender"  # a viewer with a window; from the network; tests/hosts/test_blender_command.py
+NOT_HERE = r"tev|scripts/setup|lull-denoiser-setup|python3 -m lull\.blender"  # a viewer with a window; from the network; tests/hosts/test_blender_command.py
 RUN = {("docs/denoised.md", 1): NOT_HERE, ("docs/quote.md", 1): None, ("docs/shots.md", 1): None, ("docs/watching.md", 1): NOT_HERE,
        ("docs/watching.md", 2): NOT_HERE, ("plugin-api/README.md", 1): None}
 # Those of which only the words are checked, and where they are run, or why not.
@@ -258,8 +259,15 @@ def test_shell_is_listed():
     shell = {(page, place) for page, language, place in FOUND if language == "sh"}
     assert shell == {*RUN} | {*CHECKED}, (shell - {*RUN} - {*CHECKED}, {*RUN, *CHECKED} - shell)
     assert not {*RUN} & {*CHECKED}
-    code = {key for key in FOUND if key[1] != "sh"}
+    code = {key for key in FOUND if key[1] not in ("sh", "json")}
     assert code == CODE, (code - CODE, CODE - code)
+
+
+def test_json():
+    """every snippet of JSON is JSON"""
+    for key, text in FOUND.items():
+        if key[1] == "json":
+            json.loads(text)
 
 
 @functools.lru_cache(None)
@@ -267,8 +275,8 @@ def help_of(program, sub):
     if program == "lull.blender":
         from lull.blender import cli
         return cli.parser().format_help()
-    if program == "scripts/setup":
-        return Path(program).read_text()
+    if program in ("scripts/setup", "lull-denoiser-setup"):
+        return (Path(program) if "/" in program else Path("scripts/packages") / program).read_text()
     if program == "scripts/lab":
         return subprocess.run([program, "--help"], text=True, capture_output=True).stdout + Path("docs/results.md").read_text()
     return subprocess.run([BUILD / "bin" / program, *([sub] if sub else []), "--help"], text=True, capture_output=True).stdout
@@ -276,7 +284,7 @@ def help_of(program, sub):
 
 def commands(text):
     """(program, its words) of every command that is ours."""
-    programs = {p.name for p in (BUILD / "bin").iterdir()} | {"scripts/setup", "scripts/lab"}
+    programs = {p.name for p in (BUILD / "bin").iterdir()} | {"scripts/setup", "scripts/lab", "lull-denoiser-setup"}
     plain = re.sub(r"(?m)(^|\s)#.*$", "", re.sub(r"\\\n\s*", " ", text))
     lexer = shlex.shlex(plain, posix=True, punctuation_chars=";|&()\n")
     lexer.commenters, lexer.whitespace, lexer.whitespace_split, segment = "", " \t", True, []

@@ -48,6 +48,12 @@ t "  …finds the criteria, and stops its noisy half later" inside "LD_LIBRARY_P
 t "the example criterion is built, and keeps the contract" inside "cc -shared -fPIC -fvisibility=hidden \$(PKG_CONFIG_PATH=$usr/lib/pkgconfig \
     PKG_CONFIG_SYSROOT_DIR=${usr%/usr} pkg-config --cflags lull-criterion) -Wl,--version-script=$usr/share/doc/lull-dev/examples/plugin.map \
     $usr/share/doc/lull-dev/examples/null.c -o mine.so -lm && $usr/bin/lull-check -q ./mine.so"
+doc=$root/usr/share/doc/lull
+t "README and pages are there, as pages and not packed" test -s $doc/README.md -a -s $doc/docs/hosting.md -a -s $doc/plugin-api/python/README.md -a -s $doc/docs/demo.png
+t "  …and what README leads to" sh -c "cd $doc && for to in \$(grep -o '](\([a-z][^)#:]*\)' README.md | sed 's/](//' | sort -u); do
+    [ -e \$to ] || case \$to in tests/README.md | CONTRIBUTING.md) ;; *) echo \$to && exit 1 ;; esac; done"
+t "a scene that came with it is rendered" inside "$usr/bin/lull-render $usr/share/lull/scenes/demo.pbrt --size 48x32 --block 16 --spp-max 16 -q -o demo.exr"
+t "the denoiser can be fetched" inside "$usr/bin/lull-denoiser-setup --help | grep -q python3-venv"
 t "man pages are there" sh -c "zcat $root/usr/share/man/man1/lull-render.1.gz | grep -q lull-render && zcat $root/usr/share/man/man7/lull-criterion.7.gz | grep -q criterion"
 t "purge" $dpkg_at --purge lull lull-dev liblull-host1
 t "  …leaves nothing" test -z "$(files)"

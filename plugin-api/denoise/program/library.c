@@ -34,9 +34,9 @@ struct library {
     void (*execute_filter)(filter_t filter);
 };
 
-static const char *const how_to_get_it = "scripts/setup --denoiser puts it into build/oidn, pip install pyoidn into a "
-                                         "Python; or install Open Image Denoise 2 and name its library by "
-                                         "LULL_OIDN=FILE";
+static const char *const how_to_get_it = "lull-denoiser-setup fetches it, scripts/setup --denoiser puts it into build/oidn, "
+                                         "pip install pyoidn into a Python; or install Open Image Denoise 2 and name its "
+                                         "library by LULL_OIDN=FILE";
 
 /* --- finding ----------------------------------------------------------------------------------------------------------- */
 
@@ -79,6 +79,20 @@ static void *open_nearby(void)
     return library;
 }
 
+/* Where lull-denoiser-setup puts it. */
+static void *open_fetched(void)
+{
+    const char *data = getenv("XDG_DATA_HOME"), *home = getenv("HOME");
+    char path[4200];
+    void *library = NULL;
+    if (data && *data == '/')
+        snprintf(path, sizeof path, "%.4000s/lull/oidn", data);
+    else
+        snprintf(path, sizeof path, "%.4000s/.local/share/lull/oidn", home && *home == '/' ? home : "/nonexistent");
+    library = open_at(path);
+    return library ? library : open_at("/usr/local/lib/lull/oidn");
+}
+
 static void *find(const char *path, struct base_err *err)
 {
     const char *named = *path ? path : getenv("LULL_OIDN");
@@ -92,6 +106,7 @@ static void *find(const char *path, struct base_err *err)
     }
     void *library = dlopen(file_name, RTLD_NOW | RTLD_LOCAL);
     library = library ? library : open_nearby();
+    library = library ? library : open_fetched();
     if (!library)
         base_fail(err, BASE_EINVAL, "no Open Image Denoise: %s", how_to_get_it);
     return library;
