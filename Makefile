@@ -62,7 +62,6 @@ MPI_PKG := $(firstword $(foreach p,ompi-c mpich,$(shell $(PKG) --exists $(p) 2>/
 MPI     ?= $(if $(MPI_PKG),1)
 MPI_CFLAGS := $(patsubst -I%,-isystem %,$(if $(MPI_PKG),$(shell $(PKG) --cflags $(MPI_PKG))))
 MPI_LIBS   := $(if $(MPI_PKG),$(shell $(PKG) --libs $(MPI_PKG)))
-STUDY_LIBS := -lmicrohttpd -lsqlite3
 GGN_LIBS := -lsvm -lcjson -lpng -lz -ldl -lm
 
 # --- include paths: the dependency arrows --------------------------------------------------------------------------------
@@ -99,13 +98,12 @@ TOOL_SRC    := $(wildcard plugin-api/tools/*.c)
 MPI_SRC     := $(wildcard plugin-api/mpi/*.c)
 PT_MAIN     := pathtracer/app/main.c
 PT_SRC      := $(filter-out $(PT_MAIN),$(wildcard pathtracer/*/*.c))
-GGN_SRC     := $(filter-out ggn/plugin/% ggn/study/% ggn/cli/%,$(wildcard ggn/*/*.c))
+GGN_SRC     := $(filter-out ggn/plugin/% ggn/cli/%,$(wildcard ggn/*/*.c))
 # What includes nn/real.h itself is compiled for float and, with GGN_DOUBLE, for double.
 GGN_TWICE   := $(shell grep -ls '"nn/real.h"' ggn/nn/*.c ggn/model/*.c tests/support/*.c)
 GGN_ENTRIES := $(wildcard ggn/plugin/entry_*.c)# one a library of criteria: entry_NAME.c makes NAME.so
 GGN_PLUGIN  := $(filter-out $(GGN_ENTRIES),$(wildcard ggn/plugin/*.c ggn/plugin/*/*.c))
-STUDY_MAIN  := ggn/study/main.c
-STUDY_SRC   := $(filter-out $(STUDY_MAIN),$(wildcard ggn/study/*.c))# the only users of STUDY_LIBS
+STUDY       := plugin-api/python/lull/study# lull-study: Python, and the page that it serves
 GGN_CLI     := $(wildcard ggn/cli/*.c)
 # Tests name what they test by prefix: pt_ (path tracer), ggn_, api_ (plugin-api), base_ (BASE_FOLDERS).
 TEST_FOLDERS := unit grad golden stat abi hard oom
@@ -127,7 +125,6 @@ LOADER_OBJ  := $(call o,$(LOADER_SRC))
 GGN_CORE_OBJ := $(call o,$(GGN_SRC)) $(BASE_OBJ)
 GGN_OBJ     := $(GGN_CORE_OBJ) $(call o,$(IMAGES_SRC))
 GGN_PLUGIN_OBJ := $(call o,$(GGN_PLUGIN))
-STUDY_OBJ   := $(call o,$(STUDY_SRC))
 
 PROGRAMS := $(addprefix $(BIN)/,lull-render ggn lull-study lull-report lull-check)
 MPI_MODULE := $(if $(MPI),$(OUT)/lib/lull/modules/lull-mpi.so)# loaded only by processes that a launcher has started
@@ -196,9 +193,9 @@ $(BIN)/lull-render: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(IMAGES
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
 $(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_CORE_OBJ) | $(IMAGES)
 	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
-# Of the rest of ggn the study takes what it names, and no network is among it.
-$(BIN)/lull-study: $(call o,$(STUDY_MAIN)) $(STUDY_OBJ) $(OBJ)/ggn.a | $(IMAGES)
-	$(link) $^ $(LDFLAGS_ALL) -Wl,--as-needed $(STUDY_LIBS) $(GGN_LIBS) -o $@
+# Its package is found beside it where it is installed, else in the source tree.
+$(BIN)/lull-study: plugin-api/python/lull-study | $(BIN)/ggn
+	@install -D -m 755 $< $@
 # Of what both programs stand on the checker takes what it names.
 $(OBJ)/base.a: $(BASE_OBJ)
 	@rm -f $@; echo "  AR   $@"; $(AR) rcs $@ $^
@@ -266,8 +263,6 @@ $(OUT)/tests/$(1)/pt_%: $(OBJ)/tests/$(1)/pt_%.c.o $(PT_CORE_OBJ) $(LOADER_OBJ) 
 	$$(link) $$^ $$(LDFLAGS_ALL) $(PT_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/ggn_%: $(OBJ)/tests/$(1)/ggn_%.c.o $(GGN_CORE_OBJ) $(SUPPORT_ggn)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
-$(OUT)/tests/$(1)/ggn_study%: $(OBJ)/tests/$(1)/ggn_study%.c.o $(STUDY_OBJ) $(GGN_CORE_OBJ) $(SUPPORT_ggn)
-	$$(link) $$^ $$(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/ggn_plugin%: $(OBJ)/tests/$(1)/ggn_plugin%.c.o $(GGN_PLUGIN_OBJ) $(GGN_CORE_OBJ) $(SUPPORT_ggn)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/api_%: $(OBJ)/tests/$(1)/api_%.c.o $(LOADER_OBJ) $(SUPPORT_api)
@@ -300,8 +295,6 @@ $(OUT)/tests/processors/embree_isa.so: $(OBJ)/tests/processors/embree_isa.c.o
 $(patsubst tests/%.c,$(OUT)/tests/%,$(wildcard tests/abi/api_*.c)): | $(ABI_PLUGINS) $(CRITERIA) $(HOST_LIB)
 $(OUT)/fuzz/replay-pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(PT_OBJ) $(LOADER_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) $(IMAGE_LIBS) -o $@
-$(OUT)/fuzz/replay-ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(OBJ)/tests/fuzz/replay.c.o $(STUDY_OBJ) $(GGN_OBJ)
-	$(link) $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) $(IMAGE_LIBS) -o $@
 $(OUT)/fuzz/replay-ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(OBJ)/tests/fuzz/replay.c.o $(GGN_OBJ)
 	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) $(IMAGE_LIBS) -o $@
 
@@ -358,8 +351,6 @@ fuzz: ## fuzz each target for FUZZ_SECONDS (default 60) under ASan+UBSan; needs 
 fuzzers: $(FUZZERS)
 build/fuzz/pt_%: $(OBJ)/tests/fuzz/pt_%.c.o $(PT_OBJ) $(LOADER_OBJ)
 	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(PT_LIBS) $(IMAGE_LIBS) -o $@
-build/fuzz/ggn_study%: $(OBJ)/tests/fuzz/ggn_study%.c.o $(STUDY_OBJ) $(GGN_OBJ)
-	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(STUDY_LIBS) $(GGN_LIBS) $(IMAGE_LIBS) -o $@
 build/fuzz/ggn_%: $(OBJ)/tests/fuzz/ggn_%.c.o $(GGN_OBJ)
 	$(link) -fsanitize=fuzzer $^ $(LDFLAGS_ALL) $(GGN_LIBS) $(IMAGE_LIBS) -o $@
 
@@ -408,10 +399,11 @@ INSTALLED = $(call put,$(PREFIX)/bin,755,$(PROGRAMS) scripts/packages/lull-denoi
     $(call put,$(share)/man/man1,644,$(wildcard docs/man/*.1)) $(call put,$(share)/man/man7,644,$(wildcard docs/man/*.7)) \
     $(call put,$(share)/bash-completion/completions,644,$(wildcard scripts/packages/completions/*)) \
     $(call put,$(share)/lull,644,$(wildcard ggn/models/*.ggn)) \
-    $(call put,$(share)/lull/study,644,$(wildcard ggn/study/page/*.*)) \
-    $(call put,$(share)/lull/study/vendor,644,$(wildcard ggn/study/page/vendor/*))
+    $(call put,$(share)/lull/study,644,$(wildcard $(STUDY)/*.py)) \
+    $(call put,$(share)/lull/study/page,644,$(wildcard $(STUDY)/page/*.*)) \
+    $(call put,$(share)/lull/study/page/vendor,644,$(wildcard $(STUDY)/page/vendor/*))
 OWN_FOLDERS = $(libdir)/lull/modules $(libdir)/lull $(libdir)/cmake/lull $(PREFIX)/include/lull \
-    $(share)/lull/study/vendor $(share)/lull/study $(share)/lull
+    $(share)/lull/study/page/vendor $(share)/lull/study/page $(share)/lull/study $(share)/lull
 # Where LIBDIR is elsewhere, this link: programs find their criteria and modules in ../lib/lull.
 OWN_LINK = $(filter-out $(libdir)/lull,$(PREFIX)/lib/lull)
 PC_FILES := $(OUT)/lull-criterion.pc $(OUT)/lull-host.pc

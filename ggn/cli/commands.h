@@ -31,7 +31,8 @@
     X(baseline, "train a published model before the network, as a criterion") \
     X(evaluate, "figures of models and baselines on recorded sequences") \
     X(cost, "what accuracy costs each criterion on recorded sequences") \
-    X(reconstruct, "the picture with each block at its threshold")
+    X(reconstruct, "the picture with each block at its threshold") \
+    X(stimuli, "the pictures of recordings and renders that people are shown")
 
 #define GGN_DECLARE_COMMAND(name, help) int ggn_cmd_##name(int argc, char **argv);
 GGN_COMMANDS(GGN_DECLARE_COMMAND)

@@ -51,12 +51,7 @@ echo '#include <lull/host.h>' | plant ggn/plugin/h.c
 echo 'int h;' | plant plugin-api/include/lull/host.h
 finds "a criterion that hosts" "ggn/plugin/h.c:1: only hosts may see the host library"
 rm "$tmp/t/ggn/plugin/h.c"
-echo 'floors: cli plugin study nn' | plant ggn/README.md
-echo '#include "study/s.h"' | plant ggn/cli/c.c
-echo 'int s;' | plant ggn/study/s.h
-finds "a study inside another program" "ggn/cli/c.c:1: ggn/study is a program of its own: only its files include them"
-rm "$tmp/t/ggn/cli/c.c"
-echo 'floors: cli plugin study figures nn' | plant ggn/README.md
+echo 'floors: cli plugin figures nn' | plant ggn/README.md
 echo '#include "figures/plot.h"' | plant ggn/cli/c.c
 echo 'char p[] = "gnuplot";' | plant ggn/figures/plot.h
 finds "a picture's language outside its folder" "ggn/cli/c.c:1: only ggn/figures writes gnuplot: hand figures/charts.h series"

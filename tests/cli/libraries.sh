@@ -1,6 +1,6 @@
 #!/bin/sh
 # What each criterion brings into a host: the libraries that it is linked with, and that opening one by its name opens no other.
-# What ggn and lull-study are linked with: the page and the data base of a study are no part of ggn, BLAS and libsvm none of a study.
+# What ggn is linked with.
 BUILD=${BUILD:-build} n=0 bad=0
 lib=$BUILD/lib/lull
 err=$(mktemp) || exit 2
@@ -22,8 +22,7 @@ t "denoised.so needs the mathematical library, and no denoiser" needs "$lib/deno
 t "ggn.so needs no BLAS" needs "$lib/ggn.so" libcjson libm
 t "baselines.so needs libsvm, and OpenBLAS when it is asked only" needs "$lib/baselines.so" libcjson libm libsvm
 for k in fixed halfbuf variance; do t "$k.so needs the mathematical library" needs "$lib/$k.so" libm; done
-t "lull-study needs libmicrohttpd and SQLite, no BLAS" needs "$BUILD/bin/lull-study" libcjson libm libmicrohttpd libpng16 libsqlite3 libz
-t "ggn needs neither" needs "$BUILD/bin/ggn" libcjson libm libpng16 libsvm libz
+t "ggn needs libsvm and what reads and writes files, no BLAS" needs "$BUILD/bin/ggn" libcjson libm libpng16 libsvm libz
 only() { # only NAME: opened by it, NAME.so is the one library of criteria that is loaded
     LD_DEBUG=files "$BUILD/bin/lull-check" -q -o table "$1" 2>&1 | sed -n 's|.*calling init: .*/\([a-z_-]*[.]so\)$|\1|p' | sort -u >"$err.names"
     loaded=$(grep -xE "$(ls "$lib" | tr '\n' '|' | sed 's/|$//')" "$err.names" | tr '\n' ' ')

@@ -1,7 +1,7 @@
 """`lull-study` over raw HTTP: what is refused changes nothing and is logged; what is stored comes back. Speaks TAP.
 
 Every command, request and answer, what is stored, the exports and the reports are kept as they come and compared at the end
-(tests/golden/whole/study.txt; whole.py says how to record anew). gnuplot is one that hands its script back as the picture."""
+(tests/golden/whole/study.txt; whole.py says how to record anew)."""
 
 import atexit
 import http.client
@@ -10,6 +10,7 @@ import os
 import re
 import signal
 import socket
+import struct
 import sqlite3
 import subprocess
 import sys
@@ -26,12 +27,6 @@ count = 0
 failed = 0
 kept = {}  # section -> text
 drawn = {}  # what is drawn at random -> its name
-
-os.makedirs(os.path.join(TMP.name, "path"))
-with open(os.path.join(TMP.name, "path", "gnuplot"), "w") as f:
-    f.write("#!/bin/sh\ncp \"$1\" \"$(sed -n \"s/^set output '\\(.*\\)'$/\\1/p\" \"$1\")\"\n")
-os.chmod(f.name, 0o755)
-os.environ["PATH"] = os.path.dirname(f.name) + ":" + os.environ["PATH"]
 
 
 def keep(section, text):
@@ -59,7 +54,8 @@ def pixels_told(data):
 
 
 def keep_files(section, folder):
-    """The files of a folder: text as it is, pictures by a checksum of their pixels."""
+    """The files of a folder: text as it is, pictures that are shown by a checksum of their pixels, those of a report (whose letters are
+    matplotlib's) by their size; tests/study/statistics.py looks at what is drawn."""
     for path, folders, names in os.walk(folder):
         folders.sort()
         for name in sorted(names):
@@ -67,9 +63,9 @@ def keep_files(section, folder):
                 data = f.read()
             name = os.path.relpath(os.path.join(path, name), folder)
             if data[:4] == b"\x89PNG":
-                keep(section, "%s: %s\n" % (name, pixels_told(data)))
+                keep(section, "%s: %s\n" % (name, pixels_told(data) if "/" in name else "%d x %d" % struct.unpack(">II", data[16:24])))
             elif name == "texts.json":
-                with open(os.path.join(whole.ROOT, "ggn", "study", "page", "texts.en.json"), "rb") as f:
+                with open(os.path.join(whole.ROOT, "plugin-api", "python", "lull", "study", "page", "texts.en.json"), "rb") as f:
                     keep(section, name + (": those of the page\n" if f.read() == data else ": other texts\n"))
             elif not name.startswith("study.db"):
                 keep(section, "--- %s\n%s\n" % (name, data.decode()))

@@ -535,9 +535,10 @@ for (const [name, viewport, beside] of [
         'refused with a text: zoom',
     );
     await look(zoomed, 'refuse-zoom', ['One moment', 'zoomed to about 150 %']);
-    await zoomed.goto(`${server.link}?p=${'0'.repeat(32)}`);
+    const stranger = await retina.context().newPage(); // the zoomed one would say again that it is zoomed
+    await stranger.goto(`${server.link}?p=${'0'.repeat(32)}`);
     check(
-        await zoomed
+        await stranger
             .getByText('Nobody has this link')
             .waitFor()
             .then(
@@ -546,7 +547,7 @@ for (const [name, viewport, beside] of [
             ),
         'an unknown link is told so',
     );
-    await look(zoomed, 'unknown', ['Nobody has this link', ASKED_BY, CONTACT]);
+    await look(stranger, 'unknown', ['Nobody has this link', ASKED_BY, CONTACT]);
     const broken = await openPage(server.link, SMALL);
     await broken.route('**/api/people', (route) => route.fulfill({ status: 400, json: { error: 'a reason' } }));
     await title(broken, 'A study on noise');

@@ -20,5 +20,5 @@ need_browser() {
 need node nodejs
 mkdir -p "$work" && copy=$(mktemp -d "$work/copy.XXXXXX") || exit 2
 cp tests/study/*.mjs "$copy" && mv -f "$copy"/*.mjs "$work" && rmdir "$copy" || exit 2 # the others run at the same time
-LULL_STUDY=$PWD/${BUILD:-build}/bin/lull-study PAGE=$PWD/ggn/study/page
+LULL_STUDY=$PWD/${BUILD:-build}/bin/lull-study PAGE=$PWD/plugin-api/python/lull/study/page
 export LULL_STUDY PAGE

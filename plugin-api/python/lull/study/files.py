@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""Files and JSON: what is refused, how it is written. A file is a temporary beside its name until it is whole and synced."""
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import tempfile
+from typing import Any, Iterator, TextIO
+
+VERSION = "1.0"
+
+
+class Refused(Exception):
+    """One line for people: bad usage, bad input, or an output that cannot be written. Exit status 2."""
+
+
+# --- JSON ---
+
+def _no_constant(word: str) -> None:
+    raise ValueError(f"{word} is no JSON")
+
+
+def loads(text: str | bytes) -> Any:
+    """ValueError for all that is no JSON, text that is no Unicode included."""
+    try:
+        value = json.loads(text, parse_constant=_no_constant)
+        json.dumps(value, ensure_ascii=False).encode()  # half a surrogate pair is no text
+        return value
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+
+
+def _number(value: float) -> str:
+    if isinstance(value, int):
+        return str(value)
+    if not math.isfinite(value):
+        return "null"
+    if value == int(value) and abs(value) < 2**53:
+        return str(int(value))
+    return repr(value)
+
+
+def print_json(value: Any, pretty: bool, depth: int = 0) -> str:
+    """As cJSON lays it out, so that files of before look the same. What is not known (NaN) is null."""
+    if isinstance(value, dict):
+        line, tabs, after = ("\n", "\t" * (depth + 1), ":\t") if pretty else ("", "", ":")
+        members = [f"{tabs}{json.dumps(k, ensure_ascii=False)}{after}{print_json(v, pretty, depth + 1)}"
+                   for k, v in value.items()]
+        return "{" + line + f",{line}".join(members) + (line if members else "") + tabs[1:] + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + (", " if pretty else ",").join(print_json(v, pretty, depth + 1) for v in value) + "]"
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return _number(value)
+    return json.dumps(value, ensure_ascii=False)
+
+
+# --- reading ---
+
+def read_file(path: str, most: int) -> bytes:
+    try:
+        with open(path, "rb") as file:
+            data = file.read(most + 1)
+    except OSError as error:
+        raise Refused(f"{path}: {error.strerror}") from None
+    if len(data) > most:
+        raise Refused(f"{path}: larger than {most} bytes")
+    return data
+
+
+# --- writing ---
+
+def check_output(path: str) -> str:
+    """The file behind `path`, if it can be written: links are followed, also to where no file is yet."""
+    target = os.path.realpath(path)
+    if not os.path.basename(path):
+        raise Refused(f"{path}: not the name of a file")
+    if os.path.exists(target) and not os.path.isfile(target):
+        raise Refused(f"{path}: cannot write there: "
+                      f"{'it is a folder' if os.path.isdir(target) else 'it is no regular file and would be replaced'}")
+    folder = os.path.dirname(target)
+    if not os.access(folder, os.W_OK | os.X_OK):
+        why = "No such file or directory" if not os.path.isdir(folder) else "Permission denied"
+        raise Refused(f"{path}: cannot write there: {why}")
+    return target
+
+
+@contextlib.contextmanager
+def replaced(path: str) -> Iterator[TextIO]:
+    """A text that becomes `path` at the end, on the disk; whatever goes wrong leaves what was there."""
+    target = check_output(path)
+    try:
+        descriptor, made = tempfile.mkstemp(prefix=".tmp-lull", dir=os.path.dirname(target))
+    except OSError as error:
+        raise Refused(f"{path}: cannot write there: {error.strerror}") from None
+    try:
+        with open(descriptor, "w", encoding="utf-8", newline="\n") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(made, 0o666 & ~umask)
+        os.replace(made, target)
+    except BaseException as error:
+        with contextlib.suppress(OSError):
+            os.unlink(made)
+        if isinstance(error, OSError):
+            raise Refused(f"{path}: write failed: {error.strerror or error}") from None
+        raise
+
+
+def write_line(path: str, text: str) -> None:
+    with replaced(path) as file:
+        file.write(text + "\n")
+
+
+def make_folder(path: str) -> None:
+    try:
+        os.makedirs(path, exist_ok=True) if not os.path.dirname(path) else os.mkdir(path)
+    except FileExistsError:
+        if not os.path.isdir(path):
+            raise Refused(f"{path}: File exists") from None
+    except OSError as error:
+        raise Refused(f"{path}: {error.strerror}") from None
+
+
+# --- what nothing may be written onto ---
+
+OWN = ("study.json", "texts.json", "token", "study.db", "study.db-wal", "study.db-shm")
+
+
+def protect(folder: str, output: str) -> None:
+    """Refuses an output that would replace a file of the study in `folder`, by whatever name, or take the name of one that
+    is made later. Reports and exports may lie beside them."""
+    target, stimuli = os.path.realpath(output), os.path.realpath(os.path.join(folder, "stimuli"))
+    if os.path.commonpath([target, stimuli]) == stimuli:
+        raise Refused(f"{output}: lies among the pictures that the study shows")
+    for name in OWN:
+        own = os.path.realpath(os.path.join(folder, name))
+        if target == own or (os.path.exists(target) and os.path.exists(own) and os.path.samefile(target, own)):
+            raise Refused(f"{output}: this is the study's own {name}, it would be lost")

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: MIT
+"""Makes a study: `ggn stimuli` chooses blocks and levels and writes every picture that is shown; then come texts.json and
+study.json. Nothing is left in DIR that looks like a study unless all went well: study.json is written last."""
+from __future__ import annotations
+
+import json
+import math
+import os
+import secrets
+import shutil
+import subprocess
+import sys
+from typing import Any
+
+from .definition import (ADJUSTMENT, KINDS, MAX_FPS, MAX_LINE, MAX_TRIALS, MIN_MS, TWO_INTERVAL, VALIDATION, Block, Study,
+                         View, fit_intervals, is_plain_line, write_study)
+from .files import Refused, make_folder, read_file, write_line
+from .options import Option, integer, real, said, word
+from .people import MIN_TRIALS
+from .plan import plan_count, plan_minutes
+
+MIN_SHOW_MS = 50  # three pictures of a screen of 60 Hz; in less an interval may never be seen
+def _kinds(text: str) -> str:
+    kinds = text.split(",")
+    if len(set(kinds)) < len(kinds) or not set(kinds) <= set(KINDS):
+        raise ValueError(f"expected some of {','.join(KINDS)}, each once")
+    return text
+
+
+OPTIONS = (
+    Option("task", "thresholds|validation", "what people are asked (required)", word("thresholds", "validation")),
+    Option("method", "adjustment|2ifc", "how thresholds are measured (adjustment)", word(ADJUSTMENT, TWO_INTERVAL)),
+    Option("views", "FOLDER[:BLOCKS]",
+           "a recorded sequence, or a folder of pictures; more may follow. BLOCKS: only these, e.g. 0,3,8-11", many=True),
+    Option("kinds", "LIST",
+           "2ifc: of pictures rendered with --denoise, what is shown: some of noisy,denoised,blend, a view of each", _kinds),
+    Option("asked-by", "NAME", "who asks, as the page says it (required)", said),
+    Option("contact", "ADDRESS", "whom to write to or to call, as the page says it (required)", said),
+    Option("trials", "N", "2ifc: trials per block, catch trials included, at least 10 (30)", integer(MIN_TRIALS, 1000)),
+    Option("repeats", "N", "adjustment: settings per block (2); validation: judgements per picture (1)", integer(1, 100)),
+    Option("catch", "SHARE", "2ifc, validation: share of catch trials (0.1)", real(0, 0.5)),
+    Option("show", "MS", "2ifc: how long an interval is shown (700; clips: two loops)", integer(MIN_SHOW_MS, 60000)),
+    Option("fps", "N", "2ifc: frames a second of clips (24)", integer(1, MAX_FPS)),
+    Option("gap", "MS", "the blank between two pictures in the same place (400)", integer(1, 60000)),
+    Option("break-every", "N", "offer a break after so many trials (60; 0: never)", integer(0, 100000)),
+    Option("spacing", "OCTAVES", "leave out levels that are nearer than that (0.15)", real(0.01, 4)),
+    Option("spp-min", "N", "leave out levels below (1)", integer(1, 10**9)),
+    Option("spp-max", "N", "leave out levels above (1000000)", integer(1, 10**9)),
+    Option("block", "PIXELS", "side of a block when the view is a folder of pictures (200)", integer(8, 4096)),
+    Option("seed", "N", "of all orders and sides (1)", integer(0, 2**53 - 1)))
+
+
+def _define(o: dict[str, Any]) -> Study:
+    """Task, names and numbers of the study."""
+    validation = o.get("task") == "validation"
+    if "task" not in o or not o["views"]:
+        raise Refused("--task and --views are needed")
+    if validation and "method" in o:
+        raise Refused("--method goes with --task thresholds")
+    if "asked_by" not in o or "contact" not in o:
+        raise Refused("--asked-by NAME and --contact ADDRESS are needed: the page tells people who asks them and whom "
+                      "to write to")
+    for name in ("asked_by", "contact"):
+        if not is_plain_line(o[name]):
+            raise Refused(f"--{name.replace('_', '-')}: expected one line of at most {MAX_LINE} bytes that is not blank")
+    task = VALIDATION if validation else o.get("method", ADJUSTMENT)
+    # what one task alone listens to is refused in another: a study that ignores it would not be the one that was meant
+    for name in {ADJUSTMENT: ("trials", "show", "fps", "kinds", "gap", "catch"), TWO_INTERVAL: ("repeats",),
+                 VALIDATION: ("trials", "show", "fps", "kinds")}[task]:
+        if name in o:
+            raise Refused(f"--{name} does nothing in this task ({task})")
+    into = {"catch": "catch_share", "show": "show_ms", "gap": "gap_ms"}
+    names = "seed", "trials", "repeats", "catch", "show", "fps", "gap", "break_every", "asked_by", "contact"
+    given = {into.get(name, name): o[name] for name in names if name in o}
+    return Study(**{"id": secrets.token_hex(16), "task": task, "seed": 1, "repeats": 2 if task == ADJUSTMENT else 1,
+                    "min_ms": MIN_MS[task], "max_fast": 0.1, **given})
+
+
+def _find_ggn() -> str:
+    beside = os.path.join(os.path.dirname(os.path.realpath(sys.argv[0])), "ggn")
+    found = beside if os.access(beside, os.X_OK) else shutil.which("ggn")
+    if not found:
+        raise Refused("the program ggn makes the pictures, and is neither beside lull-study nor on PATH")
+    return found
+
+
+def _make_stimuli(folder: str, study: Study, o: dict[str, Any]) -> dict[str, Any]:
+    """The pictures, and what study.json says of them."""
+    names = [name for name in ("kinds", "block", "spacing", "spp_min", "spp_max") if name in o]
+    told = [f"--task={study.task}", *(f"--{name.replace('_', '-')}={o[name]}" for name in names)]
+    ran = subprocess.run([_find_ggn(), "stimuli", "-o", os.path.join(folder, "stimuli"), *told, "--", *o["views"]],
+                         stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    lines = ran.stderr.decode("utf-8", "surrogateescape").splitlines()
+    if ran.returncode == 1:
+        raise MemoryError
+    if ran.returncode:
+        raise Refused(lines[-1].removeprefix("ggn stimuli: ") if lines else f"ggn stimuli ended with {ran.returncode}")
+    return json.loads(ran.stdout)
+
+
+def prepare(folder: str, page: str, o: dict[str, Any]) -> None:
+    study = _define(o)
+    make_folder(folder)
+    if os.path.exists(os.path.join(folder, "study.json")):
+        raise Refused(f"{folder}: there is a study already")
+    texts = os.path.join(folder, "texts.json")
+    if os.path.exists(texts):
+        raise Refused(f"{texts}: is there and would be replaced; move it away, and back after init")
+    make_folder(os.path.join(folder, "stimuli"))
+    shown = _make_stimuli(folder, study, o)
+    for view in shown["views"]:
+        study.views.append(View(**{**view, "blocks": [Block(**block) for block in view.get("blocks", [])]}))
+    study.conditions = shown.get("conditions", [])
+    fit_intervals(study)
+    if plan_count(study) > MAX_TRIALS:
+        raise Refused(f"more than {MAX_TRIALS} trials for one person: take fewer views, trials or repeats")
+    write_line(texts, read_file(os.path.join(page, "texts.en.json"), 1 << 20).decode().removesuffix("\n"))
+    write_study(folder, study)
+    views = len(study.views)
+    print(f"{folder}: {views} view{'' if views == 1 else 's'}, {plan_count(study)} trials for each person, some "
+          f"{math.ceil(plan_minutes(study))} min; `lull-study serve {folder}` opens it")

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: MIT
+"""What all people together gave: a threshold per block, how well people agree, shares of judgements, and how many people it
+takes. Only people who count (people.py) enter."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Optional
+
+import numpy as np
+from scipy.special import ndtri
+from scipy.stats import rankdata
+
+from .people import People
+from .psychometric import t975, wilson
+
+NAN = math.nan
+
+
+@dataclass
+class Threshold:
+    """Of a cell, octaves; NaN without people."""
+    t: float = NAN  # mean over people of their estimates, none beyond the highest level
+    lo: float = NAN  # 95 %: Student's t over people, or with one person their own interval
+    hi: float = NAN
+    spread: float = NAN  # geometric mean of theirs
+    people: int = 0
+    trials: int = 0
+    at_cap: int = 0  # so many did not reach their threshold at the highest level
+
+
+def estimates(people: People) -> np.ndarray:
+    """[person that counts][cell], not beyond the highest level; NaN without one."""
+    return np.array([[min(r.estimates[c].t, cell.cap()) if c in r.estimates else NAN for c, cell in enumerate(people.cells)]
+                     for r in people.counting()]).reshape(-1, len(people.cells))
+
+
+def _student(values: np.ndarray) -> tuple[float, float, float]:
+    """The mean and Student's interval, which takes two values."""
+    if len(values) == 0:
+        return NAN, NAN, NAN
+    mean = float(values.mean())
+    half = t975(len(values) - 1) * float(values.std(ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else NAN
+    return mean, mean - half, mean + half
+
+
+def thresholds(people: People) -> list[Threshold]:
+    found = []
+    for c, cell in enumerate(people.cells):
+        own = [r.estimates[c] for r in people.counting() if c in r.estimates]
+        if not own:
+            found.append(Threshold())
+            continue
+        t, lo, hi = _student(np.array([min(e.t, cell.cap()) for e in own]))
+        if len(own) == 1:
+            lo, hi = own[0].lo, own[0].hi
+        with np.errstate(divide="ignore"):
+            spread = float(np.exp2(np.mean(np.log2([e.spread for e in own]))))
+        found.append(Threshold(t, lo, hi, spread, len(own), sum(e.trials for e in own), sum(e.t >= cell.cap() for e in own)))
+    return found
+
+
+# --- kinds ---
+
+@dataclass
+class Difference:
+    """How many octaves of samples more one kind takes than the noisy picture of the same block and scene: each person's mean
+    over the blocks of which they have both, then the mean over people with Student's interval (NaN below two)."""
+    octaves: float
+    lo: float
+    hi: float
+    people: int
+    blocks: int
+
+
+def against_noisy(people: People, kind: str, only: Optional[int] = None) -> Difference:
+    """only: of one cell, else of all blocks of the kind."""
+    def noisy(c: int) -> Optional[int]:
+        view, block = people.cells[c]
+        return next((n for n, (v, b) in enumerate(people.cells)
+                     if v.kind == "noisy" and b.id == block.id and v.scene() == view.scene()), None)
+    pairs = [(c, noisy(c)) for c, cell in enumerate(people.cells) if cell.view.kind == kind and only in (None, c)]
+    pairs = [(c, n) for c, n in pairs if n is not None]
+    table = estimates(people)
+    more = np.array([table[:, c] - table[:, n] for c, n in pairs]).reshape(len(pairs), len(table)).T
+    blocks = (~np.isnan(more)).sum(1)
+    own = np.nansum(more[blocks > 0], 1) / blocks[blocks > 0]
+    return Difference(*_student(own), people=len(own), blocks=int(blocks.max(initial=0)))
+
+
+# --- agreement ---
+
+@dataclass
+class Ceiling:
+    """Agreement of people over blocks, in log2 of the thresholds. Each person against the mean of the others says how well
+    the best possible prediction could do on one person (lower bound of the noise ceiling); against the mean with them in it
+    is the upper bound (Nili et al. 2014). Means over people; NaN below two people or three blocks."""
+    people: int = 0
+    blocks: int = 0  # that at least two people have
+    pearson_lower: float = NAN
+    pearson_upper: float = NAN
+    spearman_lower: float = NAN
+    spearman_upper: float = NAN
+    median_abs_log2_lower: float = NAN
+    median_abs_log2_upper: float = NAN
+    within_half_lower: float = NAN  # share of blocks within half an octave, an octave
+    within_one_lower: float = NAN
+
+
+def pearson(x: np.ndarray, y: np.ndarray) -> float:
+    """NaN where one of them does not vary."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return float(np.corrcoef(x, y)[0, 1]) if np.ptp(x) > 0 and np.ptp(y) > 0 else NAN
+
+
+def ceiling(people: People) -> Ceiling:
+    table, figures, c = estimates(people), [], Ceiling()
+    for person, own in enumerate(table):
+        others = np.delete(table, person, axis=0)
+        known = ~np.isnan(own) & (~np.isnan(others)).any(0)
+        if known.sum() < 3:
+            continue
+        of_person = {}
+        for name, rest in (("lower", others), ("upper", table)):
+            mean = np.nanmean(rest[:, known], 0)
+            errors = np.abs(own[known] - mean)
+            of_person |= {"pearson_" + name: pearson(own[known], mean), "median_abs_log2_" + name: np.median(errors),
+                          "spearman_" + name: pearson(rankdata(own[known]), rankdata(mean))}
+            if name == "lower":
+                of_person |= {"within_half_lower": np.mean(errors <= 0.5), "within_one_lower": np.mean(errors <= 1.0)}
+        figures.append(of_person)
+        c.blocks = max(c.blocks, int(known.sum()))
+    c.people = len(figures)
+    for name in figures[0] if figures else ():
+        setattr(c, name, float(np.mean([f[name] for f in figures])))
+    return c
+
+
+# --- judgements ---
+
+@dataclass
+class Share:
+    """Of "same"."""
+    same: int = 0
+    n: int = 0
+    share: float = NAN
+    lo: float = NAN  # Wilson, 95 %
+    hi: float = NAN
+    rating: float = NAN  # mean
+
+
+def share(people: People, view: Optional[int], condition: int) -> Share:
+    """view None: all."""
+    found = [j for r in people.counting() for j in r.judgements if j.condition == condition and view in (None, j.view)]
+    n, same = len(found), sum(j.same for j in found)
+    return Share(same, n, same / n, *wilson(same, n), rating=sum(j.rating for j in found) / n) if n else Share()
+
+
+def intraclass(people: People, condition: int) -> float:
+    """Correlation of the judgements of one condition within people (one-way analysis of variance, not below 0); NaN below
+    two people or two judgements each."""
+    groups = [[j.same for j in r.judgements if j.condition == condition] for r in people.counting()]
+    groups = [np.array(g) for g in groups if g]
+    sizes = np.array([len(g) for g in groups])
+    if len(groups) < 2 or sizes.sum() - len(groups) < 1:
+        return NAN
+    everything = np.concatenate(groups)
+    between = sum(len(g) * (g.mean() - everything.mean())**2 for g in groups) / (len(groups) - 1)
+    within = sum(((g - g.mean())**2).sum() for g in groups) / (sizes.sum() - len(groups))
+    n0 = (sizes.sum() - (sizes**2).sum() / sizes.sum()) / (len(groups) - 1)
+    total = between + (n0 - 1) * within
+    return max(float((between - within) / total), 0.0) if total > 0 else 0.0
+
+
+def people_needed(p: float, difference: float, m: int, icc: float) -> int:
+    """People needed to show that two conditions differ by `difference` of share (two-sided 5 %, power 80 %), when one has
+    the share p and each person judges m pictures of each condition:
+        n = (z.975 + z.80)^2 (p q + p' q') / difference^2 · (1 + (m - 1) icc) / m"""
+    z = float(ndtri(0.975) + ndtri(0.8))
+    other = p - difference if p - difference >= 0 else p + difference
+    judgements = z * z * (p * (1 - p) + other * (1 - other)) / difference**2
+    return math.ceil(judgements * (1 + (m - 1) * icc) / m)
