@@ -292,6 +292,9 @@ static int make_ply_mesh(struct pt_builder *b, const struct pt_state *s, struct 
     free(bytes);
     if (rc)
         return pt_diag_fail_code(&b->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, loc, "cannot read %s", err.text);
+    if (ply.corner_uvs)
+        pt_diag_warn(&b->diag, loc, "%s: texture coordinates per face corner are ignored (expected those of vertices)",
+                     path);
     if (pt_params_find(p, "displacement")) {
         pt_diag_warn(&b->diag, pt_params_find(p, "displacement")->loc, "displacement of a plymesh's vertices is ignored");
         pt_params_ignore(p, "displacement edgelength");

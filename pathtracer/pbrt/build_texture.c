@@ -34,7 +34,7 @@ static double parse_encoding(const char *encoding)
     return -1;
 }
 
-/* Two channels (grey and alpha) become four, alpha that is 1 everywhere goes: the renderer knows 1, 3 and 4 channels.
+/* Grey and alpha become four channels, alpha that is 1 everywhere goes: the renderer knows 1, 3 and 4 channels.
  * Returns the channels to keep per pixel; `from` maps them. */
 static int choose_channels(const struct pic_image *image, int from[4])
 {
@@ -115,6 +115,9 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
             rc = pic_read_memory(path, bytes, size, &image, &err);
         free(bytes);
     }
+    if (!rc && image.is_part)
+        pt_diag_warn(&b->diag, loc, "%s: its pixels are not those of its whole picture: others are black, or left out",
+                     path);
     if (rc)
         pt_diag_fail_code(&b->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, loc, "cannot read %s", err.text);
     else if (convert(b, &image, code, &map) == 0 && (id = pt_list_add(b, &b->images, &map)) >= 0 &&

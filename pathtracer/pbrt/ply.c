@@ -19,7 +19,7 @@ static const struct {
                   {"float", T_F32}, {"float32", T_F32}, {"double", T_F64}, {"float64", T_F64}};
 
 /* What a property means to us. */
-enum role { R_SKIP, R_X, R_Y, R_Z, R_NX, R_NY, R_NZ, R_U, R_V, R_INDICES };
+enum role { R_SKIP, R_X, R_Y, R_Z, R_NX, R_NY, R_NZ, R_U, R_V, R_INDICES, R_CORNER_UVS };
 
 enum { MAX_PROPERTIES = 32, MAX_ELEMENTS = 16, MAX_CORNERS = 1 << 16 };
 
@@ -43,7 +43,7 @@ struct reader {
     struct element elements[MAX_ELEMENTS];
     struct pt_ply *ply;
     size_t index_room;
-    int has[R_INDICES + 1];
+    int has[R_CORNER_UVS + 1];
 };
 
 /* --- header ----------------------------------------------------------------------------------------------------------- */
@@ -92,6 +92,8 @@ static enum role role_of(const struct element *e, const char *name, int is_list)
     } roles[] = {{"x", R_X},         {"y", R_Y},         {"z", R_Z},         {"nx", R_NX},      {"ny", R_NY},
                  {"nz", R_NZ},       {"u", R_U},         {"v", R_V},         {"s", R_U},        {"t", R_V},
                  {"texture_u", R_U}, {"texture_v", R_V}, {"texture_s", R_U}, {"texture_t", R_V}};
+    if (strcmp(e->name, "face") == 0 && is_list && (strcmp(name, "texcoord") == 0 || strcmp(name, "texcoords") == 0))
+        return R_CORNER_UVS;
     if (strcmp(e->name, "face") == 0 && is_list)
         return strcmp(name, "vertex_indices") == 0 || strcmp(name, "vertex_index") == 0 ? R_INDICES : R_SKIP;
     if (strcmp(e->name, "vertex") == 0 && !is_list)
@@ -380,6 +382,7 @@ int pt_ply_parse(const char *name, const char *bytes, size_t size, struct pt_ply
         rc = base_fail(err, BASE_EINVAL, "%s: PLY file without vertices", name);
     if (!rc && !r->has[R_INDICES])
         rc = base_fail(err, BASE_EINVAL, "%s: PLY file without faces", name);
+    ply.corner_uvs = r->has[R_CORNER_UVS];
     free(r);
     if (rc) {
         pt_ply_release(&ply);

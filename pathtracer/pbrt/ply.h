@@ -16,6 +16,7 @@ struct pt_ply {
     float *uvs;        /* owns: [vertex_count][2] or NULL */
     uint32_t *indices; /* owns: [triangle_count][3], each < vertex_count */
     uint32_t polygons; /* faces of more than four corners, cut into fans */
+    int corner_uvs;    /* the file has texture coordinates per face corner, which are not read */
 };
 
 /* Parses bytes[0, size). Faces with more than three corners become fans. Fails with BASE_EINVAL and `name: what is wrong`

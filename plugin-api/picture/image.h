@@ -13,6 +13,7 @@ struct pic_image {
     uint8_t *u8;                     /* owns [height][width][channels]: codes; or NULL */
     float *f32;                      /* owns [height][width][channels]: values, those of integers in [0, 1]; or NULL */
     size_t clipped;                  /* pixels that were NaN, infinite or negative when pic_encode made codes of them */
+    int32_t is_part;                 /* pic_read: the file has other pixels than its picture */
 };
 
 /* Where the stored pixels lie in the whole picture: 0 <= x0 < x1 <= width, the same of y. */

@@ -3,6 +3,7 @@ extern "C" {
 #include "base/files.h"
 }
 
+#include "picture/channels.h"
 #include "picture/oiio.h"
 
 #include <OpenImageIO/filesystem.h>
@@ -16,6 +17,7 @@ extern "C" {
 #include <mutex>
 #include <new>
 #include <string>
+#include <vector>
 
 #include <strings.h>
 #include <zlib.h>
@@ -57,44 +59,74 @@ int complain(const char *name, std::string why, base_err *err)
 
 /* --- which channels --- */
 
-struct selection {
-    int part, count, at[4]; /* channels of the file, count of them */
-};
-
-/* R, G, B by name, else the first three, else the first one repeated. */
-selection find_rgb(const ImageSpec &spec)
+std::vector<ImageSpec> list_parts(ImageInput &input)
 {
-    static const char *const names[3] = {"R", "G", "B"};
-    selection s = {0, 3, {0, 0, 0}};
-    int found = 0;
-    for (int c = 0; c < 3; c++) {
-        const auto at = std::find(spec.channelnames.begin(), spec.channelnames.end(), names[c]);
-        found += at != spec.channelnames.end();
-        s.at[c] = static_cast<int>(at - spec.channelnames.begin());
-    }
-    for (int c = 0; c < 3 && found != 3; c++)
-        s.at[c] = spec.nchannels >= 3 ? c : 0;
-    return s;
+    std::vector<ImageSpec> parts{input.spec()};
+    for (int part = 1; part < max_channels && input.seek_subimage(part, 0); part++)
+        parts.push_back(input.spec());
+    input.seek_subimage(0, 0);
+    input.geterror(); /* there is no such part */
+    return parts;
 }
 
-/* In the first part that has it; count is 0 if none has. */
-selection find_channel(ImageInput &input, const char *channel)
+/* The first three, else the first one, and alpha: of other formats than EXR, whose names may say nothing. */
+pic_choice choose_by_place(const ImageSpec &spec)
+{
+    pic_choice choice = {0, spec.nchannels >= 3 ? 3 : 1, {0, 1, 2, 0}};
+    if (spec.alpha_channel >= choice.count)
+        choice.at[choice.count++] = spec.alpha_channel;
+    return choice;
+}
+
+int choose_picture(ImageInput &input, const char *name, pic_choice *out, base_err *err)
+{
+    const bool is_exr = std::strcmp(input.format_name(), "openexr") == 0;
+    const std::vector<ImageSpec> parts = is_exr ? list_parts(input) : std::vector<ImageSpec>{input.spec()};
+    std::vector<std::string> part_names;
+    std::vector<pic_channel> list;
+    for (const ImageSpec &spec : parts)
+        part_names.push_back(parts.size() > 1 ? spec.get_string_attribute("oiio:subimagename").c_str() : "");
+    for (size_t part = 0; part < parts.size(); part++)
+        for (size_t c = 0; c < parts[part].channelnames.size(); c++)
+            list.push_back({parts[part].channelnames[c].c_str(),
+                            part_names[part].empty() ? nullptr : part_names[part].c_str(), static_cast<int>(part),
+                            static_cast<int>(c)});
+    if (list.size() > PIC_MAX_CHANNELS)
+        return base_fail(err, BASE_EINVAL, "%s: %zu channels (expected at most %d)", name, list.size(), PIC_MAX_CHANNELS);
+    base_err why = {};
+    const int rc = pic_choose_channels(name, list.data(), static_cast<int>(list.size()), out, &why);
+    if (rc == BASE_ENOMEM || (rc != 0 && is_exr))
+        return base_fail(err, rc, "%s", why.text);
+    if (rc != 0)
+        *out = choose_by_place(parts[0]);
+    return 0;
+}
+
+/* In the first part that has it. */
+int choose_channel(ImageInput &input, const pic_request &q, pic_choice *out, base_err *err)
 {
     for (int part = 0; input.seek_subimage(part, 0); part++) {
         const ImageSpec &spec = input.spec();
-        const auto at = std::find(spec.channelnames.begin(), spec.channelnames.end(), channel);
-        if (at != spec.channelnames.end())
-            return {part, 1, {static_cast<int>(at - spec.channelnames.begin())}};
+        const auto at = std::find(spec.channelnames.begin(), spec.channelnames.end(), q.channel);
+        if (at != spec.channelnames.end()) {
+            *out = {part, 1, {static_cast<int>(at - spec.channelnames.begin())}};
+            return 0;
+        }
     }
-    return {0, 0, {0}};
+    return base_fail(err, BASE_EINVAL, "%s: has no channel '%s'", q.name, q.channel);
 }
 
-selection choose(ImageInput &input, const pic_request &q)
+int choose(ImageInput &input, const pic_request &q, pic_choice *out, base_err *err)
 {
     if (q.wanted == PIC_CHANNEL)
-        return find_channel(input, q.channel);
-    return q.wanted == PIC_DISPLAY ? find_rgb(input.spec())
-                                   : selection{0, std::min(input.spec().nchannels, 4), {0, 1, 2, 3}};
+        return choose_channel(input, q, out, err);
+    int rc = choose_picture(input, q.name, out, err);
+    if (!rc && q.wanted == PIC_DISPLAY) { /* grey is repeated, alpha dropped */
+        for (int c = 1; c < 3 && out->count < 3; c++)
+            out->at[c] = out->at[0];
+        out->count = 3;
+    }
+    return rc;
 }
 
 /* --- pixels --- */
@@ -111,39 +143,102 @@ int check_size(const ImageSpec &spec, const char *name, base_err *err)
     return 0;
 }
 
+/* The pixels of an image: where the stored ones begin, which may be outside. */
+struct canvas {
+    int width, height, x, y;
+};
+
+bool holds(const canvas &c, const ImageSpec &spec)
+{
+    return c.x >= 0 && c.y >= 0 && c.x + spec.width <= c.width && c.y + spec.height <= c.height;
+}
+
+/* A texture is a picture in its frame: what the file leaves out is black, what it has outside is left out. Other readers
+ * take the stored pixels. */
+int find_canvas(const ImageSpec &spec, const pic_request &q, canvas *out, base_err *err)
+{
+    *out = {spec.width, spec.height, 0, 0};
+    const long long x = static_cast<long long>(spec.x) - spec.full_x, y = static_cast<long long>(spec.y) - spec.full_y;
+    if (q.wanted != PIC_STORED || (x == 0 && y == 0 && spec.full_width == spec.width && spec.full_height == spec.height))
+        return 0;
+    ImageSpec whole = spec;
+    whole.width = spec.full_width;
+    whole.height = spec.full_height;
+    if (int rc = check_size(whole, q.name, err))
+        return rc;
+    if (x >= whole.width || y >= whole.height || x + spec.width <= 0 || y + spec.height <= 0)
+        return base_fail(err, BASE_EINVAL, "%s: all of its pixels lie outside of its picture", q.name);
+    *out = {whole.width, whole.height, static_cast<int>(x), static_cast<int>(y)};
+    return 0;
+}
+
+/* The chosen channels of all stored pixels, interleaved; `row` is from one row to the next, in bytes. */
+int read_stored(ImageInput &input, const pic_request &q, const pic_choice &s, const ImageSpec &spec, TypeDesc type, char *to,
+                size_t row, base_err *err)
+{
+    const size_t size = type.size(), pixel = static_cast<size_t>(s.count) * size;
+    for (int c = 0, n = 1; c < s.count; c += n) {
+        for (n = 1; c + n < s.count && s.at[c + n] == s.at[c] + n;)
+            n++;
+        if (c > 0 && s.at[c] == s.at[0]) { /* repeated */
+            for (int y = 0; y < spec.height; y++)
+                for (int x = 0; x < spec.width; x++) {
+                    char *at = to + static_cast<size_t>(y) * row + static_cast<size_t>(x) * pixel;
+                    std::memcpy(at + static_cast<size_t>(c) * size, at, size);
+                }
+        } else if (!input.read_image(s.part, 0, s.at[c], s.at[c] + n, type, to + static_cast<size_t>(c) * size,
+                                     static_cast<OIIO::stride_t>(pixel), static_cast<OIIO::stride_t>(row))) {
+            return complain(q.name, input.geterror(), err);
+        }
+    }
+    return 0;
+}
+
+/* The same in their place on the canvas, which is black. */
+int read_placed(ImageInput &input, const pic_request &q, const pic_choice &s, const ImageSpec &spec, TypeDesc type,
+                const canvas &c, char *to, base_err *err)
+{
+    const size_t pixel = static_cast<size_t>(s.count) * type.size(), row = static_cast<size_t>(c.width) * pixel,
+                 stored_row = static_cast<size_t>(spec.width) * pixel;
+    if (holds(c, spec))
+        return read_stored(input, q, s, spec, type, to + static_cast<size_t>(c.y) * row + static_cast<size_t>(c.x) * pixel,
+                           row, err);
+    memory stored(std::calloc(static_cast<size_t>(spec.height), stored_row));
+    if (!stored)
+        return base_fail_nomem(err, q.name);
+    if (int rc = read_stored(input, q, s, spec, type, static_cast<char *>(stored.get()), stored_row, err))
+        return rc;
+    const int x0 = std::max(c.x, 0), x1 = std::min(c.x + spec.width, c.width);
+    for (int y = std::max(c.y, 0); y < std::min(c.y + spec.height, c.height); y++)
+        std::memcpy(to + static_cast<size_t>(y) * row + static_cast<size_t>(x0) * pixel,
+                    static_cast<const char *>(stored.get()) + static_cast<size_t>(y - c.y) * stored_row +
+                        static_cast<size_t>(x0 - c.x) * pixel,
+                    static_cast<size_t>(x1 - x0) * pixel);
+    return 0;
+}
+
 int read_pixels(ImageInput &input, const pic_request &q, pic_image *out, base_err *err)
 {
-    const selection s = choose(input, q);
-    if (q.wanted == PIC_CHANNEL && s.count == 0)
-        return base_fail(err, BASE_EINVAL, "%s: has no channel '%s'", q.name, q.channel);
+    pic_choice s = {};
+    if (int rc = choose(input, q, &s, err))
+        return rc;
     const ImageSpec spec = input.spec_dimensions(s.part, 0);
+    canvas c = {};
     if (int rc = check_size(spec, q.name, err))
+        return rc;
+    if (int rc = find_canvas(spec, q, &c, err))
         return rc;
     const bool is_float = spec.format.is_floating_point();
     const bool is_codes = q.wanted == PIC_DISPLAY ? !is_float : q.wanted == PIC_STORED && spec.format == TypeDesc::UINT8;
     const TypeDesc type = is_codes ? TypeDesc::UINT8 : TypeDesc::FLOAT;
-    const int lo = *std::min_element(s.at, s.at + s.count), hi = *std::max_element(s.at, s.at + s.count) + 1;
-    const size_t pixels = static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height), size = type.size(),
-                 count = static_cast<size_t>(s.count), span = static_cast<size_t>(hi - lo);
-    memory values(std::calloc(pixels * span, size));
+    memory values(std::calloc(static_cast<size_t>(c.width) * static_cast<size_t>(c.height),
+                              static_cast<size_t>(s.count) * type.size()));
     if (!values)
         return base_fail_nomem(err, q.name);
-    if (!input.read_image(s.part, 0, lo, hi, type, values.get()))
-        return complain(q.name, input.geterror(), err);
-    bool in_order = span == count;
-    for (int c = 0; c < s.count; c++)
-        in_order = in_order && s.at[c] == lo + c;
-    if (!in_order) {
-        memory ordered(std::malloc(pixels * count * size));
-        if (!ordered)
-            return base_fail_nomem(err, q.name);
-        for (size_t i = 0; i < pixels; i++)
-            for (size_t c = 0; c < count; c++)
-                std::memcpy(static_cast<char *>(ordered.get()) + (i * count + c) * size,
-                            static_cast<char *>(values.get()) + (i * span + static_cast<size_t>(s.at[c] - lo)) * size, size);
-        values.swap(ordered);
-    }
-    *out = pic_image{spec.width, spec.height, s.count, is_float, nullptr, nullptr, 0};
+    if (int rc = read_placed(input, q, s, spec, type, c, static_cast<char *>(values.get()), err))
+        return rc;
+    *out = pic_image{c.width, c.height, s.count, is_float,
+                     nullptr, nullptr,  0,       !(holds(c, spec) && c.width == spec.width && c.height == spec.height)};
     if (is_codes)
         out->u8 = static_cast<uint8_t *>(values.release());
     else

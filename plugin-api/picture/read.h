@@ -14,13 +14,15 @@
 #include "base/err.h"
 #include "picture/image.h"
 
-/* The first part of the file as it is stored: codes of an 8-bit file, else values; its first four channels. */
+/* The picture, as picture/channels.h finds it: grey, or red, green and blue, each with alpha if there is one; codes of
+ * an 8-bit file, else values. Where the stored pixels are not those of the picture (EXR's data and display window) they
+ * are put into their place: what is missing is black, what lies outside is left out, and is_part is set. */
 int pic_read(const char *path, struct pic_image *out, struct base_err *err);
 /* The same from memory; `name` only tells the format by its extension and names the image in errors. Formats that
  * OpenImageIO reads from files alone are refused (BASE_EINVAL). */
 int pic_read_memory(const char *name, const void *data, size_t size, struct pic_image *out, struct base_err *err);
-/* The sRGB codes that a display shows, three channels, found by name. Those of integers come as they are, those of light are
- * made by pic_encode. Grey is repeated, alpha is dropped. */
+/* The sRGB codes that a display shows of the stored pixels, three channels, found in the same way. Those of integers
+ * come as they are, those of light are made by pic_encode. Grey is repeated, alpha is dropped. */
 int pic_read_display(const char *path, struct pic_image *out, struct base_err *err);
 /* The values of one channel, found by name ("lull.spp.V") in any part of the file. BASE_EINVAL if there is none. */
 int pic_read_channel(const char *path, const char *channel, struct pic_image *out, struct base_err *err);

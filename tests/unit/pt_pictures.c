@@ -99,27 +99,115 @@ static void exr_channels(void **state)
         assert_true(number == 2.5);
         check_exr_header(file, count);
         exr_finish(&file);
-        struct pic_image read;
         char renamed[80];
         snprintf(renamed, sizeof renamed, "%s.exr", path);
         assert_int_equal(rename(path, renamed), 0);
-        assert_int_equal(pic_read(renamed, &read, &err), 0);
-        assert_true(read.width == 3 && read.height == 37 && read.channels == (count < 4 ? count : 4) && read.is_float_file &&
-                    !read.u8);
-        for (int i = 0; i < 3 * 37 * read.channels; i++) {
-            int place = i % read.channels, wanted = 0; /* the file sorts by name: which of ours is the place-th */
-            for (int c = 0; c < count; c++) {
-                int before = 0;
-                for (int k = 0; k < count; k++)
-                    before += strcmp(names[k], names[c]) < 0;
-                wanted = before == place ? c : wanted;
-            }
-            assert_true(read.f32[i] == (float)(1000 * wanted + 10 * (i / read.channels / 3 + 2) + i / read.channels % 3));
+        for (int c = 0; c < count; c++) {
+            struct pic_image read;
+            assert_int_equal(pic_read_channel(renamed, list[c], &read, &err), 0);
+            assert_true(read.width == 3 && read.height == 37 && read.channels == 1 && read.is_float_file && !read.u8);
+            for (int i = 0; i < 3 * 37; i++)
+                assert_true(read.f32[i] == (float)(1000 * c + 10 * (i / 3 + 2) + i % 3));
+            pic_release(&read);
+            assert_null(read.f32);
         }
-        pic_release(&read);
-        assert_null(read.f32);
         unlink(renamed);
     }
+}
+
+/* --- pictures by name ------------------------------------------------------------------------------------------------- */
+
+/* Channel c is 1 + c everywhere, plus the place in a thousandth. */
+static void place_row(void *data, int y, float *const *rows)
+{
+    const struct pt_exr_image *image = data;
+    for (int c = 0; c < image->channel_count; c++)
+        for (int x = image->x0; x < image->x1; x++)
+            rows[c][x - image->x0] = 1 + (float)c + (float)(16 * y + x) / 1024;
+}
+
+/* A picture of 6x5 of these channels whose stored pixels are [x0, x1) x [y0, y1). */
+static void write_picture(char path[64], const char *const *names, int count, const int window[4])
+{
+    struct base_err err = {0};
+    struct pt_exr_image image = {6, 5, window[0], window[1], window[2], window[3], count, names, 0, NULL, place_row, NULL};
+    image.data = &image;
+    snprintf(path, 64, "%s/a.exr", dir);
+    if (pt_exr_write(path, &image, &err) != 0)
+        fail_msg("%s", err.text);
+}
+
+/* Wherever R, G, B and A stand among others, in the file's order or not, they are read; the same as codes for a display. */
+static void channels_are_found_by_name(void **state)
+{
+    (void)state;
+    static const int all[4] = {0, 0, 6, 5};
+    static const struct {
+        const char *names[8];
+        int count, wanted, at[4];
+    } cases[] = {
+        {{"R", "G", "B"}, 3, 3, {0, 1, 2}},
+        {{"Z", "B", "lull.error.V", "G", "N.X", "R", "AO.R", "a"}, 8, 4, {5, 3, 1, 7}},
+        {{"depth", "A", "Y"}, 3, 2, {2, 1}},
+        {{"mist"}, 1, 1, {0}},
+        {{"V.Glossy.R", "V.Glossy.G", "V.Glossy.B", "V.Combined.B", "V.Combined.G", "V.Combined.R"}, 6, 3, {5, 4, 3}}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char path[64];
+        struct base_err err = {0};
+        struct pic_image read, shown;
+        write_picture(path, cases[i].names, cases[i].count, all);
+        if (pic_read(path, &read, &err) != 0 || pic_read_display(path, &shown, &err) != 0)
+            fail_msg("%s", err.text);
+        assert_true(read.width == 6 && read.height == 5 && read.channels == cases[i].wanted && !read.is_part);
+        for (int k = 0; k < 30 * read.channels; k++) {
+            const int c = cases[i].at[k % read.channels], at = k / read.channels;
+            assert_true(read.f32[k] == 1 + (float)c + (float)(16 * (at / 6) + at % 6) / 1024);
+        }
+        for (int k = 0; k < 90; k++)
+            assert_int_equal(shown.u8[k], 255);
+        pic_release(&read);
+        pic_release(&shown);
+        unlink(path);
+    }
+}
+
+/* A file that stores part of its picture, as --crop writes it, or more: each pixel is where it is in the picture. */
+static void windows_are_placed(void **state)
+{
+    (void)state;
+    static const char *const rgb[] = {"R", "G", "B"};
+    static const int windows[][4] = {{2, 1, 5, 4}, {0, 0, 6, 5}, {-2, -1, 8, 6}, {-3, 2, 4, 9}, {5, 4, 6, 5}, {-1, 0, 6, 5}};
+    for (size_t i = 0; i < sizeof windows / sizeof windows[0]; i++) {
+        const int *w = windows[i];
+        char path[64];
+        struct base_err err = {0};
+        struct pic_image read;
+        write_picture(path, rgb, 3, w);
+        if (pic_read(path, &read, &err) != 0)
+            fail_msg("%s", err.text);
+        assert_true(read.width == 6 && read.height == 5 && read.channels == 3 && read.is_part == (i != 1));
+        for (int y = 0; y < 5; y++)
+            for (int x = 0; x < 6; x++)
+                for (int c = 0; c < 3; c++) {
+                    int stored = x >= w[0] && x < w[2] && y >= w[1] && y < w[3];
+                    float wanted = stored ? 1 + (float)c + (float)(16 * y + x) / 1024 : 0;
+                    assert_true(read.f32[(6 * y + x) * 3 + c] == wanted);
+                }
+        pic_release(&read);
+        assert_int_equal(pic_read_display(path, &read, &err), 0); /* that is what is stored */
+        assert_true(read.width == w[2] - w[0] && read.height == w[3] - w[1]);
+        pic_release(&read);
+        unlink(path);
+    }
+    static const int away[4] = {6, 0, 9, 5};
+    char path[64], words[128];
+    struct base_err err = {0};
+    struct pic_image read;
+    write_picture(path, rgb, 3, away);
+    assert_int_equal(pic_read(path, &read, &err), BASE_EINVAL);
+    snprintf(words, sizeof words, "%s: all of its pixels lie outside of its picture", path);
+    assert_string_equal(err.text, words);
+    unlink(path);
 }
 
 /* --- drawings --------------------------------------------------------------------------------------------------------- */
@@ -223,6 +311,7 @@ static void drawings(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(drawings), cmocka_unit_test(exr_channels)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(drawings), cmocka_unit_test(exr_channels),
+                                       cmocka_unit_test(channels_are_found_by_name), cmocka_unit_test(windows_are_placed)};
     return cmocka_run_group_tests(tests, make_dir, remove_dir);
 }

@@ -89,6 +89,26 @@ static void reads_binary(void **state)
     }
 }
 
+/* They are not read, and that can be said. */
+static void texture_coordinates_per_corner(void **state)
+{
+    (void)state;
+    static const char text[] =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar int vertex_indices\nproperty list uchar float %s\n"
+        "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 6 0 0 1 0 0 1\n";
+    static const char *const names[] = {"texcoord", "texcoords", "weights"};
+    for (int i = 0; i < 3; i++) {
+        char bytes[512];
+        struct pt_ply ply;
+        struct base_err err = {0};
+        int n = snprintf(bytes, sizeof bytes, text, names[i]);
+        assert_int_equal(pt_ply_parse("a.ply", bytes, (size_t)n, &ply, &err), 0);
+        assert_true(ply.triangle_count == 1 && !ply.uvs && ply.corner_uvs == (i < 2));
+        pt_ply_release(&ply);
+    }
+}
+
 static size_t put_number(char *out, size_t at, int type, double v, int big)
 {
     const int8_t i8 = (int8_t)v;
@@ -147,7 +167,7 @@ static void numbers_of_every_type(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(reads_ascii), cmocka_unit_test(reads_binary),
-                                       cmocka_unit_test(numbers_of_every_type)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(reads_ascii), cmocka_unit_test(texture_coordinates_per_corner),
+                                       cmocka_unit_test(reads_binary), cmocka_unit_test(numbers_of_every_type)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

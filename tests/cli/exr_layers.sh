@@ -1,0 +1,52 @@
+#!/bin/sh
+# An EXR as colour, as alpha and as sky: its picture is found by the names of its channels, whatever their order, type and
+# company; what does not tell is refused in a line; a cropped file is placed and said.
+. "$(dirname "$0")/lull_render_setup"
+command -v oiiotool >/dev/null || { echo "1..0 # SKIP no oiiotool"; exit 0; }
+
+# make VALUES NAMES COUNT OPTIONS…: t.exr of one colour
+make() { values=$1 names=$2 count=$3; shift 3; oiiotool --pattern "constant:color=$values" 8x4 "$count" --chnames "$names" "$@" -o t.exr; }
+cat >colour.pbrt <<'S'
+LookAt 0 0 -5  0 0 0  0 1 0
+Camera "orthographic"
+Film "rgb" "integer xresolution" 4 "integer yresolution" 4
+WorldBegin
+LightSource "infinite" "string filename" "t.exr"
+Texture "t" "spectrum" "imagemap" "string filename" "t.exr"
+Texture "f" "float" "imagemap" "string filename" "t.exr"
+Material "diffuse" "texture reflectance" "t"
+Shape "disk" "float radius" 1 "texture alpha" "f"
+S
+picture() { "$P" colour.pbrt -q --spp 8 --reproducible -o "$1" --strict; }
+same_as() { picture got.exr && cmp "$1" got.exr; }
+
+make .2,.5,.8 R,G,B 3
+t "red, green and blue" picture rgb.exr
+make .8,.03,.5,7,.2 B,Z,G,AO.R,R 5
+t "  …in another order among other channels" same_as rgb.exr
+make .2,.5,.8,1 .R,.G,.B,.A 4
+t "  …of V-Ray" same_as rgb.exr
+make 9,9,9,.2,.5,.8,1,5 V.Diffuse.R,V.Diffuse.G,V.Diffuse.B,V.Combined.R,V.Combined.G,V.Combined.B,V.Combined.A,V.Depth.Z 8
+t "  …of Blender" same_as rgb.exr
+make .2,.5,.8,3,7 R,G,B,N,NF 5 -d NF=uint32
+t "  …beside integers" same_as rgb.exr
+make .4 Y 1
+t "luminance" picture grey.exr
+for names in R luminance mask; do
+    make .4 $names 1
+    t "  …called $names" same_as grey.exr
+done
+make 3,.4,1 Z,Y,A 3
+t "  …beside depth, opaque" same_as grey.exr
+make 9,9,9,8,8,8 a.R,a.G,a.B,b.R,b.G,b.B 6
+refused "t.exr: several layers, a, b: keep one (expected R, G and B, or a layer Combined)" colour.pbrt -q --spp 1 -o x.exr
+make .4,.1,.1 Y,RY,BY 3
+refused "luminance and chroma" colour.pbrt -q --spp 1 -o x.exr
+make 1,2,3 N.X,N.Y,N.Z 3
+refused "t.exr: none of its channels is a picture: N.X, N.Y, N.Z" colour.pbrt -q --spp 1 -o x.exr
+
+"$P" "$scene" -q --size 32x16 --spp 1 --block 8 --crop 8,4,24,12 -o t.exr
+t "a cropped picture is placed and said" sh -c "'$P' colour.pbrt --spp 1 -o x.exr 2>&1 | grep 'its pixels are not those of its whole picture'"
+refused "its pixels are not those of its whole picture" colour.pbrt -q --strict --spp 1 -o x.exr
+echo "1..$n"
+exit $bad
