@@ -25,7 +25,7 @@
     X(flip, "visible difference of two images (LDR-FLIP)") \
     X(visible, "where the noise of an image is still seen, against a reference") \
     X(compare, "stop maps or thresholds against (human) thresholds") \
-    X(import_sin3d, "SIN3D images into block sequences") \
+    X(import, "pictures into block sequences") \
     X(label, "thresholds for recorded sequences: human, or a model observer's") \
     X(train, "train a stopping criterion on block sequences") \
     X(baseline, "train a published model before the network, as a criterion") \

@@ -384,11 +384,13 @@ static void warn_of_learned(const struct evaluation *j)
         }
 }
 
-/* A host asks a model at the samples that it has learned with, about blocks of its size. Where the recording has others, what
- * is judged here is not what a host would stop by. */
-static int warn_of_setting(const struct evaluation *j, const char *path, const struct ggn_model *model, struct base_err *err)
+/* A host asks a model at the samples that it has learned with, about blocks of its size. Where the recording has others,
+ * what is judged here is not what a host would stop by. */
+static int warn_of_setting(const struct evaluation *j, int index, struct base_err *err)
 {
     const struct ggn_series_set *s = &j->set.images;
+    const struct ggn_model *model = j->models[index];
+    const char *path = j->o->models[index];
     struct ggn_policy policy;
     char text[200];
     double asked, nearest;
@@ -452,7 +454,7 @@ static int load(struct evaluation *j, struct base_threads *threads, int *skipped
     if (!rc)
         warn_of_learned(j);
     for (int i = 0; i < o->n_models && !rc && job_rank(ggn_cmd_job) == 0; i++)
-        rc = warn_of_setting(j, o->models[i], j->models[i], err);
+        rc = warn_of_setting(j, i, err);
     return rc;
 }
 

@@ -62,18 +62,10 @@ int ggn_cmd_fail(const char *command, const struct base_err *err)
     return err->code == BASE_EINVAL || err->code == BASE_EIO ? GGN_EXIT_BAD_INPUT : GGN_EXIT_FAILED;
 }
 
-/* import_sin3d is typed as import-sin3d. */
-static int is_name(const char *typed, const char *name)
-{
-    while (*name && *typed == (*name == '_' ? '-' : *name))
-        typed++, name++;
-    return *name == '\0' && *typed == '\0';
-}
-
 static const struct command *find(const char *typed)
 {
     for (int i = 0; i < N_COMMANDS; i++)
-        if (is_name(typed, commands[i].name))
+        if (!strcmp(typed, commands[i].name))
             return &commands[i];
     return NULL;
 }
@@ -87,15 +79,11 @@ static int refuse(const char *text)
 /* `ggn` with options only. */
 static int main_options(int argc, char **argv)
 {
-    char doc[2048], name[32];
+    char doc[2048];
     size_t used = (size_t)snprintf(doc, sizeof doc,
                                    "Learned stopping criterion for path tracing: data, training, evaluation.\vCommands:\n");
-    for (int i = 0; i < N_COMMANDS && used < sizeof doc; i++) {
-        snprintf(name, sizeof name, "%s", commands[i].name);
-        for (char *p = name; *p; p++)
-            *p = *p == '_' ? '-' : *p;
-        used += (size_t)snprintf(doc + used, sizeof doc - used, "  %-12s %s\n", name, commands[i].help);
-    }
+    for (int i = 0; i < N_COMMANDS && used < sizeof doc; i++)
+        used += (size_t)snprintf(doc + used, sizeof doc - used, "  %-12s %s\n", commands[i].name, commands[i].help);
     if (used < sizeof doc)
         snprintf(doc + used, sizeof doc - used, "\n`ggn COMMAND --help` says more.");
     static const struct base_option none[] = {{0}};

@@ -127,6 +127,7 @@ static int follows(const struct ggn_policy *p, double from, double to)
 void ggn_policy_set_levels(struct ggn_policy *p, const double *spp, int n)
 {
     p->n_levels = 0;
+    n -= n > 1 && !follows(p, spp[n - 2], spp[n - 1]); /* a recording ends where it was told to */
     while (n > 1 && follows(p, spp[n - 2], spp[n - 1]))
         n--;
     p->n_levels = n < 2 ? 0 : n < GGN_POLICY_LEVELS ? n : GGN_POLICY_LEVELS;

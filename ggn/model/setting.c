@@ -37,7 +37,7 @@ size_t ggn_setting_difference(const struct ggn_setting *learned, const struct gg
 
 int ggn_setting_levels_differ(const struct ggn_policy *policy, const double *spp, int n, double *asked, double *nearest)
 {
-    int i = 0;
+    int i = 0, differ = 0;
 
     while (i < n && spp[i] < policy->first_spp)
         i++;
@@ -46,12 +46,11 @@ int ggn_setting_levels_differ(const struct ggn_policy *policy, const double *spp
         int k = i + 1;
         while (k + 1 < n && fabs(spp[k + 1] - next) <= fabs(spp[k] - next))
             k++;
-        if (next < spp[n - 1] && fabs(spp[k] - next) >= fmax(0.5 * step, 1 + 1e-9)) {
+        if (next < spp[n - 1] && fabs(spp[k] - next) >= fmax(0.5 * step, 1 + 1e-9) && differ++ == 0) {
             *asked = next;
             *nearest = spp[k];
-            return 1;
         }
         i = k;
     }
-    return 0;
+    return differ > 1;
 }

@@ -24,7 +24,7 @@ size_t ggn_setting_difference(const struct ggn_setting *learned, const struct gg
 
 /* Where levels, rising, are not those that a policy asks for: from the first image on, each next one is looked for, and the
  * nearest level must be less than half a step or one sample away. Returns 1 with the first that is not: the level that is
- * asked for, and the nearest. */
+ * asked for, and the nearest. A single one is the seam at the end of a recording. */
 int ggn_setting_levels_differ(const struct ggn_policy *policy, const double *spp, int n_levels, double *asked,
                               double *nearest);
 

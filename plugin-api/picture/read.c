@@ -65,17 +65,24 @@ int pic_encode(const char *name, struct pic_image *image, struct base_err *err)
     return 0;
 }
 
-int pic_read_display(const char *path, struct pic_image *out, struct base_err *err)
+int pic_read_light(const char *path, struct pic_image *out, struct base_err *err)
 {
     struct pic_image image;
     int rc = answer(&(struct pic_request){.wanted = PIC_DISPLAY, .name = path}, &image, err);
-    if (!rc && image.f32) {
-        rc = pic_encode(path, &image, err);
-        free(image.f32);
-        image.f32 = NULL;
-    }
+    if (!rc && image.f32 && (rc = pic_encode(path, &image, err)) != 0)
+        pic_release(&image);
     if (!rc)
         *out = image;
+    return rc;
+}
+
+int pic_read_display(const char *path, struct pic_image *out, struct base_err *err)
+{
+    int rc = pic_read_light(path, out, err);
+    if (!rc) {
+        free(out->f32);
+        out->f32 = NULL;
+    }
     return rc;
 }
 

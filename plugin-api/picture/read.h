@@ -24,6 +24,8 @@ int pic_read_memory(const char *name, const void *data, size_t size, struct pic_
 /* The sRGB codes that a display shows of the stored pixels, three channels, found in the same way. Those of integers
  * come as they are, those of light are made by pic_encode. Grey is repeated, alpha is dropped. */
 int pic_read_display(const char *path, struct pic_image *out, struct base_err *err);
+/* The same, and the light itself beside the codes where the file holds light. */
+int pic_read_light(const char *path, struct pic_image *out, struct base_err *err);
 /* The values of one channel, found by name ("lull.spp.V") in any part of the file. BASE_EINVAL if there is none. */
 int pic_read_channel(const char *path, const char *channel, struct pic_image *out, struct base_err *err);
 /* Of the first part, without its pixels: where they lie, and the attributes whose names are set. */

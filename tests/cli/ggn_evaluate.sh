@@ -1,5 +1,5 @@
 #!/bin/sh
-# import-sin3d, label, evaluate and reconstruct from the outside, on a small made-up view in the SIN3D layout.
+# import, label, evaluate and reconstruct from the outside, on a small made-up view in the SIN3D layout.
 . "$(dirname "$0")/ggn_setup"
 view=$tmp/sin3d/p3d_toy-view0_part6
 mkdir -p "$view"
@@ -10,15 +10,15 @@ for i in 1 2 3 4 5 6 7 8; do
         -o "$view/p3d_toy-view0_$(printf %05d $((20 * i))).png" >/dev/null 2>&1
 done
 printf 'p3d_toy-view0_part6;90;160;\n' >"$tmp/human.csv"
-$ggn import-sin3d "$tmp/sin3d" -o "$tmp/data" --block 32 --thresholds "$tmp/human.csv" >"$tmp/out" 2>"$tmp/err" &&
+$ggn import "$tmp/sin3d" -o "$tmp/data" --block 32 --thresholds "$tmp/human.csv" >"$tmp/out" 2>"$tmp/err" &&
     [ -s "$tmp/data/p3d_toy-view0_part6/manifest.json" ] && grep -q 'imported with thresholds' "$tmp/out"
 check "import a folder of views" $?
 d=$tmp/data/p3d_toy-view0_part6
 grep -q '"source":.*"human"' "$d/labels.json"
 check "imported thresholds are human labels" $?
-fails "import: nothing there" 'no NAME_' $ggn import-sin3d "$tmp/data" -o "$tmp/x"
-fails "import: missing folder" '/none: ' $ggn import-sin3d "$tmp/none" -o "$tmp/x"
-fails "import: thresholds that do not fit" '2 blocks, but 1' sh -c "printf 'p3d_toy-view0_part6;90;\n' >$tmp/one.csv; $ggn import-sin3d $tmp/sin3d -o $tmp/y --block 32 -t $tmp/one.csv"
+fails "import: nothing there" 'no NAME_' $ggn import "$tmp/data" -o "$tmp/x"
+fails "import: missing folder" '/none: ' $ggn import "$tmp/none" -o "$tmp/x"
+fails "import: thresholds that do not fit" '2 blocks, but 1' sh -c "printf 'p3d_toy-view0_part6;90;\n' >$tmp/one.csv; $ggn import $tmp/sin3d -o $tmp/y --block 32 -t $tmp/one.csv"
 
 $ggn evaluate -d "$tmp/data" --json >"$tmp/out" 2>"$tmp/err" && grep -q '"labels":.*"human"' "$tmp/out" && grep -q '"-spp"' "$tmp/out" &&
     ! grep -q halfbuf "$tmp/out"
@@ -38,7 +38,7 @@ $ggn label "$tmp/data" --human "$tmp/human.csv" >"$tmp/out" 2>"$tmp/err" && cmp 
 check "label --human: the thresholds that are there are the same labels" $?
 printf 'p3d_toy-view0_part6;90;161;\n' >"$tmp/other.csv"
 fails "label --human: other people's too" "thresholds of people would be lost" $ggn label "$tmp/data" --human "$tmp/other.csv"
-fails "import: so does it" "thresholds of people would be lost" $ggn import-sin3d "$tmp/sin3d" -o "$tmp/data" --block 32 -t "$tmp/other.csv"
+fails "import: so does it" "thresholds of people would be lost" $ggn import "$tmp/sin3d" -o "$tmp/data" --block 32 -t "$tmp/other.csv"
 cmp -s "$d/labels.json" "$tmp/people.json"
 check "  …and they are what they were" $?
 fails "baseline: nothing is written into the data" "labels.json: this is inside its data, " $ggn baseline attributes -d "$tmp/data" -o "$d/labels.json"
@@ -49,8 +49,8 @@ fails "reconstruct: nor a picture" "seen.png: this is inside its data, " $ggn re
 fails "label --calibrate: nor parameters" "labels.json: this is inside its data, " $ggn label "$tmp/data" --calibrate "$tmp/human.csv" -o "$d/labels.json"
 fails "label --calibrate: nor onto what it reads" "this is an input" $ggn label "$tmp/data" --calibrate "$tmp/human.csv" -o "$tmp/human.csv"
 fails "reconstruct: two pictures, one name" "--reference .*/none.png: the same file as --output" $ggn reconstruct "$d" -o "$tmp/./none.png" -r "$tmp/none.png"
-fails "import: a view into itself" "inside its data" $ggn import-sin3d "$view" -o "$view" --block 32
-fails "import: a view onto itself" "this is the view itself" $ggn import-sin3d "$view" -o "$tmp/sin3d" --block 32
+fails "import: a view into itself" "inside its data" $ggn import "$view" -o "$view" --block 32
+fails "import: a view onto itself" "this is the view itself" $ggn import "$view" -o "$tmp/sin3d" --block 32
 cmp -s "$d/labels.json" "$tmp/people.json" && [ ! -e "$tmp/none.png" ] && [ ! -e "$tmp/data/figures" ]
 check "  …and nothing has changed" $?
 

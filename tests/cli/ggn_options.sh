@@ -86,20 +86,20 @@ END
 $ggn label --fit-trials "$tmp/trials.csv" >"$tmp/out" 2>"$tmp/err" && grep -q 'spread 0\.\(5[5-9]\|6[0-5]\) octaves (1600 trials, 4 blocks, 0 lines' "$tmp/out"
 check "label --fit-trials finds the spread that the trials were made with" $?
 
-# --- import-sin3d: levels with a gap ------------------------------------------------------------------------------------------
+# --- import: levels with a gap ------------------------------------------------------------------------------------------
 view=$tmp/sin3d/p3d_toy-view0_part6
 mkdir -p "$view"
 for level in 20 40 60 100 120; do
     oiiotool --pattern constant:color=.4,.5,.6 32x32 3 -d uint8 -o "$view/p3d_toy-view0_$(printf %05d $level).png" >/dev/null 2>&1
 done
-$ggn import-sin3d "$tmp/sin3d" -o "$tmp/imported" --block 16 >"$tmp/out" 2>"$tmp/err"
+$ggn import "$tmp/sin3d" -o "$tmp/imported" --block 16 >"$tmp/out" 2>"$tmp/err"
 [ $? -eq 2 ] && grep -q 'allow-gaps' "$tmp/err"
-check "import-sin3d refuses levels with a gap, and says what would take them" $?
-$ggn import-sin3d "$tmp/sin3d" -o "$tmp/imported" --block 16 --allow-gaps >"$tmp/out" 2>"$tmp/err" &&
+check "import refuses levels with a gap, and says what would take them" $?
+$ggn import "$tmp/sin3d" -o "$tmp/imported" --block 16 --allow-gaps >"$tmp/out" 2>"$tmp/err" &&
     tr -d ' \n\t' <"$tmp/imported/p3d_toy-view0_part6/manifest.json" | grep -q '"levels":\[20,40,60,100,120\]'
-check "import-sin3d --allow-gaps" $?
+check "import --allow-gaps" $?
 [ "$(find "$tmp/imported" -name 'block-*' | wc -l)" -eq 4 ]
-check "import-sin3d --block: four of 16 pixels" $?
+check "import --block: four of 16 pixels" $?
 
 # --- flip -------------------------------------------------------------------------------------------------------------------
 oiiotool --pattern constant:color=.5,.5,.5 80x40 3 -d uint8 -o "$tmp/grey.png" \

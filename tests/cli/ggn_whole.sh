@@ -34,7 +34,7 @@ d=$tmp/d one=$tmp/d/train/one-view0
 
 # --- options: help, and both bounds of every number ----------------------------------------------------------------------------
 says help --help
-for command in bench golden inspect convert flip visible compare import-sin3d label train baseline evaluate cost reconstruct; do
+for command in bench golden inspect convert flip visible compare import label train baseline evaluate cost reconstruct; do
     says help "$command" --help
 done
 while read -r command options; do
@@ -46,7 +46,7 @@ convert type
 flip ppd
 visible block
 compare cap block
-import-sin3d block
+import block
 label source spread threads
 train preset seed window kr km kd crop batch-denoiser batch steps-denoiser steps epochs epoch-steps patience lr-denoiser lr difference soft-labels flips jitter picture average synthetic extend ratio validation-windows early-rate threads rank-timeout
 baseline epochs early ratio window type threads
@@ -61,7 +61,7 @@ says bounds evaluate -d none $(printf -- '--baseline m %.0s' 1 2 3 4 5 6 7 8 9)
 for option in model baseline thresholds; do # shellcheck disable=SC2046
     says bounds cost -d none $(printf -- "--$option m %.0s" 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17)
 done
-for word in "" frobnicate importsin3d import_sin3d -x; do says bounds $word; done
+for word in "" frobnicate import-sin3d import_ -x; do says bounds $word; done
 
 # --- labels --------------------------------------------------------------------------------------------------------------------
 printf '{"level": 0.25, "spread": 0.4, "each_view_left_out": [{"name": "four", "level": 0.2}, {"name": "five", "level": 0.3}]}\n' >"$tmp/o.json"
@@ -191,16 +191,16 @@ for view in p3d_toy-view0_part6 p3d_toy-view1; do
 done
 echo >"$tmp/sin3d/p3d_toy-view0_part6/notes.txt" && mkdir "$tmp/sin3d/.hidden" "$tmp/sin3d/nothing"
 printf 'p3d_toy-view0_part6;20;40;60;61;59.5;1\n' >"$tmp/p.csv"
-run import import-sin3d "$tmp/sin3d" -o "$tmp/imported" --block 16 -t "$tmp/p.csv"
-run import-again import-sin3d "$tmp/sin3d/p3d_toy-view1///" -o "$tmp/imported" --block 16
-run import-another import-sin3d "$tmp/sin3d/p3d_toy-view1" -o "$tmp/imported" --block 8
+run import import "$tmp/sin3d" -o "$tmp/imported" --block 16 -t "$tmp/p.csv"
+run import-again import "$tmp/sin3d/p3d_toy-view1///" -o "$tmp/imported" --block 16
+run import-another import "$tmp/sin3d/p3d_toy-view1" -o "$tmp/imported" --block 8
 cp "$tmp/imported/p3d_toy-view0_part6/manifest.json" "$got/imported-manifest" && cp "$tmp/imported/p3d_toy-view0_part6/labels.json" "$got/imported-labels"
 run import-picture reconstruct "$tmp/imported/p3d_toy-view0_part6" -o "$got/pictures/imported.png"
 run evaluate-imported evaluate -d "$tmp/imported" -w 2
-says import-errors import-sin3d "$tmp/sin3d/nothing" -o "$tmp/failed"
-says import-errors import-sin3d "$tmp/sin3d" -o "$tmp/failed" --block 15
-says import-errors import-sin3d "$tmp/none" -o "$tmp/failed"
-says import-errors import-sin3d "$tmp/sin3d" -o "$tmp/none/failed" --block 16
+says import-errors import "$tmp/sin3d/nothing" -o "$tmp/failed"
+says import-errors import "$tmp/sin3d" -o "$tmp/failed" --block 15
+says import-errors import "$tmp/none" -o "$tmp/failed"
+says import-errors import "$tmp/sin3d" -o "$tmp/none/failed" --block 16
 [ ! -e "$tmp/failed" ]
 check "an import that fails leaves nothing" $?
 

@@ -53,7 +53,7 @@ for command in flip visible; do
 done
 
 mkdir sin3d
-refused "sin3d" "$G" import-sin3d sin3d -o imported
+refused "sin3d" "$G" import sin3d -o imported
 t "a failed import leaves no folder" test ! -e imported
 echo "1..$n"
 exit $bad

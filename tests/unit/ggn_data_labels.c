@@ -672,7 +672,8 @@ int main(void)
                                        cmocka_unit_test(thresholds_are_told_word_by_word),
                                        cmocka_unit_test(datasets_are_told_word_by_word),
                                        cmocka_unit_test(chains_are_as_they_were),
-                                       cmocka_unit_test(scenes_are_held_out), cmocka_unit_test(models_bring_their_split),
+                                       cmocka_unit_test(scenes_are_held_out),
+                                       cmocka_unit_test(models_bring_their_split),
                                        cmocka_unit_test(windows_are_as_they_were)};
     return cmocka_run_group_tests_name("data_labels", tests, setup, teardown);
 }

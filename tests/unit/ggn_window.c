@@ -398,7 +398,7 @@ static void policies_are_adjusted(void **state)
 static void policies_list_their_levels(void **state)
 {
     static const double thinned[] = {16, 32, 48, 64, 80, 96, 112, 128, 144, 160, 176, 208, 240},
-                        geometric[] = {4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40}, even[] = {16, 32, 48, 64, 80, 96};
+                        geometric[] = {4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40, 42}, even[] = {16, 32, 48, 64, 80, 96};
     struct ggn_policy p = ggn_policy_default(), q;
     struct base_err err = {0};
     cJSON *root = cJSON_CreateObject();
@@ -427,7 +427,7 @@ static void policies_list_their_levels(void **state)
     cJSON_Delete(root);
     /* what ratio or step tell by themselves needs no list */
     p.ratio = 1.26;
-    ggn_policy_set_levels(&p, geometric, 11);
+    ggn_policy_set_levels(&p, geometric, 12); /* the last one is the end of the recording */
     assert_int_equal(p.n_levels, 0);
     p.ratio = 0;
     p.step_spp = 16;

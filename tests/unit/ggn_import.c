@@ -1,4 +1,5 @@
-/* The SIN3D layout on a small generated copy of it, the .rawls reader, and a real sequence when it is there. */
+/* Pictures into sequences: the SIN3D layout on a small generated copy of it; the .rawls reader; a real sequence when it is
+ * there. Other files and halves: tests/hosts/test_sequence.py. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,7 +17,7 @@
 #include "data/dataset.h"
 #include "picture/read.h"
 #include "data/rawls.h"
-#include "data/sin3d.h"
+#include "data/import.h"
 #include "support/ggn_transcript.h"
 #include "picture/png.h"
 
@@ -66,7 +67,7 @@ static const char *make_view(const char *name)
     return dir;
 }
 
-static const struct ggn_sin3d_options plain = {.block = BLOCK};
+static const struct ggn_import_options plain = {.block = BLOCK};
 
 static void layout(void **state)
 {
@@ -83,9 +84,9 @@ static void layout(void **state)
     mkdir(out, 0777);
     snprintf(out, sizeof out, "%s/out/toy", root);
     assert_int_equal(ggn_thresholds_parse_csv("t.csv", text, &t, NULL), 0);
-    struct ggn_sin3d_options o = plain;
+    struct ggn_import_options o = plain;
     o.thresholds = &t;
-    if (ggn_sin3d_import_view(dir, out, &o, &labelled, &err) != 0)
+    if (ggn_import_view(dir, out, &o, &labelled, &err) != 0)
         fail_msg("%s", err.text);
     assert_true(labelled);
     snprintf(out, sizeof out, "%s/out", root);
@@ -132,16 +133,16 @@ static void resume(void **state)
     m.n_blocks = 3; /* as if the run had stopped inside the second row */
     seq_manifest_write(out, &m, NULL);
     seq_manifest_release(&m);
-    if (ggn_sin3d_import_view(dir, out, &plain, &labelled, &err) != 0)
+    if (ggn_import_view(dir, out, &plain, &labelled, &err) != 0)
         fail_msg("%s", err.text);
     stat(path, &after);
     assert_true(before.st_ino == after.st_ino); /* the first row was not written again */
     seq_manifest_read(out, &m, NULL);
     assert_int_equal(m.n_blocks, 4);
     seq_manifest_release(&m);
-    struct ggn_sin3d_options other = plain;
+    struct ggn_import_options other = plain;
     other.block = SIDE;
-    assert_int_equal(ggn_sin3d_import_view(dir, out, &other, &labelled, &err), BASE_EINVAL);
+    assert_int_equal(ggn_import_view(dir, out, &other, &labelled, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "another sequence"));
 }
 
@@ -154,7 +155,7 @@ static void refuse(const char *name, void (*spoil)(const char *dir), const char 
     const char *dir = make_view(name);
     spoil(dir);
     snprintf(out, sizeof out, "%s/refused", root);
-    if (ggn_sin3d_import_view(dir, out, &plain, &labelled, &err) != BASE_EINVAL)
+    if (ggn_import_view(dir, out, &plain, &labelled, &err) != BASE_EINVAL)
         fail_msg("%s was accepted", name);
     if (!strstr(err.text, why))
         fail_msg("%s: '%s' does not say '%s'", name, err.text, why);
@@ -186,13 +187,13 @@ static void bad_layouts(void **state)
     refuse("single", one_level, "1 levels");
     refuse("stranger", stranger, "does not belong");
     refuse("odd", odd_size, "not a multiple");
-    struct ggn_sin3d_options o = plain;
+    struct ggn_import_options o = plain;
     char dir[600], out[600];
     int labelled;
     o.allow_gaps = 1;
     snprintf(dir, sizeof dir, "%s/gap", root);
     snprintf(out, sizeof out, "%s/gapped", root);
-    assert_int_equal(ggn_sin3d_import_view(dir, out, &o, &labelled, NULL), 0);
+    assert_int_equal(ggn_import_view(dir, out, &o, &labelled, NULL), 0);
 }
 
 static void scene_names(void **state)
@@ -204,7 +205,7 @@ static void scene_names(void **state)
                                            {"p3d_arcsphere", "p3d_arcsphere"}};
     for (size_t i = 0; i < 4; i++) {
         char scene[64];
-        ggn_sin3d_scene(pairs[i][0], scene, sizeof scene);
+        ggn_import_scene(pairs[i][0], scene, sizeof scene);
         assert_string_equal(scene, pairs[i][1]);
     }
 }
@@ -278,7 +279,7 @@ static void rawls_layout(void **state)
         assert_int_equal(fwrite(file, 1, n, f), n);
         fclose(f);
     }
-    if (ggn_sin3d_import_view(dir, out, &plain, &labelled, &err) != 0 || seq_manifest_read(out, &m, &err) != 0 ||
+    if (ggn_import_view(dir, out, &plain, &labelled, &err) != 0 || seq_manifest_read(out, &m, &err) != 0 ||
         seq_manifest_read_block(out, &m, 1, &b, &err) != 0)
         fail_msg("%s", err.text);
     assert_int_equal(seq_mean(&b, &b.levels[0], back, &err), 0);
@@ -305,8 +306,8 @@ static void real_sequence(void **state)
     mkdir(copy, 0777);
     shell("cp %s/*_05000.png %s/", dir, copy);
     shell("cp %s/*_10000.png %s/", dir, copy);
-    struct ggn_sin3d_options o = {.block = 200, .allow_gaps = 1};
-    if (ggn_sin3d_import_view(copy, out, &o, &labelled, &err) != 0 || seq_manifest_read(out, &m, &err) != 0)
+    struct ggn_import_options o = {.block = 200, .allow_gaps = 1};
+    if (ggn_import_view(copy, out, &o, &labelled, &err) != 0 || seq_manifest_read(out, &m, &err) != 0)
         fail_msg("%s", err.text);
     assert_int_equal(m.n_blocks, 16);
     assert_string_equal(m.scene, "p3d_cornel-box");
@@ -343,7 +344,7 @@ static void names_of_levels(FILE *f)
         else
             snprintf(name, sizeof name, "%0*d_20.png", (int)more + GGN_VIEW_NAME - 2, 0);
         put("%s/name/%s", name, "");
-        fprintf(f, "%s: %d\n", name, ggn_sin3d_is_view(dir));
+        fprintf(f, "%s: %d\n", name, ggn_import_is_view(dir));
         shell("rm -r %s%s", dir, "");
     }
 }
@@ -353,14 +354,14 @@ static void tell_progress(void *data, const char *view, int done, int of)
     fprintf(data, "  %s %d of %d\n", view, done, of);
 }
 
-static void tell_import(FILE *f, const char *name, const char *dir, const char *out, const struct ggn_sin3d_options *o)
+static void tell_import(FILE *f, const char *name, const char *dir, const char *out, const struct ggn_import_options *o)
 {
     struct base_err err = {0};
     struct seq_manifest m;
     struct ggn_labels l;
     int labelled = -1;
     fprintf(f, "%s: ", name);
-    if (ggn_sin3d_import_view(dir, out, o, &labelled, &err)) {
+    if (ggn_import_view(dir, out, o, &labelled, &err)) {
         fprintf(f, "%s; %s\n", err.text, access(out, F_OK) == 0 ? "the folder is there" : "nothing is there");
         return;
     }
@@ -418,7 +419,7 @@ static void views_are_told_word_by_word(void **state)
     (void)state;
     names_of_levels(f);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        struct ggn_sin3d_options o = {
+        struct ggn_import_options o = {
             .block = cases[i].block, .allow_gaps = cases[i].gaps, .progress = i == 0 ? tell_progress : NULL, .data = f};
         struct ggn_thresholds thresholds = {0};
         char csv[200];
@@ -433,7 +434,7 @@ static void views_are_told_word_by_word(void **state)
         tell_import(f, cases[i].name, dir, out, &o);
         if (i == 0) { /* and once more, with other options */
             tell_import(f, "again", dir, out, &o);
-            tell_import(f, "in larger blocks", dir, out, &(struct ggn_sin3d_options){.block = SIDE});
+            tell_import(f, "in larger blocks", dir, out, &(struct ggn_import_options){.block = SIDE});
             snprintf(out, sizeof out, "%s/none/x", root);
             tell_import(f, "into no folder", dir, out, &o);
             tell_import(f, "nothing", out, dir, &o);
@@ -581,5 +582,5 @@ int main(void)
         cmocka_unit_test(rawls_are_told_word_by_word),
         cmocka_unit_test(pictures_of_others),
     };
-    return cmocka_run_group_tests_name("import_sin3d", tests, setup, teardown);
+    return cmocka_run_group_tests_name("import", tests, setup, teardown);
 }

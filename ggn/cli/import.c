@@ -1,4 +1,4 @@
-/* `ggn import-sin3d DIR`: the public SIN3D layout into block sequences. */
+/* `ggn import DIR`: pictures of rising sample counts into block sequences. */
 #include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
@@ -11,7 +11,7 @@
 #include "base/interrupt.h"
 #include "base/options.h"
 #include "cli/commands.h"
-#include "data/sin3d.h"
+#include "data/import.h"
 
 struct options {
     const char *dir, *thresholds, *out;
@@ -25,7 +25,7 @@ static const struct base_option list[] = {
     {"thresholds", 't', "CSV", TO(thresholds), .input = BASE_FILE,
      .help = "human thresholds, name;t0;…;t15; (written as labels)"},
     {"block", 'b', "PIXELS", TO(block), 1, 4096, .help = "side of a block (200)"},
-    {"allow-gaps", 'g', NULL, TO(allow_gaps), .help = "take levels that are not evenly spaced"},
+    {"allow-gaps", 'g', NULL, TO(allow_gaps), .help = "take evenly spaced levels of which some are missing"},
     {0}};
 
 static void show_progress(void *data, const char *view, int done, int of)
@@ -34,7 +34,7 @@ static void show_progress(void *data, const char *view, int done, int of)
     fprintf(stderr, "\r%s: %d of %d images%s", view, done, of, done == of ? "\n" : "");
 }
 
-static int import_one(const struct options *o, const struct ggn_sin3d_options *so, const char *dir, struct base_err *err)
+static int import_one(const struct options *o, const struct ggn_import_options *so, const char *dir, struct base_err *err)
 {
     char copy[4096], out[4096];
     int labelled = 0;
@@ -45,7 +45,7 @@ static int import_one(const struct options *o, const struct ggn_sin3d_options *s
     if (!rc && base_file_is_same(out, copy))
         rc = base_fail(err, BASE_EINVAL, "%s: this is the view itself; --output names another folder", out);
     if (!rc)
-        rc = ggn_sin3d_import_view(copy, out, so, &labelled, err);
+        rc = ggn_import_view(copy, out, so, &labelled, err);
     if (!rc)
         printf("%s: %s\n", out, labelled ? "imported with thresholds" : "imported, no thresholds for it");
     return rc;
@@ -54,7 +54,7 @@ static int import_one(const struct options *o, const struct ggn_sin3d_options *s
 static int compare_names(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
 /* Every view folder in the root, in order of name. */
-static int import_all(const struct options *o, const struct ggn_sin3d_options *so, struct base_err *err)
+static int import_all(const struct options *o, const struct ggn_import_options *so, struct base_err *err)
 {
     DIR *d = opendir(o->dir);
     char **names = NULL;
@@ -81,7 +81,7 @@ static int import_all(const struct options *o, const struct ggn_sin3d_options *s
         int length = snprintf(path, sizeof path, "%s/%s", o->dir, names[i]);
         struct stat st;
         if (length < 0 || (size_t)length >= sizeof path || stat(path, &st) != 0 || !S_ISDIR(st.st_mode) ||
-            !ggn_sin3d_is_view(path))
+            !ggn_import_is_view(path))
             continue;
         found++;
         rc = import_one(o, so, path, err);
@@ -90,11 +90,11 @@ static int import_all(const struct options *o, const struct ggn_sin3d_options *s
         free(names[i]);
     free(names);
     if (!rc && !found)
-        rc = base_fail(err, BASE_EINVAL, "%s: no NAME_00020.png … in it or in its folders", o->dir);
+        rc = base_fail(err, BASE_EINVAL, "%s: no NAME_00020.png (.jpg, .exr, .rawls) … in it or in its folders", o->dir);
     return rc;
 }
 
-int ggn_cmd_import_sin3d(int argc, char **argv)
+int ggn_cmd_import(int argc, char **argv)
 {
     static const struct base_options options = {
         .list = list,
@@ -102,9 +102,9 @@ int ggn_cmd_import_sin3d(int argc, char **argv)
         .args_min = 1,
         .args_max = 1,
         .args = offsetof(struct options, dir),
-        .doc = "Reads views in the layout of the public SIN3D data set (VIEW_part6/VIEW_00020.png … or .rawls; DIR is one "
-               "view or "
-               "the folder of all) into block sequences. Running it again continues where it stopped."};
+        .doc = "Reads pictures of rising sample counts (VIEW/NAME_00020.png …, .jpg, .exr or .rawls; DIR is one view or the "
+               "folder of all) into block sequences, with the halves of their samples where there are any "
+               "(NAME_half_00020.exr …, or the layer half). Running it again continues where it stopped."};
     struct options o = {.block = 200};
     struct ggn_thresholds thresholds = {0};
     struct base_err err = {0};
@@ -113,7 +113,7 @@ int ggn_cmd_import_sin3d(int argc, char **argv)
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
     base_interrupt_catch();
-    struct ggn_sin3d_options so = {
+    struct ggn_import_options so = {
         .block = o.block, .allow_gaps = o.allow_gaps, .progress = isatty(2) ? show_progress : NULL};
     if (o.thresholds) {
         rc = ggn_thresholds_read(o.thresholds, o.block, &thresholds, &err);
@@ -123,7 +123,7 @@ int ggn_cmd_import_sin3d(int argc, char **argv)
     if (!rc && !made && errno != EEXIST)
         rc = base_fail(&err, BASE_EIO, "%s: %s", o.out, strerror(errno));
     if (!rc)
-        rc = ggn_sin3d_is_view(o.dir) ? import_one(&o, &so, o.dir, &err) : import_all(&o, &so, &err);
+        rc = ggn_import_is_view(o.dir) ? import_one(&o, &so, o.dir, &err) : import_all(&o, &so, &err);
     ggn_thresholds_release(&thresholds);
     if (rc && made)
         rmdir(o.out); /* goes only if nothing was imported */

@@ -1,0 +1,534 @@
+#include "data/import.h"
+
+#include <ctype.h>
+#include <dirent.h>
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/colour.h"
+#include "base/files.h"
+#include "data/labels.h"
+#include "picture/read.h"
+#include "sequence/builder.h"
+#include "sequence/manifest.h"
+#include "sequence/statistics.h"
+#include "data/rawls.h"
+
+struct level {
+    uint32_t spp;
+    char file[256], half[256]; /* half: the mean of the first half of the samples; "": none */
+};
+
+struct view {
+    char dir[4096], prefix[GGN_VIEW_NAME];
+    const char *ending;   /* of all files, static */
+    int n, has_layers;    /* has_layers: the files hold the halves themselves */
+    struct level *levels; /* owns; rising */
+};
+
+static const char HALF[] = "half"; /* behind a file's name, or the layer */
+static const char *const endings[] = {".png", ".exr", ".jpg", ".jpeg", ".rawls", NULL};
+
+/* NAME_00020.png -> length of NAME, samples, whether it is NAME_half; 0: no level has such a name. Between name and number
+ * stands '_', '-' or '.'. */
+static size_t split_name(const char *name, uint32_t *spp, int *is_half, const char **ending)
+{
+    const char *dot = strrchr(name, '.'), *digits = dot;
+    int i = 0;
+    while (endings[i] && (!dot || strcmp(dot, endings[i]) != 0))
+        i++;
+    if (!endings[i])
+        return 0;
+    while (digits > name && isdigit((unsigned char)digits[-1]))
+        digits--;
+    if (digits == dot || dot - digits > 9 || digits - name < 2 || !strchr("_-.", digits[-1]))
+        return 0;
+    *spp = (uint32_t)strtoul(digits, NULL, 10);
+    *ending = endings[i];
+    size_t length = (size_t)(digits - 1 - name);
+    const size_t half = sizeof HALF - 1;
+    *is_half = length > half + 1 && !memcmp(name + length - half, HALF, half) && strchr("_-.", name[length - half - 1]);
+    return *spp > 0 ? length - (*is_half ? half + 1 : 0) : 0;
+}
+
+static int compare_levels(const void *a, const void *b)
+{
+    uint32_t x = ((const struct level *)a)->spp, y = ((const struct level *)b)->spp;
+    return (x > y) - (x < y);
+}
+
+/* The level of so many samples; a new one where there is none. NULL: out of memory. */
+static struct level *find_level(struct view *v, uint32_t spp)
+{
+    for (int i = 0; i < v->n; i++)
+        if (v->levels[i].spp == spp)
+            return &v->levels[i];
+    struct level *levels = realloc(v->levels, (size_t)(v->n + 1) * sizeof *levels);
+    if (!levels)
+        return NULL;
+    v->levels = levels;
+    levels[v->n] = (struct level){.spp = spp};
+    return &levels[v->n++];
+}
+
+static int add_file(struct view *v, const char *name, struct base_err *err)
+{
+    uint32_t spp;
+    int is_half;
+    const char *ending;
+    size_t length = split_name(name, &spp, &is_half, &ending);
+    if (length == 0)
+        return 0;
+    if (length >= sizeof v->prefix || strlen(name) >= sizeof v->levels->file)
+        return base_fail(err, BASE_EINVAL, "%s/%s: the name is too long", v->dir, name);
+    if (v->n == 0) {
+        memcpy(v->prefix, name, length);
+        v->ending = ending;
+    } else if (strncmp(v->prefix, name, length) != 0 || v->prefix[length] != '\0' || v->ending != ending) {
+        return base_fail(err, BASE_EINVAL, "%s: '%s' does not belong to the sequence '%s'", v->dir, name, v->prefix);
+    }
+    struct level *level = find_level(v, spp);
+    if (!level)
+        return base_fail_nomem(err, v->dir);
+    char *file = is_half ? level->half : level->file;
+    if (file[0])
+        return base_fail(err, BASE_EINVAL, "%s: two images for %u spp", v->dir, spp);
+    strcpy(file, name);
+    return 0;
+}
+
+static int scan(const char *dir, struct view *v, struct base_err *err)
+{
+    snprintf(v->dir, sizeof v->dir, "%s", dir);
+    DIR *d = opendir(dir);
+    if (!d)
+        return base_fail(err, BASE_EIO, "%s: %s", dir, strerror(errno));
+    int rc = 0;
+    for (const struct dirent *e; !rc && (e = readdir(d));)
+        rc = add_file(v, e->d_name, err);
+    closedir(d);
+    if (v->n > 0)
+        qsort(v->levels, (size_t)v->n, sizeof *v->levels, compare_levels);
+    return rc;
+}
+
+/* Samples of the first level that an evenly spaced sequence lacks: most steps are the smallest one, and the others are
+ * multiples of it. 0: none, or the levels follow another rule. */
+static uint32_t missing_level(const struct view *v)
+{
+    uint32_t step = UINT32_MAX, missing = 0;
+    int even = 0, multiples = 0;
+    for (int i = 1; i < v->n; i++)
+        if (v->levels[i].spp - v->levels[i - 1].spp < step)
+            step = v->levels[i].spp - v->levels[i - 1].spp;
+    for (int i = 1; i < v->n; i++) {
+        const uint32_t here = v->levels[i].spp - v->levels[i - 1].spp;
+        even += here == step;
+        multiples += here % step == 0;
+        missing = !missing && here != step ? v->levels[i - 1].spp + step : missing;
+    }
+    return 2 * even > v->n - 1 && multiples == v->n - 1 ? missing : 0;
+}
+
+static int check_levels(const struct view *v, int allow_gaps, struct base_err *err)
+{
+    int halves = 0;
+    if (v->n < 2 || v->n > SEQ_MAX_RECORDS - 1)
+        return base_fail(err, BASE_EINVAL, "%s: %d levels (at least 2 are needed)", v->dir, v->n);
+    for (int i = 0; i < v->n; i++) {
+        if (!v->levels[i].file[0])
+            return base_fail(err, BASE_EINVAL, "%s/%s: a half without the image of all %u samples", v->dir,
+                             v->levels[i].half, v->levels[i].spp);
+        halves += v->levels[i].half[0] != '\0';
+    }
+    if (halves && halves < v->n)
+        return base_fail(err, BASE_EINVAL, "%s: %d of %d levels have a half; all or none are needed", v->dir, halves, v->n);
+    if (v->levels[0].spp < 2 && halves)
+        return base_fail(err, BASE_EINVAL, "%s: the half of one sample", v->dir);
+    const uint32_t missing = allow_gaps ? 0 : missing_level(v);
+    return missing ? base_fail(err, BASE_EINVAL, "%s: the level at %u spp is missing (--allow-gaps takes what is there)",
+                               v->dir, missing)
+                   : 0;
+}
+
+int ggn_import_is_view(const char *dir)
+{
+    struct view v = {0};
+    int ok = scan(dir, &v, NULL) == 0 && v.n > 0;
+    free(v.levels);
+    return ok;
+}
+
+void ggn_import_scene(const char *view, char *scene, size_t room)
+{
+    const char *cut = NULL;
+    for (const char *p = view; (p = strstr(p, "view")) != NULL; p++)
+        if (p > view && (p[-1] == '-' || p[-1] == '_') && isdigit((unsigned char)p[4]))
+            cut = p - 1;
+    snprintf(scene, room, "%.*s", cut ? (int)(cut - view) : (int)strlen(view), view);
+}
+
+/* --- pictures --------------------------------------------------------------------------------------------------------- */
+
+static int check_finite(const char *path, const struct pic_image *p, struct base_err *err)
+{
+    const size_t n = p->f32 ? 3 * (size_t)p->width * (size_t)p->height : 0;
+    for (size_t i = 0; i < n; i++)
+        if (!isfinite(p->f32[i]))
+            return base_fail(err, BASE_EINVAL, "%s: pixel %zu,%zu is not finite", path, i / 3 % (size_t)p->width,
+                             i / 3 / (size_t)p->width);
+    return 0;
+}
+
+/* Codes and, from files of light, linear values. */
+static int read_picture(const struct view *v, const char *file, struct pic_image *p, struct base_err *err)
+{
+    char path[4400];
+    snprintf(path, sizeof path, "%s/%s", v->dir, file);
+    int rc = strcmp(v->ending, ".rawls") == 0 ? ggn_rawls_read(path, p, err) : pic_read_light(path, p, err);
+    if (rc)
+        return rc;
+    rc = p->u8 ? 0 : pic_encode(path, p, err);
+    if (!rc)
+        rc = check_finite(path, p, err);
+    if (rc)
+        pic_release(p);
+    return rc;
+}
+
+/* The layer of the first half of the samples; *there 0: the file has none. */
+static int read_layer(const struct view *v, const char *file, struct pic_image *p, int *there, struct base_err *err)
+{
+    static const char names[] = "RGB";
+    struct pic_image channel[3] = {{0}};
+    char path[4400], name[16];
+    int rc = 0, n = 0;
+    snprintf(path, sizeof path, "%s/%s", v->dir, file);
+    for (; n < 3 && !rc; n += !rc) {
+        snprintf(name, sizeof name, "%s.%c", HALF, names[n]);
+        rc = pic_read_channel(path, name, &channel[n], err);
+    }
+    *there = n > 0 || rc != BASE_EINVAL;
+    const size_t pixels = rc ? 0 : (size_t)channel[0].width * (size_t)channel[0].height;
+    float *rgb = rc ? NULL : malloc(3 * pixels * sizeof *rgb);
+    if (!rc && !rgb)
+        rc = base_fail_nomem(err, path);
+    for (size_t i = 0; i < 3 * pixels && !rc; i++)
+        rgb[i] = channel[i % 3].f32[i / 3];
+    if (!rc)
+        *p = (struct pic_image){
+            .width = channel[0].width, .height = channel[0].height, .channels = 3, .is_float_file = 1, .f32 = rgb};
+    for (int c = 0; c < n; c++)
+        pic_release(&channel[c]);
+    if (!rc && (rc = check_finite(path, p, err)) != 0)
+        pic_release(p);
+    return rc;
+}
+
+/* The level's image and the half of its samples, if there is one. */
+struct pair {
+    struct pic_image all, half;
+    int has_half;
+};
+
+static void pair_release(struct pair *p)
+{
+    pic_release(&p->all);
+    pic_release(&p->half);
+}
+
+static int read_pair(const struct view *v, const struct level *level, struct pair *p, struct base_err *err)
+{
+    int there = 1, rc = read_picture(v, level->file, &p->all, err);
+    if (rc)
+        return rc;
+    p->has_half = level->half[0] || v->has_layers;
+    if (level->half[0])
+        rc = read_picture(v, level->half, &p->half, err);
+    else if (v->has_layers)
+        rc = read_layer(v, level->file, &p->half, &there, err);
+    if (!rc && p->has_half && (p->half.width != p->all.width || p->half.height != p->all.height))
+        rc = base_fail(err, BASE_EINVAL, "%s/%s: %dx%d, its half has %dx%d", v->dir, level->file, p->all.width,
+                       p->all.height, p->half.width, p->half.height);
+    if (rc)
+        pair_release(p);
+    return rc;
+}
+
+static int has_layers(const struct view *v)
+{
+    struct pic_image half = {0};
+    int there = 0, rc = 1;
+    if (!strcmp(v->ending, ".exr") && !v->levels[0].half[0])
+        rc = read_layer(v, v->levels[0].file, &half, &there, NULL);
+    if (!rc)
+        pic_release(&half);
+    return !rc;
+}
+
+/* Work on one row of blocks: all its builders fill level by level, so that each image is read once per row. */
+struct row {
+    int columns, block, y0;
+    struct seq_builder *builders; /* [columns] */
+    uint8_t *display;             /* [3][block^2] */
+    double *mean, *first, *half;  /* the same, linear: of all samples, of the first half, half their difference */
+    double *none, *scratch;       /* [block^2] */
+};
+
+static double value_of(const struct pic_image *p, size_t at)
+{
+    return p->f32 ? (double)p->f32[at] : base_srgb_eotf(p->u8[at] / 255.0);
+}
+
+/* D = (A - B) / 2 where A is the mean of the first h of n samples, B that of the others. */
+static double difference(double all, double first, double n, double h) { return 0.5 * n / (n - h) * (first - all); }
+
+static void cut_block(const struct row *row, const struct pair *p, int x0, uint32_t spp)
+{
+    const size_t pixels = (size_t)row->block * (size_t)row->block;
+    for (int y = 0; y < row->block; y++)
+        for (int x = 0; x < row->block; x++)
+            for (size_t c = 0; c < 3; c++) {
+                size_t from = ((size_t)(row->y0 + y) * (size_t)p->all.width + (size_t)(x0 + x)) * 3 + c;
+                size_t to = c * pixels + (size_t)y * (size_t)row->block + (size_t)x;
+                row->display[to] = p->all.u8[from];
+                if (p->all.f32 || p->has_half)
+                    row->mean[to] = value_of(&p->all, from);
+                if (!p->has_half)
+                    continue;
+                row->first[to] = value_of(&p->half, from);
+                row->half[to] = difference(row->mean[to], row->first[to], spp, spp / 2);
+            }
+}
+
+/* What can be told without the samples' squares: errors by the half buffer, its tail. */
+static uint32_t tell(const struct row *row, uint32_t spp, struct seq_stat stats[SEQ_STATISTICS])
+{
+    static const int known[] = {SEQ_DAMMERTZ, SEQ_HALF_UNSETTLED, SEQ_TAIL999, SEQ_GINI};
+    struct seq_stat all[SEQ_STATISTICS];
+    seq_statistics(row->mean, row->first, row->half, row->none, (size_t)row->block * (size_t)row->block, spp, row->scratch,
+                   all);
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+        stats[i] = all[known[i]];
+    return sizeof known / sizeof known[0];
+}
+
+static int add_picture(struct row *row, const struct pair *p, uint32_t spp, int full, int is_reference, struct base_err *err)
+{
+    int rc = 0;
+    for (int c = 0; c < row->columns && !rc; c++) {
+        struct seq_stat stats[SEQ_STATISTICS];
+        cut_block(row, p, c * row->block, spp);
+        struct seq_frame f = {.spp = spp, .is_reference = is_reference, .display = row->display};
+        f.mean = p->all.f32 || p->has_half ? row->mean : NULL;
+        if (p->has_half) {
+            f.half = row->half;
+            f.half_spp = spp / 2;
+            f.full = full;
+            f.stats = stats;
+            f.n_stats = tell(row, spp, stats);
+        }
+        rc = seq_builder_add(&row->builders[c], &f, err);
+    }
+    return rc;
+}
+
+/* The level from which others are simulated. */
+static int full_level(const struct view *v)
+{
+    int i = 0;
+    while (i + 1 < v->n && v->levels[i].spp < 320)
+        i++;
+    return i;
+}
+
+static int fill_row(const struct view *v, const struct seq_manifest *m, struct row *row, const struct ggn_import_options *o,
+                    int base, struct base_err *err)
+{
+    int rc = 0;
+    for (int i = 0; i < v->n && !rc; i++) {
+        struct pair p = {0};
+        rc = read_pair(v, &v->levels[i], &p, err);
+        if (rc)
+            return rc;
+        if ((uint32_t)p.all.width != m->width || (uint32_t)p.all.height != m->height)
+            rc = base_fail(err, BASE_EINVAL, "%s/%s: %dx%d, the other levels are %ux%u", v->dir, v->levels[i].file,
+                           p.all.width, p.all.height, m->width, m->height);
+        if (!rc)
+            rc = add_picture(row, &p, v->levels[i].spp, i == full_level(v), 0, err);
+        if (!rc && i + 1 == v->n && m->reference_spp)
+            rc = add_picture(row, &p, v->levels[i].spp, 0, 1, err);
+        pair_release(&p);
+        if (o->progress)
+            o->progress(o->data, v->prefix, base + i + 1, (int)(m->height / m->block) * v->n);
+    }
+    return rc;
+}
+
+static void row_release(struct row *row)
+{
+    for (int c = 0; c < row->columns && row->builders; c++)
+        seq_builder_release(&row->builders[c]);
+    free(row->builders);
+    free(row->display);
+    free(row->mean); /* one allocation of all doubles */
+}
+
+static int row_init(struct row *row, const struct view *v, const struct seq_manifest *m, int index, struct base_err *err)
+{
+    const size_t pixels = (size_t)m->block * m->block;
+    *row = (struct row){.columns = (int)(m->width / m->block), .block = (int)m->block, .y0 = index * (int)m->block};
+    row->builders = calloc((size_t)row->columns, sizeof *row->builders);
+    row->display = malloc(3 * pixels);
+    row->mean = calloc(11 * pixels, sizeof *row->mean);
+    if (!row->builders || !row->display || !row->mean)
+        return base_fail_nomem(err, v->dir);
+    row->first = row->mean + 3 * pixels;
+    row->half = row->first + 3 * pixels;
+    row->none = row->half + 3 * pixels;
+    row->scratch = row->none + pixels;
+    return 0;
+}
+
+static int import_row(const struct view *v, const char *out, struct seq_manifest *m, int index,
+                      const struct ggn_import_options *o, struct base_err *err)
+{
+    const uint32_t block = m->block;
+    struct row row;
+    int rc = row_init(&row, v, m, index, err);
+    for (int c = 0; c < row.columns && !rc; c++)
+        rc = seq_builder_init(&row.builders[c], block, block, c * (int)block, row.y0, (uint32_t)(index * row.columns + c), 0,
+                              err);
+    if (!rc)
+        rc = fill_row(v, m, &row, o, index * v->n, err);
+    for (int c = 0; c < row.columns && !rc; c++) {
+        uint32_t x0 = (uint32_t)c * block, y0 = (uint32_t)row.y0;
+        struct seq_manifest_block *b = &m->blocks[m->n_blocks];
+        char path[4200];
+        *b = (struct seq_manifest_block){
+            .id = (uint32_t)(index * row.columns + c), .x0 = x0, .y0 = y0, .x1 = x0 + block, .y1 = y0 + block};
+        snprintf(b->file, sizeof b->file, "block-%05u.lseq", b->id);
+        snprintf(path, sizeof path, "%s/%s", out, b->file);
+        rc = seq_builder_write(&row.builders[c], path, &b->crc32, err);
+        b->bytes = row.builders[c].size;
+        m->n_blocks += !rc;
+    }
+    row_release(&row);
+    return rc;
+}
+
+static int init_manifest(const struct view *v, const struct ggn_import_options *o, struct seq_manifest *m,
+                         struct base_err *err)
+{
+    const int has_halves = v->has_layers || v->levels[0].half[0];
+    struct pic_image first;
+    int rc = read_picture(v, v->levels[0].file, &first, err);
+    if (rc)
+        return rc;
+    *m = (struct seq_manifest){.width = (uint32_t)first.width,
+                               .height = (uint32_t)first.height,
+                               .block = (uint32_t)o->block,
+                               .reference_spp = has_halves ? 0 : v->levels[v->n - 1].spp,
+                               .reference_independent = has_halves,
+                               .n_levels = (uint32_t)v->n};
+    pic_release(&first);
+    ggn_import_scene(v->prefix, m->scene, sizeof m->scene);
+    snprintf(m->source, sizeof m->source, "%.255s", v->prefix);
+    snprintf(m->renderer, sizeof m->renderer, "imported");
+    if (m->width % m->block != 0 || m->height % m->block != 0)
+        return base_fail(err, BASE_EINVAL, "%s: %ux%u is not a multiple of the block of %u", v->dir, m->width, m->height,
+                         m->block);
+    size_t blocks = (size_t)(m->width / m->block) * (m->height / m->block);
+    m->levels = malloc((size_t)v->n * sizeof *m->levels);
+    m->blocks = malloc(blocks * sizeof *m->blocks);
+    if (!m->levels || !m->blocks)
+        return base_fail_nomem(err, v->dir);
+    for (int i = 0; i < v->n; i++)
+        m->levels[i] = v->levels[i].spp;
+    return 0;
+}
+
+/* Takes over the blocks of an earlier run with the same images. Whole rows only. */
+static int take_over(const char *out, struct seq_manifest *m, struct base_err *err)
+{
+    struct seq_manifest old;
+    char path[4200];
+    struct stat st;
+    snprintf(path, sizeof path, "%s/manifest.json", out);
+    if (stat(path, &st) != 0)
+        return 0;
+    int rc = seq_manifest_read(out, &old, err);
+    if (rc)
+        return rc;
+    uint32_t columns = m->width / m->block, most = columns * (m->height / m->block);
+    if (old.width != m->width || old.height != m->height || old.block != m->block || strcmp(old.source, m->source) != 0 ||
+        old.n_levels != m->n_levels || memcmp(old.levels, m->levels, m->n_levels * sizeof *m->levels) != 0)
+        rc = base_fail(err, BASE_EINVAL, "%s: holds another sequence already", out);
+    else if (old.n_blocks <= most) {
+        m->n_blocks = old.n_blocks / columns * columns;
+        memcpy(m->blocks, old.blocks, m->n_blocks * sizeof *m->blocks);
+    }
+    seq_manifest_release(&old);
+    return rc;
+}
+
+static int attach_thresholds(const struct view *v, const char *out, const struct seq_manifest *m,
+                             const struct ggn_thresholds *t, int *labelled, struct base_err *err)
+{
+    char with_part[GGN_VIEW_NAME + 8];
+    snprintf(with_part, sizeof with_part, "%s_part6", v->prefix);
+    const struct ggn_view *row = !t ? NULL : ggn_thresholds_find(t, with_part);
+    if (t && !row)
+        row = ggn_thresholds_find(t, v->prefix);
+    if (t && !row)
+        row = ggn_thresholds_find(t, base_file_name(v->dir));
+    *labelled = row != NULL;
+    if (!row)
+        return 0;
+    struct ggn_labels labels;
+    struct base_err why = {0};
+    int rc = ggn_thresholds_label(row, m, &labels, &why);
+    if (rc)
+        return base_fail(err, why.code, "%s: %s", v->dir, why.text);
+    rc = ggn_labels_write(out, &labels, 0, err);
+    ggn_labels_release(&labels);
+    return rc;
+}
+
+int ggn_import_view(const char *dir, const char *out, const struct ggn_import_options *o, int *labelled,
+                    struct base_err *err)
+{
+    struct view v = {0};
+    struct seq_manifest m = {0};
+    int rc = strlen(dir) < sizeof v.dir && strlen(out) < 4096
+                 ? scan(dir, &v, err)
+                 : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
+    if (!rc)
+        rc = check_levels(&v, o->allow_gaps, err);
+    if (!rc) {
+        v.has_layers = has_layers(&v);
+        rc = init_manifest(&v, o, &m, err);
+    }
+    int made = !rc && mkdir(out, 0777) == 0;
+    if (!rc && !made && errno != EEXIST)
+        rc = base_fail(err, BASE_EIO, "%s: %s", out, strerror(errno));
+    if (!rc)
+        rc = take_over(out, &m, err);
+    for (uint32_t row = !rc ? m.n_blocks / (m.width / m.block) : 0; !rc && row < m.height / m.block; row++) {
+        rc = import_row(&v, out, &m, (int)row, o, err);
+        if (!rc)
+            rc = seq_manifest_write(out, &m, err);
+    }
+    if (!rc)
+        rc = attach_thresholds(&v, out, &m, o->thresholds, labelled, err);
+    if (rc && made)
+        rmdir(out); /* goes only if it is empty */
+    seq_manifest_release(&m);
+    free(v.levels);
+    return rc;
+}

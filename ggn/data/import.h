@@ -1,0 +1,32 @@
+/*
+ * Pictures of rising sample counts, one folder per view, into block sequences: PNG, JPEG, EXR, and the .rawls of SIN3D.
+ *
+ * A view folder holds NAME_00020.exr …: the number is that of the samples. EXR and .rawls are linear light, the others sRGB
+ * codes. Halves, the mean of the first half of the samples, are either second files NAME_half_00020.exr … or the layer
+ * half.R, half.G, half.B of an EXR; then the sequence needs no reference. Without halves the last level serves as the
+ * reference, and the manifest says that it is not independent.
+ */
+#ifndef GGN_DATA_IMPORT_H
+#define GGN_DATA_IMPORT_H
+
+#include <stddef.h>
+
+#include "data/thresholds.h"
+
+struct ggn_import_options {
+    int block;                               /* pixels */
+    int allow_gaps;                          /* take evenly spaced levels of which some are missing */
+    const struct ggn_thresholds *thresholds; /* may be NULL */
+    void (*progress)(void *data, const char *view, int done, int of); /* may be NULL */
+    void *data;
+};
+
+/* Blocks that OUT/manifest.json lists already are kept. *labelled: whether thresholds were found for it. */
+int ggn_import_view(const char *dir, const char *out, const struct ggn_import_options *options, int *labelled,
+                    struct base_err *err);
+/* Whether a folder holds such images itself. */
+int ggn_import_is_view(const char *dir);
+/* The group for the split: "p3d_kitchen-view1_part6" -> "p3d_kitchen". */
+void ggn_import_scene(const char *view, char *scene, size_t room);
+
+#endif

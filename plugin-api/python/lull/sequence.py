@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: MIT
+"""Recorded block sequences (plugin-api/sequence/FORMAT.md): what `ggn label`, `ggn train` and `ggn evaluate` read.
+
+    from lull import sequence
+    levels = [sequence.Level(spp, mean, first_half) for spp, mean, first_half in my_renders]      # rising in spp
+    sequence.write("data/chess", levels, scene="chess")
+
+`ggn import` makes the same of pictures in files.
+"""
+from __future__ import annotations
+
+import functools
+import json
+import os
+import struct
+import zlib
+from dataclasses import dataclass, field
+from typing import Any, Sequence
+
+import numpy as np
+
+from .files import replaced, srgb
+
+MAGIC, FILE_HEADER, RECORD_HEADER, PLANE_HEADER = b"LULLSEQ1", 64, 32, 16
+LEVEL, REFERENCE = 1, 2
+DISPLAY, FINE, HALF_LOG, MEAN_F16, HALF_F16 = 1, 2, 3, 4, 5
+SHUFFLE, AVERAGE, GREEN = 1, 2, 4
+MAX_SIDE, MAX_RECORDS, FULL_SPP = 4096, 4096, 320
+
+
+@dataclass
+class Level:
+    """A picture of so many samples per pixel. mean: linear light, [height, width, 3]; first_half: the mean of the first
+    spp // 2 samples, likewise, or None; display: its 8-bit sRGB codes, where there is no linear light."""
+    spp: int
+    mean: np.ndarray | None = None
+    first_half: np.ndarray | None = None
+    display: np.ndarray | None = None
+
+
+@dataclass
+class Record:
+    """A level or the reference of a block, as the file has it. planes: by number, the bytes before they are filtered."""
+    kind: int
+    spp: int
+    half_spp: int = 0
+    stats: list[tuple[str, float]] = field(default_factory=list)
+    planes: dict[int, bytes] = field(default_factory=dict)
+
+
+@dataclass
+class Block:
+    width: int
+    height: int
+    x0: int
+    y0: int
+    id: int
+    seed: int
+    records: list[Record]
+
+
+# --- planes -----------------------------------------------------------------------------------------------------------
+
+
+def _filter_of(plane: int) -> int:
+    return {DISPLAY: AVERAGE | GREEN, MEAN_F16: SHUFFLE, HALF_F16: SHUFFLE}.get(plane, 0)
+
+
+def _predicted(channels: np.ndarray) -> np.ndarray:
+    """floor((left + up) / 2) of [channel, height, width]; what is missing is 0."""
+    sums = np.zeros(channels.shape, np.uint16)
+    sums[:, :, 1:] += channels[:, :, :-1]
+    sums[:, 1:, :] += channels[:, :-1, :]
+    return (sums // 2).astype(np.uint8)
+
+
+def _filtered(raw: bytes, number: int, width: int, height: int) -> bytes:
+    if number & SHUFFLE:
+        return np.frombuffer(raw, np.uint8).reshape(-1, 2).T.tobytes()
+    if not number:
+        return raw
+    codes = np.frombuffer(raw, np.uint8).reshape(3, height, width).copy()
+    if number & GREEN:
+        codes[0::2] -= codes[1]
+    if number & AVERAGE:
+        codes -= _predicted(codes)
+    return codes.tobytes()
+
+
+def _unfiltered(data: bytes, number: int, width: int, height: int) -> bytes:
+    if number & SHUFFLE:
+        return np.frombuffer(data, np.uint8).reshape(2, -1).T.tobytes()
+    if not number:
+        return data
+    codes = np.frombuffer(data, np.uint8).reshape(3, height, width).copy()
+    if number & AVERAGE:  # a pixel needs its neighbours: one diagonal after the other
+        y, x = np.indices((height, width))
+        for d in range(width + height - 1):
+            at = (slice(None), y[x + y == d], x[x + y == d])
+            left = np.where(at[2] > 0, codes[:, at[1], at[2] - 1], 0).astype(np.uint16)
+            up = np.where(at[1] > 0, codes[:, at[1] - 1, at[2]], 0)
+            codes[at] += ((left + up) // 2).astype(np.uint8)
+    if number & GREEN:
+        codes[0::2] += codes[1]
+    return codes.tobytes()
+
+
+@functools.lru_cache(None)
+def _limits() -> np.ndarray:
+    """limit[d]: the least linear value of the display code d, by halving what the library says; limit[0] is 0."""
+    low, high = np.zeros(256, np.int64), np.full(256, np.float64(2).view(np.int64), np.int64)
+    wanted = np.arange(256)
+    for _ in range(64):  # positive doubles are in the order of their bits
+        middle = low + (high - low) // 2
+        is_less = srgb(middle.view(np.float64)) < wanted
+        low, high = np.where(is_less, middle + 1, low), np.where(is_less, high, middle)
+    return low.view(np.float64)
+
+
+def _fine(codes: np.ndarray, light: np.ndarray) -> np.ndarray:
+    limit = np.append(_limits(), np.nan)
+    low, high = limit[codes], limit[codes.astype(int) + 1]
+    with np.errstate(all="ignore"):
+        steps = np.clip(np.floor(8.0 * (light - low) / (high - low)), 0, 7)
+        stops = np.where(light > low, np.clip(np.floor(16.0 * np.log2(light / low) + 0.5), 0, 255), 0)
+    return np.where(codes == 255, stops, steps).astype(np.uint8)
+
+
+def _luminance(rgb: np.ndarray) -> np.ndarray:
+    return 0.2126729 * rgb[0] + 0.7151522 * rgb[1] + 0.0721750 * rgb[2]
+
+
+def _half_log(values: np.ndarray) -> np.ndarray:
+    size = np.abs(values)
+    seen = size >= 2.0 ** -19.875
+    octaves = 4.0 * np.log2(np.where(seen, size, 1.0))
+    codes = np.clip(np.sign(octaves) * np.floor(np.abs(octaves) + 0.5) + 80, 1, 127)
+    return np.where(seen, codes + np.where(values < 0, 128, 0), 0).astype(np.uint8)
+
+
+def _f16(values: np.ndarray) -> bytes:
+    return np.clip(values, -65504.0, 65504.0).astype("<f2").tobytes()
+
+
+# --- blocks -----------------------------------------------------------------------------------------------------------
+
+
+def _pack_record(record: Record, width: int, height: int) -> bytes:
+    payload = b"".join(struct.pack("<24sd", name.encode()[:23], value) for name, value in record.stats)
+    for plane, raw in record.planes.items():
+        number = _filter_of(plane)
+        stored = zlib.compress(_filtered(raw, number, width, height), 6)
+        payload += struct.pack("<4I", plane, number, len(raw), len(stored)) + stored
+    head = struct.pack("<7I", record.kind, record.spp, record.half_spp, len(record.stats), len(record.planes),
+                       len(payload), zlib.crc32(payload))
+    return head + struct.pack("<I", zlib.crc32(head)) + payload
+
+
+def pack(block: Block) -> bytes:
+    """The bytes of block-NNNNN.lseq."""
+    head = MAGIC + struct.pack("<4I2i2IQ3I", 1, FILE_HEADER, block.width, block.height, block.x0, block.y0, block.id,
+                               len(block.records), block.seed, 0, 0, 0)
+    records = (_pack_record(r, block.width, block.height) for r in block.records)
+    return head + struct.pack("<I", zlib.crc32(head)) + b"".join(records)
+
+
+def _need(holds: bool, what: str) -> None:
+    if not holds:
+        raise ValueError(what)
+
+
+def unpack(data: bytes) -> Block:
+    """What pack was given; ValueError says what does not fit."""
+    try:
+        return _unpacked(data)
+    except (struct.error, zlib.error, UnicodeDecodeError) as error:
+        raise ValueError(f"a damaged record: {error}") from None
+
+
+def _unpacked(data: bytes) -> Block:
+    _need(len(data) >= FILE_HEADER and data[:8] == MAGIC, "not a block sequence")
+    version, _, width, height, x0, y0, number, count, seed, *_, crc = struct.unpack_from("<4I2i2IQ3II", data, 8)
+    _need(version == 1 and crc == zlib.crc32(data[:60]), "a damaged header")
+    block, at = Block(width, height, x0, y0, number, seed, []), FILE_HEADER
+    for _ in range(count):
+        _need(at + RECORD_HEADER <= len(data), "truncated")
+        kind, spp, half_spp, n_stats, n_planes, size, crc, own = struct.unpack_from("<8I", data, at)
+        payload = data[at + RECORD_HEADER:at + RECORD_HEADER + size]
+        _need(own == zlib.crc32(data[at:at + 28]) and len(payload) == size and crc == zlib.crc32(payload),
+              f"a damaged record at byte {at}")
+        record, used = Record(kind, spp, half_spp), 32 * n_stats
+        for i in range(n_stats):
+            name, value = struct.unpack_from("<24sd", payload, 32 * i)
+            record.stats.append((name.rstrip(b"\0").decode(), value))
+        for _ in range(n_planes):
+            plane, by, raw_bytes, stored = struct.unpack_from("<4I", payload, used)
+            raw = zlib.decompress(payload[used + PLANE_HEADER:used + PLANE_HEADER + stored])
+            _need(len(raw) == raw_bytes, f"plane {plane} has another size")
+            record.planes[plane] = _unfiltered(raw, by, width, height)
+            used += PLANE_HEADER + stored
+        block.records.append(record)
+        at += RECORD_HEADER + size
+    _need(at == len(data), "bytes behind the last record")
+    return block
+
+
+# --- whole pictures ---------------------------------------------------------------------------------------------------
+
+
+def _planar(picture: np.ndarray, kind: Any) -> np.ndarray:
+    return np.ascontiguousarray(np.asarray(picture)[..., :3].transpose(2, 0, 1), kind)
+
+
+def _record(level: Level, box: tuple[int, int, int, int], full: bool, kind: int) -> Record:
+    x0, y0, x1, y1 = box
+    mean = None if level.mean is None else _planar(level.mean[y0:y1, x0:x1], np.float64)
+    codes = srgb(mean) if level.display is None else _planar(level.display[y0:y1, x0:x1], np.uint8)
+    record = Record(kind, level.spp, planes={DISPLAY: codes.tobytes()})
+    if mean is not None:
+        record.planes[MEAN_F16 if full else FINE] = _f16(mean) if full else _fine(codes, mean).tobytes()
+    if level.first_half is not None:
+        n, h = level.spp, level.spp // 2
+        half = 0.5 * n / (n - h) * (_planar(level.first_half[y0:y1, x0:x1], np.float64) - mean)
+        record.half_spp = h
+        record.planes[HALF_F16 if full else HALF_LOG] = _f16(half) if full else _half_log(_luminance(half)).tobytes()
+    return record
+
+
+def _check(levels: Sequence[Level], reference: Level | None) -> tuple[int, int]:
+    _need(0 < len(levels) < MAX_RECORDS, f"{len(levels)} levels")
+    shape = np.shape(levels[0].display if levels[0].mean is None else levels[0].mean)
+    _need(len(shape) == 3 and shape[2] >= 3, f"pictures are [height, width, 3], not {list(shape)}")
+    for before, level in zip([None, *levels], levels):
+        _need(level.spp > (before.spp if before else 0), f"{level.spp} spp: levels rise")
+    for level in [*levels, *([reference] if reference else [])]:
+        given = [p for p in (level.mean, level.first_half, level.display) if p is not None]
+        _need(level.mean is not None or (level.display is not None and level.first_half is None),
+              f"{level.spp} spp: a mean, or codes without halves")
+        _need(all(np.shape(p) == shape for p in given), f"{level.spp} spp: pictures of another size")
+        _need(all(np.isfinite(p).all() for p in given), f"{level.spp} spp: values that are not finite")
+        _need(level.first_half is None or level.spp > 1, f"{level.spp} spp: the half of one sample")
+    return shape[1], shape[0]
+
+
+def write(folder: str, levels: Sequence[Level], *, scene: str, block: int = 200, camera: str = "", source: str = "",
+          renderer: str = "lull for Python", seed: int = 0, reference: Level | None = None,
+          reference_seed: int | None = None) -> None:
+    """Writes a sequence of whole pictures as block files and manifest.json into `folder`, which is made. Views with the
+    same `scene` are on the same side of a split. reference: of many samples; without a reference_seed of its own it
+    shares its samples with the levels. ValueError and OSError, one line; each file is whole or not there."""
+    width, height = _check(levels, reference)
+    _need(0 < block <= MAX_SIDE, f"blocks of {block} pixels")
+    os.makedirs(folder, exist_ok=True)
+    full = next((i for i, level in enumerate(levels) if level.spp >= FULL_SPP), len(levels) - 1)
+    halves = levels[full].first_half is not None
+    columns, listed = -(-width // block), []
+    for number in range(columns * -(-height // block)):
+        x0, y0 = number % columns * block, number // columns * block
+        box = x0, y0, min(x0 + block, width), min(y0 + block, height)
+        records = [_record(level, box, halves and i == full, LEVEL) for i, level in enumerate(levels)]
+        if reference:
+            records.append(_record(reference, box, True, REFERENCE))
+        name = f"block-{number:05d}.lseq"
+        data = pack(Block(box[2] - x0, box[3] - y0, x0, y0, number, seed, records))
+        with replaced(os.path.join(folder, name)) as file:
+            file.write(data)
+        listed.append({"id": number, "x0": x0, "y0": y0, "x1": box[2], "y1": box[3], "file": name, "bytes": len(data),
+                       "crc32": f"{zlib.crc32(data):08x}"})
+    manifest: dict[str, Any] = {
+        "format": "lull-sequence", "version": 1, "scene": scene, "source": source, "camera": camera, "renderer": renderer,
+        "width": width, "height": height, "block": block, "seed": seed,
+        "reference_seed": seed if reference_seed is None else reference_seed,
+        "reference_spp": reference.spp if reference else 0,
+        "levels": [level.spp for level in levels], "blocks": listed}
+    if reference and reference_seed is None:
+        manifest["reference_independent"] = False
+    with replaced(os.path.join(folder, "manifest.json")) as file:
+        file.write((json.dumps(manifest, indent=1) + "\n").encode())
