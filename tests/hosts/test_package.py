@@ -616,6 +616,34 @@ def pictures_of(page):
     return {name: tmp(f"page-{name}.png") for name, _ in found}
 
 
+def test_every_setting():
+    """every setting of a frame and its driver takes what it is for, and names itself in one line otherwise"""
+    wrong = [np.nan, np.inf, -np.inf, -1, 1 << 64, -1 << 63, "x", " 8", b"x", {"a": 1}, np.int8(-3), np.array([1, 2]), object()]
+    numbers = ("width", "height", "block", "spp_min", "spp_max", "time_budget_s", "max_check_overhead", "max_seam", "check_step",
+               "seed", "exposure", "gamma", "sample_clamp")
+    others = ("crop", "layout", "uniform", "mask", "transfer", "independent", "shared", "deterministic")
+    c = lull.load("halfbuf")
+    for name in (*numbers, *others, "wave"):
+        for value in wrong:
+            if name in ("exposure", "gamma", "sample_clamp") and type(value) is int and value > 0:
+                continue  # large, and a number
+            settings = {"width": 32, "height": 32, "spp_max": 64, name: value}
+            size = settings.pop("width"), settings.pop("height")
+            for kind, planes in ((lull.Frame, ()), *(((lull.HostFrame, (["color", "half"],)),) if name != "wave" else ())):
+                if kind is lull.Frame and name == "check_step":
+                    continue  # it has one of its own
+                try:
+                    kind(c, *size, *planes, **settings)
+                    raise AssertionError(f"{name} {value!r} was taken")
+                except (ValueError, TypeError) as error:
+                    assert name in str(error) and "\n" not in str(error), (name, value, error)
+    frame = lull.Frame(c, 32, 32, spp_max=64)
+    for value in wrong:
+        raises((ValueError, TypeError), "threads", lull.Driver, frame, None, threads=value)
+    raises(lull.LullError, "blocks 0 (0,0,9,9) and 1 (8,8,16,16) overlap", lull.Frame, c, 32, 32,
+           layout=[lull.Rect(0, 0, 9, 9), (8, 8, 16, 16)])
+
+
 def test_views():
     """lull-report shows an EXR as its frame does, by exposure, transfer or any mapping, and says the quality parameter"""
     views = ({}, {"exposure": .25}, {"transfer": "linear"}, {"transfer": "gamma", "gamma": 1.8, "exposure": 2.},

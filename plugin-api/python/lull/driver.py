@@ -16,7 +16,7 @@ import signal
 import time
 from typing import Callable, Iterable, Mapping, NamedTuple, Optional, Sequence
 
-from . import abi
+from . import abi, limits
 from .criterion import Rect
 from .display import Display
 from .frame import Frame, Sample
@@ -59,7 +59,7 @@ class Driver:
                  identity: Optional[Mapping[str, str]] = None, after_call: Optional[Callable[[Driver], None]] = None,
                  suspend: Optional[Callable[[Driver], None]] = None, warn: Callable[[str], None] = print,
                  display_server: str = ""):
-        self.frame, self.render, self.threads = frame, render, threads
+        self.frame, self.render, self.threads = frame, render, limits.checked("threads", threads)
         self.after_call, self.suspend, self.warn = after_call, suspend, warn
         self.identity, self.totals = self._identity(identity or {}), frame.totals
         self.samples_per_s = 0.0  # recent, 0 = not known yet

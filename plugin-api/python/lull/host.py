@@ -84,26 +84,33 @@ class HostFrame:
         self.width, self.height = limits.checked("width", width), limits.checked("height", height)
         if self.width * self.height > MAX_PIXELS:
             raise ValueError(f"a picture of {width}x{height}: expected at most 2^28 pixels in all")
-        self.crop = Rect(*(limits.checked("crop", v) for v in crop or (0, 0, width, height)))
+        self.crop = Rect(*limits.rectangle("crop", (0, 0, width, height) if crop is None else crop))
         if self.crop.pixels == 0:
             raise ValueError(f"crop {','.join(map(str, self.crop))}: it is empty")
         size = self._block_size(block)
-        if transfer not in TRANSFERS:
+        if not isinstance(transfer, str) or transfer not in TRANSFERS:
             raise ValueError(f"transfer '{transfer}': expected one of {', '.join(TRANSFERS)}")
         given = {name: limits.checked(name, value) for name, value in (
             ("spp_min", spp_min), ("spp_max", spp_max), ("seed", seed), ("time_budget_s", time_budget_s),
             ("max_check_overhead", max_check_overhead), ("max_seam", max_seam), ("exposure", exposure), ("gamma", gamma),
             ("sample_clamp", sample_clamp))}
         self.spp_min, self.spp_max, self.seed, self.time_budget_s = list(given.values())[:4]
-        self.max_seam, self.check_step, self.uniform = given["max_seam"], check_step, uniform
+        uniform, deterministic, independent, shared = (limits.flag(name, value) for name, value in (
+            ("uniform", uniform), ("deterministic", deterministic), ("independent", independent), ("shared", shared)))
+        self.max_seam, self.check_step, self.uniform = given["max_seam"], limits.checked("check_step", check_step), uniform
         self.shown = {"exposure": given["exposure"], "transfer": transfer, "gamma": given["gamma"],
                       "sample_clamp": given["sample_clamp"], "independent": independent, "shared": shared}
         flags = (abi.HOST_UNIFORM * uniform | abi.FRAME_DETERMINISTIC * deterministic | abi.FRAME_INDEPENDENT * independent |
                  abi.FRAME_SHARED * shared)
-        rects, painted = (abi.Rect * len(layout))(*layout), self._mask_plane(mask)
+        try:
+            placed = [abi.Rect(*limits.rectangle(f"layout[{i}]", r)) for i, r in enumerate(layout)]
+        except TypeError as error:
+            raise error if "layout[" in str(error) else TypeError(f"layout {layout!r}: expected a list of rectangles") from None
+        rects = (abi.Rect * len(placed))(*placed)
+        painted = self._mask_plane(mask)
         self._begin(abi.sized(
             abi.HostConfig, flags=flags, width=self.width, height=self.height, block_width=size[0], block_height=size[1],
-            crop=tuple(self.crop), layout=C.addressof(rects) if layout else None, layout_count=len(layout),
+            crop=tuple(self.crop), layout=C.addressof(rects) if placed else None, layout_count=len(placed),
             layout_stride=C.sizeof(abi.Rect), planes=sum(1 << PLANES[name] for name in set(planes)),
             transfer=TRANSFERS[transfer], check_step=check_step, mask=C.addressof(painted) if painted else None, **given))
 
@@ -123,7 +130,11 @@ class HostFrame:
     def _mask_plane(self, mask: Optional[np.ndarray]) -> Optional[abi.Plane]:
         if mask is None:
             return None
-        grey = np.ascontiguousarray(limits.unmasked("mask", mask), np.float64)
+        limits.unmasked("mask", mask)
+        try:
+            grey = np.ascontiguousarray(mask, np.float64)
+        except (TypeError, ValueError):
+            raise TypeError("mask: expected an array of numbers") from None
         if grey.shape != (self.height, self.width):
             raise ValueError(f"mask of shape {grey.shape}: expected the picture's, [{self.height}, {self.width}]")
         if not ((grey >= 0) & (grey <= 1)).all():

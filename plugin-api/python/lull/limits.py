@@ -13,7 +13,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "width": (1, 32768), "height": (1, 32768), "crop": (-32768, 32768), "block": (1, 4096), "wave": _SPP, "spp_min": _SPP,
     "spp_max": _SPP, "seed": (0, (1 << 64) - 1), "threads": (1, 1 << 20), "time_budget_s": (0.0, 1e9),
     "max_seam": (0.0, 1e6), "max_check_overhead": (0.0, 1.0), "exposure": (_ABOVE_0, _FINITE), "gamma": (_ABOVE_0, _FINITE),
-    "sample_clamp": (0.0, _FINITE), "checkpoint_every_s": (0.0, _FINITE)}
+    "sample_clamp": (0.0, _FINITE), "checkpoint_every_s": (0.0, _FINITE), "check_step": (1, 1 << 32)}
 
 
 def checked(name: str, value: object) -> Any:
@@ -22,12 +22,37 @@ def checked(name: str, value: object) -> Any:
     expected = (f"expected a {'whole' if isinstance(low, int) else 'finite'} number " +
                 ("above 0" if low == _ABOVE_0 else f"from {low}") + ("" if high == _FINITE else f" to {high}"))
     try:
-        number = operator.index(value) if isinstance(low, int) else float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+        if isinstance(value, (str, bytes)):  # which float() would read
+            raise TypeError
+        number = operator.index(value) if isinstance(low, int) else float(value)  # type: ignore[arg-type,call-overload]
+    except (TypeError, ValueError, OverflowError):
         raise TypeError(f"{name} {value!r}: {expected}") from None
     if not low <= number <= high:
         raise ValueError(f"{name} {value}: {expected}")
     return number
+
+
+def flag(name: str, value: object) -> bool:
+    """value, if it is a truth value."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{name} {value!r}: expected True or False")
+    return bool(value)
+
+
+def rectangle(name: str, value: object) -> tuple[int, int, int, int]:
+    """Four whole numbers."""
+    try:
+        x0, y0, x1, y1 = value  # type: ignore[misc]
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} {value!r}: expected x0, y0, x1, y1") from None
+    low, high = _RANGES["crop"]
+    try:
+        ends = [operator.index(v) for v in (x0, y0, x1, y1)]
+    except TypeError:
+        raise TypeError(f"{name} {value!r}: expected whole numbers") from None
+    if not all(low <= v <= high for v in ends):
+        raise ValueError(f"{name} {value!r}: expected whole numbers from {low} to {high}")
+    return ends[0], ends[1], ends[2], ends[3]
 
 
 def unmasked(name: str, array: np.ndarray) -> np.ndarray:
