@@ -3,8 +3,12 @@ program in C made."""
 import itertools
 import os
 import shutil
+import socket
 import sqlite3
+import subprocess
+import sys
 import tempfile
+import urllib.request
 
 import tap
 from lull.study.definition import members, parse
@@ -128,6 +132,7 @@ def test_transfer():
 
 
 C_STUDY = "tests/data/study-of-c"
+PATIENCE_S = 120  # only so that a server which hangs ends the test
 
 
 def test_database_of_c():
@@ -221,6 +226,43 @@ def test_options():
                        (["-n", "10", "a"], "--number 10: expected an integer from 1 to 9"), ([], "expected DIR"),
                        (["a", "b", "c"], "c: one argument too many; expected DIR"), (["-n", "1_0", "a"], "expected an integer")):
         raises(Refused, why, parse_options, command, words)
+
+
+SERVE = """import sys
+from lull.study import server
+server.IDLE_S, server.SWEEP_S, server.MAX_CONNECTIONS = 1, 0.1, 4
+server.serve(sys.argv[1], "plugin-api/python/lull/study/page", "127.0.0.1:0")"""
+
+
+def test_quiet_connections():
+    """who sends half a request, or nothing, is left when time is over; who comes when all places are taken, at once; others are served"""
+    request = b"POST /api/people HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n"
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copy(os.path.join(C_STUDY, "study.json"), folder)
+        server = subprocess.Popen([sys.executable, "-c", SERVE, folder], stdout=subprocess.PIPE, text=True)
+        try:
+            port = int(server.stdout.readline().rsplit(":", 1)[1].rstrip("/\n"))
+            for sent in (b"", request, request + b"\r\n1234"):
+                with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as quiet:
+                    quiet.sendall(sent)
+                    assert left(quiet), sent
+            many = [socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) for _ in range(8)]
+            assert all(left(s) for s in many)
+            for s in many:
+                s.close()
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=PATIENCE_S) as page:
+                assert b"main.js" in page.read()
+        finally:
+            server.terminate()
+            assert server.wait(PATIENCE_S) == 0
+
+
+def left(connection):
+    """Whether the server has ended it, without an answer."""
+    try:
+        return connection.recv(1) == b""
+    except ConnectionResetError:
+        return True
 
 
 tap.main(globals())

@@ -117,7 +117,7 @@ class _Reader:
         return Refused(f"{self.path}: {text}")
 
     def number(self, o: Any, name: str, lo: float, hi: float, whole: bool = True) -> Any:
-        value = o.get(name) if isinstance(o, dict) else None
+        value: Any = o.get(name) if isinstance(o, dict) else None
         if not is_number(value, lo, hi, whole):
             raise self.fail(f"'{name}' must be a {'whole ' if whole else ''}number in {lo:g} … {hi:g}")
         return int(value) if whole else float(value)
@@ -136,7 +136,7 @@ class _Reader:
     def block(self, o: Any, view: View) -> Block:
         levels = self.list(o, "levels", MAX_LEVELS)
         at = [self.number(o, name, name in ("x1", "y1"), 32768) for name in ("id", "x0", "y0", "x1", "y1")]
-        block = Block(*at, levels=[int(n) if is_number(n, 1, MAX_SPP) else 0 for n in levels])
+        block = Block._make([*at, [int(n) if is_number(n, 1, MAX_SPP) else 0 for n in levels]])
         if block.x1 <= block.x0 or block.y1 <= block.y0 or block.x1 > view.width or block.y1 > view.height:
             raise self.fail(f"block {block.id} does not lie inside {view.name}")
         if any(b <= a for a, b in zip([0, *block.levels], block.levels)):

@@ -66,7 +66,7 @@ def curves_figure(people: People, thresholds: Sequence[Threshold]) -> Figure:
         choices = [(x, correct) for r in people.counting() for at, (x, _, correct) in r.choices if at == c]
         answers = [[correct for x, correct in choices if x == math.log2(level)] for level in levels]
         seen = [(level, np.mean(a), 9 + 6 * len(a)) for level, a in zip(levels, answers) if a]
-        axes.scatter(*zip(*(seen or [(np.nan,) * 3])), color=BLUE)
+        axes.scatter([s[0] for s in seen], [s[1] for s in seen], [s[2] for s in seen], color=BLUE)
         axes.plot(levels, p_correct(np.log2(levels), thresholds[c].t, thresholds[c].spread), color=RED)
         axes.tick_params(labelsize=7)
     return figure

@@ -6,7 +6,6 @@ import contextlib
 import json
 import math
 import os
-import tempfile
 from typing import Any, Iterator, TextIO
 
 VERSION = "1.0"
@@ -90,8 +89,10 @@ def check_output(path: str) -> str:
 def replaced(path: str) -> Iterator[TextIO]:
     """A text that becomes `path` at the end, on the disk; whatever goes wrong leaves what was there."""
     target = check_output(path)
+    folder, name = os.path.split(target)
+    made = os.path.join(folder, f".tmp-lull{os.getpid()}-0.{name[-100:]}")  # which Lull's programs sweep away when we are gone
     try:
-        descriptor, made = tempfile.mkstemp(prefix=".tmp-lull", dir=os.path.dirname(target))
+        descriptor = os.open(made, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
     except OSError as error:
         raise Refused(f"{path}: cannot write there: {error.strerror}") from None
     try:
@@ -99,9 +100,6 @@ def replaced(path: str) -> Iterator[TextIO]:
             yield file
             file.flush()
             os.fsync(file.fileno())
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(made, 0o666 & ~umask)
         os.replace(made, target)
     except BaseException as error:
         with contextlib.suppress(OSError):
@@ -118,12 +116,10 @@ def write_line(path: str, text: str) -> None:
 
 def make_folder(path: str) -> None:
     try:
-        os.makedirs(path, exist_ok=True) if not os.path.dirname(path) else os.mkdir(path)
-    except FileExistsError:
-        if not os.path.isdir(path):
-            raise Refused(f"{path}: File exists") from None
+        os.mkdir(path)
     except OSError as error:
-        raise Refused(f"{path}: {error.strerror}") from None
+        if not os.path.isdir(path):
+            raise Refused(f"{path}: {error.strerror}") from None
 
 
 # --- what nothing may be written onto ---

@@ -97,7 +97,8 @@ def _refuse(error: getopt.GetoptError) -> Refused:
 
 def parse(command: Command, arguments: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
     """(arguments, options that were given by name, '-' as '_'). Answers --help and the like itself, and exits."""
-    rows, found = [*sorted(command.options), *OWN], {}
+    rows = [*sorted(command.options), *OWN]
+    found: dict[str, Any] = {}
     try:
         letters = "".join(o.letter + (":" if o.value else "") for o in rows if o.letter)
         given, words = getopt.gnu_getopt(list(arguments), letters, [o.name + ("=" if o.value else "") for o in rows])

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import functools
 import ipaddress
 import logging
@@ -136,11 +137,12 @@ def _to_send(r: Response) -> web.Response:
 
 class _Connection(web.RequestHandler):
     """Knows when something last came or went: aiohttp waits for ever for half a request."""
+    is_too_many = False
 
     def connection_made(self, transport: Any) -> None:
         super().connection_made(transport)
         self.heard, self.unsent = asyncio.get_running_loop().time(), 0
-        if len(self._manager.connections) > MAX_CONNECTIONS:
+        if self.is_too_many:
             transport.abort()
 
     def data_received(self, data: bytes) -> None:
@@ -159,25 +161,29 @@ class _Connection(web.RequestHandler):
 
 class _Server(web.Server):
     def __call__(self) -> web.RequestHandler:
-        return _Connection(self, loop=self._loop, **self._kwargs)
+        made = _Connection(self, loop=self._loop, **self._kwargs)
+        made.is_too_many = len(self.connections) >= MAX_CONNECTIONS
+        return made
 
 
 async def _sweep(server: web.Server) -> None:
     while True:
         await asyncio.sleep(SWEEP_S)
         for connection in list(server.connections):
-            connection.sweep(asyncio.get_running_loop().time())
+            if isinstance(connection, _Connection):
+                connection.sweep(asyncio.get_running_loop().time())
 
 
 # --- running ---
 
-async def _run(site: Site, listening: socket.socket, link: str) -> None:
+async def _run(site: Site, listening: socket.socket, link: str, failures: list[str]) -> None:
+    """failures: gets why the store cannot be synced any more."""
     loop, stop = asyncio.get_running_loop(), asyncio.Event()
-    failures: list[str] = []
 
     def fail(why: str) -> None:
         failures.append(why)
-        loop.call_soon_threadsafe(stop.set)
+        with contextlib.suppress(RuntimeError):  # it has stopped already
+            loop.call_soon_threadsafe(stop.set)
 
     logger = logging.Logger("lull-study")
     logger.addHandler(_Log())
@@ -193,8 +199,6 @@ async def _run(site: Site, listening: socket.socket, link: str) -> None:
     accepting.close()
     sweeper.cancel()
     await server.shutdown(1.0)
-    if failures:
-        raise Refused(failures[0])
 
 
 def serve(folder: str, page: str, listen: str) -> None:
@@ -202,8 +206,11 @@ def serve(folder: str, page: str, listen: str) -> None:
     address = parse_address(listen)
     study = read_study(folder)
     token = None if address.loopback else keep_token(folder)
+    failures: list[str] = []
     with Store(folder, study.id, create=True) as store, _listen(address) as listening:
         port = listening.getsockname()[1]
         hosts = [address.shown(port), f"localhost:{port}"] if address.loopback else None
         link = f"http://{address.shown(port)}/{token + '/' if token else ''}"
-        asyncio.run(_run(Site(folder, page, study, store, token, hosts), listening, link))
+        asyncio.run(_run(Site(folder, page, study, store, token, hosts), listening, link, failures))
+    if failures:
+        raise Refused(failures[0])

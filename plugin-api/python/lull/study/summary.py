@@ -120,7 +120,7 @@ def ceiling(people: People) -> Ceiling:
         known = ~np.isnan(own) & (~np.isnan(others)).any(0)
         if known.sum() < 3:
             continue
-        of_person = {}
+        of_person: dict[str, float] = {}
         for name, rest in (("lower", others), ("upper", table)):
             mean = np.nanmean(rest[:, known], 0)
             errors = np.abs(own[known] - mean)
@@ -159,8 +159,8 @@ def share(people: People, view: Optional[int], condition: int) -> Share:
 def intraclass(people: People, condition: int) -> float:
     """Correlation of the judgements of one condition within people (one-way analysis of variance, not below 0); NaN below
     two people or two judgements each."""
-    groups = [[j.same for j in r.judgements if j.condition == condition] for r in people.counting()]
-    groups = [np.array(g) for g in groups if g]
+    found = [[j.same for j in r.judgements if j.condition == condition] for r in people.counting()]
+    groups = [np.array(same) for same in found if same]
     sizes = np.array([len(g) for g in groups])
     if len(groups) < 2 or sizes.sum() - len(groups) < 1:
         return NAN

@@ -65,7 +65,7 @@ def _read_trial(study: Study, plan: list[Slot], o: Any) -> Optional[Trial]:
             not all(_is_text(o.get(name), most) for name, most in texts.items()) or
             not is_number(o.get("ms"), 0, MAX_MS, whole=False)):
         return None
-    trial = Trial(*(int(o[name]) for name in bounds), float(o["ms"]), *(o[name] for name in texts))
+    trial = Trial._make([*(int(o[name]) for name in bounds), float(o["ms"]), *(o[name] for name in texts)])
     slot = plan[trial.slot]
     fits = slot_takes(study, slot, trial.level) and dropped_frames(study, slot, trial.frame_ms) is not None
     return trial if fits else None

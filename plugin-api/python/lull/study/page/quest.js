@@ -3,7 +3,7 @@
 //   P(correct | x) = 1/2 + (1 - lapse)/2 · Phi((t - x) / s),   x, t in octaves, s the spread
 //
 // The same model, on a finer grid and with the person's bias for one interval, gives the estimates of `lull-study report`
-// (ggn/study/psychometric.h); here it only chooses what to show next.
+// (psychometric.py); here it only chooses what to show next.
 import QuestPlus from './vendor/questplus.js';
 
 const STEP = 0.25; // octaves between threshold hypotheses
