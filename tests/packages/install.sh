@@ -10,6 +10,8 @@ t "a renderer that finds its criteria" sh -c "cd $tmp && $at/bin/lull-render $ro
 t "the same picture as from the build tree" sh -c "$BUILD/bin/lull-render $room --preview $tmp/b.png && cmp $tmp/a.png $tmp/b.png"
 t "networks that find their models" "$at/bin/lull-render" $room -c ggn -o "$tmp/c.exr"
 t "modules that the programs find" sh -c "$at/bin/ggn flip scenes/demo-reference.png scenes/demo-reference.png && [ -x $at/lib/lull/modules/lull-denoiser ]"
+t "a study, with the pictures of ggn and the words of its page" sh -c "$at/bin/lull-study init $tmp/study --task thresholds --views \
+    tests/data/recorded/train/one-view0 --asked-by Ada --contact here && [ -s $tmp/study/texts.json ] && [ -s $tmp/study/stimuli/v0/b0-8.png ]"
 t "a man page of each program" sh -c "for p in $at/bin/*; do [ -s $at/share/man/man1/\${p##*/}.1 ] || exit 1; done"
 # As people press Tab: $@ are the words of the line, the last one is completed.
 complete() { bash -c 'PATH=$0/bin:$PATH; . $0/share/bash-completion/completions/${1##*/}; COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)); _lull; echo "${COMPREPLY[@]}"' "$at" "$@"; }
