@@ -268,11 +268,11 @@ int pt_accel_build(struct pt_scene *scene, struct base_err *err)
         return base_fail_nomem(err, what);
     pt_terminate_begin(what);
     int built = build(scene, accel);
+    if (!built)
+        destroy(accel); /* Embree may lack memory for that, too */
     pt_terminate_end();
-    if (!built) {
-        destroy(accel);
+    if (!built)
         return base_fail_nomem(err, what);
-    }
     struct RTCBounds b;
     rtcGetSceneBounds(accel->world, &b);
     if (b.lower_x <= b.upper_x) {

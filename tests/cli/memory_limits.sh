@@ -41,6 +41,10 @@ for c in observer halfbuf ggn denoised noise-mask; do
     # shellcheck disable=SC2086
     swept "lull-render -c $c" "$BUILD/bin/lull-render" $room -q --size 32x32 -c $c $p --spp-max 16 -o "$tmp/out/x.exr" --html "$tmp/out/x.html"
 done
+# More limits where a program takes little time: it lacks memory in another place at each.
+usual_mb=$STEP_MB STEP_MB=4
+swept "lull-render" "$BUILD/bin/lull-render" $room -q --size 16x16 --spp 1 -o "$tmp/out/x.exr"
+STEP_MB=$usual_mb
 swept "lull-check" "$BUILD/bin/lull-check" -q -o table -o requirements "$BUILD/lib/lull/ggn.so"
 swept "lull-report" "$BUILD/bin/lull-report" "$tmp/a.json" "$tmp/a.exr" -o "$tmp/out/a.html"
 cp -r $data "$tmp/data"
