@@ -9,7 +9,7 @@ import re
 import sys
 
 from lablib import (agreement, ablation, bench, cells, cost_page, denoised, explained, folds, peers, profile, published, quote_accuracy, references,
-                    sampler, scale, shots, tool)
+                    sampler, scale, shots, tool, truth)
 
 TEMPLATES = os.path.join(tool.ROOT, "scripts", "lablib", "templates")
 OTHERS = ("ggn/README.md", "ggn/models/README.md", "ggn/observer/README.md")  # pages outside docs/ that show figures
@@ -43,7 +43,7 @@ def made(docs):
     jobs = {name: Job(module, tool.results(docs, name)) for name, module in (
         ("agreement", agreement), ("ablation", ablation), ("bench", bench), ("cost", cost_page), ("quote", quote_accuracy),
         ("references", references), ("sampler", sampler), ("profile", profile), ("cells", cells), ("scale", scale), ("denoised", denoised),
-        ("peers", peers), ("shots", shots), ("explained", explained), ("folds", folds), ("published", published))}
+        ("peers", peers), ("shots", shots), ("explained", explained), ("folds", folds), ("published", published), ("truth", truth))}
 
     def of_figures(name, make):
         try:

@@ -1,0 +1,211 @@
+"""Holds what criteria believe against references: how many of the blocks that they stop are truly off.
+
+Each scene is rendered with default settings, its planes kept look by look (tests/abi/plugins/planes.c), with several seeds, and twice
+more with other seeds as references. The criteria themselves are then asked about these looks, in blocks of several sizes, as a
+renderer asks them; a block that was stopped keeps its samples. True errors are those of the model observer against both references,
+whose own noise is taken out (scripts/lablib/law.py). Interrupted, the same command goes on. Needs numpy (python3-numpy)."""
+import glob
+import math
+import os
+import shutil
+import struct
+import sys
+
+from lablib import tool
+
+SCENES = ("chess glossy soft-shadow cornell-box office museum judge/rare-lamps brick-yard gallery candles kitchen judge/rare-beads "
+          "garage bathroom gems night-street judge/rare-foil panes corridor glass-shelf").split()
+RARE = ("rare-", "candles", "gems", "night-street", "glass-shelf")  # scenes whose noise is made by few bright paths
+REFERENCES = (101, 102)
+SIZES = (200, 100, 32)
+CRITERIA = ("observer", "ggn", "halfbuf", "variance")
+OFF = (1.05, 1.12, 1.5)
+ENOUGH = 0.93  # true error at which a block could have been stopped
+PLANES = (("color", 3), ("half", 3), ("albedo", 3), ("normal", 3), ("moment2", 1))
+KEEPER = os.path.join(tool.BUILD, "tests", "abi", "plugins", "planes.so")
+
+
+def options(parser):
+    parser.add_argument("--scenes", nargs="+", default=SCENES, metavar="SCENE",
+                        help="names of scenes/, or files (%s)" % " ".join(SCENES))
+    parser.add_argument("--criteria", nargs="+", default=CRITERIA, metavar="NAME[:KEY=VALUE]",
+                        help="whom to ask (%s)" % " ".join(CRITERIA))
+    parser.add_argument("--sizes", nargs="+", type=int, default=SIZES, metavar="PIXELS", help="sides of blocks (%s)" % " ".join(map(str, SIZES)))
+    parser.add_argument("--size", type=int, default=200, help="side of the pictures (200)")
+    parser.add_argument("--spp", type=int, default=512, help="samples of the last look (512)")
+    parser.add_argument("--reference-spp", type=int, default=2048, metavar="N", help="of each of the two references (2048)")
+    parser.add_argument("--seeds", type=int, default=2, help="renders of each scene (2)")
+    parser.add_argument("--threads", type=int, default=tool.THREADS, help="of the renderer (all processors)")
+    parser.add_argument("--recorded", action="store_true", help="render nothing: judge the scenes whose recordings are there")
+    parser.add_argument("--work", type=tool.path, default=os.path.join(tool.BUILD, "truth"), metavar="DIR",
+                        help="recordings; what is there is not made again (build/truth)")
+    tool.writes(parser)
+
+
+# --- recordings -----------------------------------------------------------------------------------------------------------
+
+
+def name_of(scene):
+    return os.path.splitext(os.path.basename(scene))[0]
+
+
+def record(o, scene, seed, spp, *uniform):
+    """The folder of one render's looks; None: it is not there and must not be made."""
+    folder = os.path.join(o.work, "%s-%d" % (name_of(scene), o.size), "%d-%d" % (seed, spp))
+    if os.path.exists(folder):
+        return folder
+    if o.recorded:
+        return None
+    file = scene if scene.endswith(".pbrt") else os.path.join(tool.ROOT, "scenes", scene + ".pbrt")
+    part = folder + ".part"
+    shutil.rmtree(part, ignore_errors=True)
+    os.makedirs(part)
+    tool.run(tool.RENDER, "-q", file, "--size", "%dx%d" % (o.size, o.size), "--block", o.size, "-c", KEEPER, "-t", o.threads, "--seed", seed,
+             *(uniform or ("--spp-max",)), spp, "--report", os.path.join(part, "report.json"), env={"LULL_PLANES": part})
+    os.replace(part, folder)
+    print("%s: seed %d, %d samples" % (name_of(scene), seed, spp), file=sys.stderr, flush=True)
+    return folder
+
+
+def looks_of(folder):
+    """Each look of a recording: samples, samples in the half, planes by name."""
+    import numpy as np
+    for path in sorted(glob.glob(os.path.join(folder, "0-*.planes"))):
+        with open(path, "rb") as file:
+            data = file.read()
+        if data[:8] != b"LULLPLN1":
+            raise tool.Refused("%s: not a look" % path)
+        width, height, spp, half_spp = struct.unpack("<4I", data[8:24])
+        values, at, planes = np.frombuffer(data, "<f4", offset=24).reshape(-1, height, width), 0, {}
+        for name, channels in PLANES:
+            planes[name] = np.ascontiguousarray(values[at:at + channels].transpose(1, 2, 0))
+            at += channels
+        yield spp, half_spp, planes
+
+
+# --- judging --------------------------------------------------------------------------------------------------------------
+
+
+class Reference:
+    def __init__(self, *folders):
+        from lablib import law
+        self.law = law
+        self.pictures = [law.lightness(list(looks_of(folder))[-1][2]["color"]) for folder in folders]
+
+    def error(self, lightness, rect):
+        """True error of a block, in units of what is just seen."""
+        cut = tuple(p[rect.y0:rect.y1, rect.x0:rect.x1] for p in (lightness, *self.pictures))
+        return self.law.true(*cut, self.law.texture(*cut[1:])) / tool.observer_law()
+
+
+def replay(lull, name, looks, size, block, reference):
+    """[(samples at its stop or 0, true error there, samples from which it was low enough or 0)] of each block."""
+    import numpy as np
+    from lablib import law
+    criterion, _, parameter = name.partition(":")
+    pairs = dict([parameter.split("=")]) if parameter else {}
+    frame = lull.HostFrame(lull.load(criterion, threads=1, log=lambda *_: None, **pairs), size, size, [p for p, _ in PLANES], block=block,
+                           spp_max=1 << 30)
+    shown = {p: np.zeros((size, size, c), np.float32) for p, c in PLANES}
+    next_spp, stopped, errors = [0] * len(frame.blocks), {}, [[] for _ in frame.blocks]
+    for spp, half_spp, planes in looks:
+        going = [i for i in range(len(frame.blocks)) if i not in stopped]
+        light = law.lightness(planes["color"])
+        for i, b in enumerate(frame.blocks):
+            errors[i].append((spp, reference.error(light, b.rect)))
+            if i in stopped:
+                continue
+            b.spp, b.half_spp = spp, half_spp
+            for p in shown:
+                shown[p][b.y0:b.y1, b.x0:b.x1] = planes[p][b.y0:b.y1, b.x0:b.x1]
+        due = [i for i in going if spp >= next_spp[i]]
+        for i, d in zip(due, frame.evaluate(due, {p: lull.Plane(a) for p, a in shown.items()})):
+            next_spp[i] = d.next_spp
+            if d.action == 1:
+                stopped[i] = spp
+    found = []
+    for i, of in enumerate(errors):
+        low = [k for k in range(len(of)) if all(e <= ENOUGH for _, e in of[k:])]
+        found.append((stopped.get(i, 0), dict(of).get(stopped.get(i), math.nan), of[low[0]][0] if low else 0))
+    return found
+
+
+def judge(o, scene):
+    """{"criterion size": [[stop, error, enough] of each block and seed]}; None: not recorded."""
+    folders = [record(o, scene, seed, o.spp) for seed in range(1, o.seeds + 1)]
+    references = [record(o, scene, seed, o.reference_spp, "--spp") for seed in REFERENCES]
+    if not all(folders + references):
+        return None
+    sys.path.insert(0, os.path.join(tool.ROOT, "plugin-api", "python"))
+    import lull
+    reference, found = Reference(*references), {}
+    for folder in folders:
+        looks = list(looks_of(folder))
+        for name in o.criteria:
+            for size in o.sizes:
+                found.setdefault("%s %d" % (name, size), []).extend(replay(lull, name, looks, o.size, size, reference))
+    print("%s: judged" % name_of(scene), file=sys.stderr, flush=True)
+    return found
+
+
+# --- telling --------------------------------------------------------------------------------------------------------------
+
+
+def row(blocks, usual):
+    """What a table shows of some blocks; usual: the stops of who is compared with, or None."""
+    stops = [b for b in blocks if b[0]]
+    errors = [b[1] for b in stops]
+    cost = [math.log2(b[0] / b[2]) for b in stops if b[2]]
+    return {"blocks": len(blocks), "stopped": len(stops), "worst": max(errors, default=math.nan),
+            "off": [sum(e > limit for e in errors) / max(len(errors), 1) for limit in OFF],
+            "cost": sum(cost) / len(cost) if cost else math.nan,
+            "samples": 2 ** (sum(math.log2(b[0] / u[0]) for b, u in zip(blocks, usual) if b[0] and u[0]) /
+                             max(1, sum(1 for b, u in zip(blocks, usual) if b[0] and u[0]))) if usual else math.nan}
+
+
+def rows(results):
+    """[(criterion, size, kind, row)]"""
+    told = []
+    scenes = results["scenes"]
+    keys = [(name, size) for size in results["sizes"] for name in results["criteria"]]
+    for kind, wanted in (("rare light", True), ("other scenes", False)):
+        of = [s for s in scenes if s.startswith(RARE) is wanted]
+        for name, size in keys:
+            blocks = [b for s in of for b in scenes[s]["%s %d" % (name, size)]]
+            usual = [b for s in of for b in scenes[s]["%s %d" % (results["criteria"][0], size)]]
+            if blocks:
+                told.append((name, size, kind, row(blocks, usual)))
+    return told
+
+
+def page(results):
+    """The table of the page."""
+    number = lambda v, form: "" if math.isnan(v) else form % v
+    lines = ["| criterion | block | scenes | stopped | off at 1.05 | at 1.12 | at 1.5 | worst | octaves after enough | samples |",
+             "|---|---|---|---|---|---|---|---|---|---|"]
+    for name, size, kind, r in rows(results):
+        lines.append("| %s | %d px | %s | %d of %d | %s | %s | %s | %s |" % (
+            name, size, kind, r["stopped"], r["blocks"], " | ".join("%.1f %%" % (100 * share) for share in r["off"]),
+            number(r["worst"], "%.2f"), number(r["cost"], "%+.2f"), number(r["samples"], "%.2f")))
+    measured = results["measured"]
+    lines.append("\n%d scenes, %d seeds; `%s`, %s, %s." % (len(results["scenes"]), results["seeds"], measured["command"], measured["date"],
+                                                          measured["commit"]))
+    return "\n".join(lines) + "\n"
+
+
+def main(o):
+    found = {}
+    for scene in o.scenes:
+        try:
+            judged = judge(o, scene)
+            if judged:
+                found[name_of(scene)] = judged
+        except tool.Refused as why:
+            print("lab truth: %s" % why, file=sys.stderr, flush=True)
+    if not found:
+        raise tool.Refused("no scene is recorded in %s: run it without --recorded" % o.work)
+    results = {"measured": tool.measured(), "criteria": list(o.criteria), "sizes": list(o.sizes), "seeds": o.seeds, "spp": o.spp,
+               "reference_spp": o.reference_spp, "scenes": found}
+    print(page(results))
+    if o.write:
+        tool.store(o.write, "truth", results, indent=None)
