@@ -10,8 +10,13 @@ enum { RADIUS = 2, TAPS = 2 * RADIUS + 1, SUMS = 4, PATCH = 100 };
 
 static const double TEXTURE_OFFSET = 2.0; /* L*: texture far below it hides nothing */
 
-/* exp(-k^2 / (2 * 0.7^2)) over the sum of all five taps, k = 0, 1, 2: a Gaussian of 0.7 px. */
+/* exp(-k^2 / (2 * 0.7^2)) over the sum of all five taps, k = 0, 1, 2: a Gaussian of 0.7 px; and the squares of these, which
+ * take the variances of independent pixels to that of their blurred sum. */
 static const double blur[RADIUS + 1] = {0.569912492, 0.205423697, 0.009620057};
+static const double blur_of_variance[RADIUS + 1] = {0.569912492 * 0.569912492, 0.205423697 * 0.205423697,
+                                                    0.009620057 * 0.009620057};
+
+static const double GAUSSIAN_SIXTH = 15.0; /* sixth moment of a normal distribution over the cube of its second */
 
 /* y in [0.008, 1], relative error below 1e-6: a first guess from the exponent, then two steps of Halley's method. */
 static inline float cube_root(float y)
@@ -93,16 +98,41 @@ static void extend(double *column, int width)
     }
 }
 
-/* One row of B, whose sixth power is added to the columns' sums. column: [RADIUS + width + RADIUS], blurred downwards. */
+static inline double across(const double *c, const double *taps)
+{
+    return taps[2] * (c[0] + c[4]) + taps[1] * (c[1] + c[3]) + taps[0] * c[2];
+}
+
+/* One row of G, whose sixth power is added to the columns' sums. column: [RADIUS + width + RADIUS], blurred downwards. */
 static void blur_row(const double *column, int width, double *sixth, float *blurred)
 {
     for (int x = 0; x < width; x++) {
-        const double *c = column + x;
-        double seen = blur[2] * (c[0] + c[4]) + blur[1] * (c[1] + c[3]) + blur[0] * c[2], square = seen * seen;
+        double seen = across(column + x, blur), square = seen * seen;
         sixth[x] += square * square * square;
         if (blurred)
             blurred[x] = (float)seen;
     }
+}
+
+/* The same for a row of variances of G: the sixth power that is expected of Gaussian noise. */
+static void expect_row(const double *column, int width, double *sixth)
+{
+    for (int x = 0; x < width; x++) {
+        double variance = across(column + x, blur_of_variance);
+        sixth[x] += GAUSSIAN_SIXTH * variance * variance * variance;
+    }
+}
+
+/* Five rows around y, summed downwards. column: [RADIUS + width + RADIUS]. */
+static void sum_columns(const float *image, int width, int height, int y, const double *taps, double *column)
+{
+    const float *row[TAPS];
+    for (int k = 0; k < TAPS; k++)
+        row[k] = row_at(image, width, height, y + k - RADIUS);
+    for (int x = 0; x < width; x++)
+        column[RADIUS + x] = taps[2] * (double)(row[0][x] + row[4][x]) + taps[1] * (double)(row[1][x] + row[3][x]) +
+                             taps[0] * (double)row[2][x];
+    extend(column, width);
 }
 
 /* Over the patches of one row of them: the sum of squares of what is seen, and the blurred rows in units of what texture
@@ -120,29 +150,40 @@ static double finish_patches(const double *means, const double *texture, int wid
     return sum;
 }
 
-double ggn_visible_noise(const float *noise, int width, int height, const double *texture, double *scratch, float *blurred)
+/* image: N, or with `expected` its variance. */
+static double visible(const float *image, int expected, int width, int height, const double *texture, double *scratch,
+                      float *blurred)
 {
-    const size_t row_size = (size_t)width, across = (size_t)parts(width);
+    const size_t row_size = (size_t)width;
     double *column = scratch, *sixth = column + row_size + 2 * RADIUS, *means = sixth + row_size, sum = 0.0;
     memset(sixth, 0, row_size * sizeof *sixth);
     for (int j = 0; j < parts(height); j++) {
         int begin = part_begin(height, j), end = part_begin(height, j + 1);
         for (int y = begin; y < end; y++) {
-            const float *row[TAPS];
-            for (int k = 0; k < TAPS; k++)
-                row[k] = row_at(noise, width, height, y + k - RADIUS);
-            for (int x = 0; x < width; x++)
-                column[RADIUS + x] = blur[2] * (double)(row[0][x] + row[4][x]) + blur[1] * (double)(row[1][x] + row[3][x]) +
-                                     blur[0] * (double)row[2][x];
-            extend(column, width);
-            blur_row(column, width, sixth, blurred ? blurred + (size_t)y * row_size : NULL);
+            sum_columns(image, width, height, y, expected ? blur_of_variance : blur, column);
+            if (expected)
+                expect_row(column, width, sixth);
+            else
+                blur_row(column, width, sixth, blurred ? blurred + (size_t)y * row_size : NULL);
         }
         patch_means(sixth, width, end - begin, means);
-        sum += finish_patches(means, texture + (size_t)j * across, width, end - begin,
+        sum += finish_patches(means, texture + (size_t)j * (size_t)parts(width), width, end - begin,
                               blurred ? blurred + (size_t)begin * row_size : NULL);
     }
     return sqrt(sum / (double)ggn_visible_patches(width, height));
 }
+
+double ggn_visible_noise(const float *noise, int width, int height, const double *texture, double *scratch, float *blurred)
+{
+    return visible(noise, 0, width, height, texture, scratch, blurred);
+}
+
+double ggn_visible_expected(const float *variance, int width, int height, const double *texture, double *scratch)
+{
+    return visible(variance, 1, width, height, texture, scratch, NULL);
+}
+
+double ggn_visible_together(double halves, double moments) { return sqrt(0.5 * (halves * halves + moments * moments)); }
 
 /* Sums over five rows of a, b, a b and ((a - b) / 2)^2, each [RADIUS + width + RADIUS]. */
 static void sum_rows(const float *a, const float *b, int width, int height, int y, double *const columns[SUMS])

@@ -14,6 +14,12 @@
  *   A norm of 6 lets a few bright pixels count, because people see them; squares let one noisy patch count beside smooth
  *   ones. observer/observer.h turns r into an answer.
  *
+ * Second witness. The difference of two halves is one draw of the noise, symmetric though the noise of few bright paths is
+ * not. Second moments say how large each pixel's noise is expected to be: with v the variance of the mean luminance Y,
+ * d = (L*(Y + sqrt v) - L*(Y - sqrt v)) / 2 and V = d^2 blurred by the squared Gaussian, the expected sixth power of G is
+ * 15 V^3, and r follows as above. A slope in the place of the finite difference would count what lies beyond white. The root
+ * mean square of both r is what decides.
+ *
  * Beyond the edges of a block its outermost pixels are repeated; a block may be as small as one pixel. Pure functions on
  * memory of the caller, thread-safe; the same bits on every processor (square and cube roots only).
  */
@@ -36,5 +42,9 @@ size_t ggn_visibility_scratch(int width);
 void ggn_visible_texture(const float *a, const float *b, int width, int height, double *scratch, double *texture);
 /* Returns r. noise: N [height][width]. texture: [patches]. blurred: [height][width] gets G / sqrt(s + 2), or NULL. */
 double ggn_visible_noise(const float *noise, int width, int height, const double *texture, double *scratch, float *blurred);
+/* Returns the r that is expected of independent Gaussian noise in each pixel. variance: d^2 [height][width]. */
+double ggn_visible_expected(const float *variance, int width, int height, const double *texture, double *scratch);
+/* What both witnesses say together: r by the halves and r by the moments. */
+double ggn_visible_together(double halves, double moments);
 
 #endif

@@ -140,7 +140,7 @@ static int read_pair(const struct gp_block_view *seen, int *differ, double *spli
         return 0;
     }
     *split *= seq_half_scale((double)b->spp, (double)b->half_spp);
-    *differ = gp_pair_of_halves(&in->kit, seen->view, b, rgb, &tally);
+    *differ = gp_pair_of_halves(&in->kit, seen->view, b, gp_rect_of(b), rgb, &tally);
     return 1;
 }
 

@@ -1,10 +1,21 @@
 /*
- * The criterion "observer": the model observer (observer/observer.h) in the renderer. It makes two images of a block, as a
- * display shows them: their difference is noise, their common part the texture that hides noise. With the plane HALF they
- * are the means of the two halves of the samples, and an answer follows from the block's pixels alone. Without it they are
- * the mean plus and minus the noise that an earlier value of the same mean shows (plugin/means.h). `error` is the visible
- * noise over the level at which people stop seeing it, `p_noisy` the share of viewers who still do; a block stops when that
- * is at most `visible`. With `fps` the noise is that of one frame of many. No model.
+ * The criterion "observer": the model observer (observer/observer.h) in the renderer. Two witnesses tell how visible a
+ * block's noise is, and the root mean square of what they say decides (model/visibility.h):
+ *
+ * - A pair of pictures, as a display shows them: their difference is noise, their common part the texture that hides noise.
+ *   With the plane HALF they are the means of the two halves of the samples. Without it they are the mean plus and minus the
+ *   noise that an earlier value of the same mean shows (plugin/means.h).
+ * - The second moments of the samples, where the host has MOMENT2. They know how strong the noise of each pixel is, not only
+ *   one draw of it, so that two halves which agree by luck stop nothing.
+ *
+ * Where there is no MOMENT2 the one witness errs by the luck of a draw: its noise counts as so much more that half of the
+ * viewers are what GGN_OBSERVER_VISIBLE is for it alone.
+ *
+ * A block smaller than 200x200 pixels is little evidence that rare light was met. It stops only where the 200x200 pixels
+ * about it show at most three times the limit.
+ *
+ * `error` is the visible noise over the level at which people stop seeing it, `p_noisy` the share of viewers who still do; a
+ * block stops when that is at most `visible`. With `fps` the noise is that of one frame of many. No model.
  */
 #include "observer/observer.h"
 #include "model/visibility.h"
@@ -16,19 +27,25 @@
 #include "sequence/simulate.h"
 
 enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_FPS, P_PPD, P_COUNT };
-enum { COLOR = LULL_PLANE_BIT(LULL_PLANE_COLOR), PLANES = COLOR | LULL_PLANE_BIT(LULL_PLANE_HALF) };
+enum {
+    COLOR = LULL_PLANE_BIT(LULL_PLANE_COLOR),
+    PLANES = COLOR | LULL_PLANE_BIT(LULL_PLANE_HALF) | LULL_PLANE_BIT(LULL_PLANE_MOMENT2) | LULL_PLANE_BIT(LULL_PLANE_SPP)
+};
+enum { FLOATS = 9 };              /* a pixel, of struct worker */
+enum { WINDOW = 200 };            /* pixels, the side of a block that is evidence enough by itself */
+static const double AROUND = 3.0; /* a smaller one stops only where its surroundings show at most so many times the limit */
 
 static const struct lull_param params[P_COUNT] = {
     [P_VISIBLE] =
-        LULL_KIT_FLOAT("visible", "0.35", 1e-4, 0.9999, "stop when at most this share of viewers would still see noise"),
+        LULL_KIT_FLOAT("visible", "0.5", 1e-4, 0.9999, "stop when at most this share of viewers would still see noise"),
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", "16", 2, 1e15, "samples per pixel before the first judgement"),
     [P_GROWTH] = LULL_KIT_FLOAT("growth", "1.5", 1.01, 100, "largest ratio of samples between two checks of a block"),
     [P_FPS] = GP_PARAM_FPS,
     [P_PPD] = GP_PARAM_PPD,
 };
 
-struct worker { /* [3][P] linear light of each half, its L*; [patches] */
-    float *rgb[2], *lightness[2];
+struct worker { /* [3][P] linear light of each half, its L*; [P]; [patches] */
+    float *rgb[2], *lightness[2], *deviation;
     double *texture, *scratch;
 };
 
@@ -41,10 +58,11 @@ struct lull_instance {
     struct lull_kit kit;
     struct ggn_observer observer;
     struct ggn_temporal temporal;
-    double stop_error;
-    atomic_flag warned;    /* of planes that say nothing about noise: once per frame */
-    struct gp_means means; /* of a frame without HALF */
-    uint32_t workers;      /* of the open frame */
+    double stop_error, alone; /* alone: how much more one witness is asked for than two are */
+    atomic_flag warned;       /* of planes that say nothing about noise: once per frame */
+    struct gp_means means;    /* of a frame without HALF */
+    uint32_t workers;         /* of the open frame */
+    struct lull_rect frame;   /* around all blocks */
     struct largest largest;
     struct worker *worker;
     float *pixels;   /* owns what the workers point into */
@@ -53,34 +71,106 @@ struct lull_instance {
 
 /* --- one block --------------------------------------------------------------------------------------------------------- */
 
-/* split: of the two pictures' difference, to noise as strong as the mean's. */
-static double error_of(const struct lull_instance *in, const struct lull_block *b, double split, struct worker *w)
-{
-    const int width = b->x1 - b->x0, height = b->y1 - b->y0;
-    const size_t pixels = (size_t)lull_kit_pixels(b);
+static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
 
+static int32_t least(int32_t a, int32_t b) { return a < b ? a : b; }
+
+/* A side of what surrounds a small block: WINDOW pixels about it, as far as the frame reaches. */
+static void widen(int32_t *from, int32_t *to, int32_t first, int32_t last)
+{
+    const int32_t more = WINDOW - (*to - *from);
+    *from = most(first, *from - more / 2);
+    *to = least(last, *to + more - more / 2);
+}
+
+static struct lull_rect window_of(const struct lull_rect *frame, struct lull_rect r)
+{
+    if (r.x1 - r.x0 < WINDOW)
+        widen(&r.x0, &r.x1, frame->x0, frame->x1);
+    if (r.y1 - r.y0 < WINDOW)
+        widen(&r.y0, &r.y1, frame->y0, frame->y1);
+    return r;
+}
+
+static void see_both(struct worker *w, size_t pixels)
+{
     for (int k = 0; k < 2; k++)
         ggn_visible_lightness(w->rgb[k], pixels, w->lightness[k]);
+}
+
+/* Visible noise of the two pictures of w, whose difference is made as strong as the noise of the mean by `split`; the
+ * texture they share stays in w. *gain: of the noise, where it is that of one frame of many. */
+static double noise_of_difference(const struct lull_instance *in, int width, int height, double split, struct worker *w,
+                                  double *gain)
+{
+    const size_t pixels = (size_t)width * (size_t)height;
+    const int moving = gp_is_moving(&in->kit, P_FPS);
+
+    see_both(w, pixels);
     ggn_visible_texture(w->lightness[0], w->lightness[1], width, height, w->scratch, w->texture);
     for (size_t i = 0; i < pixels; i++)
         w->lightness[0][i] = (float)split * (w->lightness[0][i] - w->lightness[1][i]);
-    const int moving = gp_is_moving(&in->kit, P_FPS);
     double noise =
         ggn_visible_noise(w->lightness[0], width, height, w->texture, w->scratch, moving ? w->lightness[1] : NULL);
-    if (moving)
-        noise *= ggn_temporal_gain(&in->temporal, w->lightness[1], width, height);
-    return ggn_observer_error(&in->observer, noise, pixels);
+    *gain = moving ? ggn_temporal_gain(&in->temporal, w->lightness[1], width, height) : 1;
+    return noise;
 }
 
-/* What the two pictures of w say; differ: they are not the same everywhere. `same` is the warning if they should not be. */
-static double verdict_on(struct lull_instance *in, const struct lull_block *b, int differ, double split, const char *same,
-                         struct worker *w, struct lull_kit_tally *tally)
+/* Visible noise that second moments let expect before w's texture; 0: they tell of none. One standard deviation to either
+ * side of a mean; two, halved, where one lies beyond white, as after two lucky hits of a lamp smaller than the pixel. */
+static double noise_of_moments(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                               struct lull_rect area, struct worker *w)
 {
-    if (differ)
-        return error_of(in, b, split, w);
-    return gp_error_of_same(&in->kit, gp_pair_has_structure(w->rgb[0], (size_t)lull_kit_pixels(b)), &in->warned, same,
-                            tally);
+    const int width = area.x1 - area.x0, height = area.y1 - area.y0;
+    const size_t pixels = (size_t)width * (size_t)height;
+
+    if (!gp_pair_of_moments(&in->kit, view, b, area, 1, w->rgb))
+        return 0;
+    see_both(w, pixels);
+    for (size_t i = 0; i < pixels; i++)
+        w->deviation[i] = 0.5f * (w->lightness[0][i] - w->lightness[1][i]);
+    gp_pair_of_moments(&in->kit, view, b, area, 2, w->rgb);
+    see_both(w, pixels);
+    for (size_t i = 0; i < pixels; i++) {
+        const float d = fmaxf(w->deviation[i], 0.25f * (w->lightness[0][i] - w->lightness[1][i]));
+        w->deviation[i] = d * d;
+    }
+    return ggn_visible_expected(w->deviation, width, height, w->texture, w->scratch);
 }
+
+/* The error of an area, whose two pictures are in w; differ: anywhere. Where only second moments tell of noise, as when both
+ * halves have hit a small lamp equally often, they decide alone. NaN: neither tells of any. */
+static double error_of(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                       struct lull_rect area, int differ, double split, struct worker *w)
+{
+    const int width = area.x1 - area.x0, height = area.y1 - area.y0;
+    const int moments = lull_kit_plane(view, LULL_PLANE_MOMENT2) && b->spp >= 2;
+    double gain, expected = 0;
+
+    if (!differ && !moments)
+        return (double)NAN;
+    double noise = noise_of_difference(in, width, height, split, w, &gain);
+    if (moments)
+        expected = noise_of_moments(in, view, b, area, w);
+    if (!differ && expected == 0)
+        return (double)NAN;
+    if (moments)
+        noise = differ ? ggn_visible_together(noise, expected) : expected;
+    else
+        noise *= in->alone; /* the luck of one draw */
+    return ggn_observer_error(&in->observer, gain * noise, (size_t)width * (size_t)height);
+}
+
+/* Its error, or that of a block in which nothing tells of noise; `same` is the warning if something should. */
+static double verdict_on(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, int differ,
+                         double split, const char *same, struct worker *w, struct lull_kit_tally *tally)
+{
+    const int structure = !differ && gp_pair_has_structure(w->rgb[0], (size_t)lull_kit_pixels(b));
+    const double error = error_of(in, view, b, gp_rect_of(b), differ, split, w);
+    return isnan(error) ? gp_error_of_same(&in->kit, structure, &in->warned, same, tally) : error;
+}
+
+static double split_of(const struct lull_block *b) { return 0.5 * seq_half_scale((double)b->spp, (double)b->half_spp); }
 
 static double error_of_halves(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                               struct worker *w, struct lull_kit_tally *tally)
@@ -93,11 +183,26 @@ static double error_of_halves(struct lull_instance *in, const struct lull_view *
         tally->early = 1;
         return (double)NAN;
     }
-    int differ = gp_pair_of_halves(&in->kit, view, b, w->rgb, tally);
-    return verdict_on(in, b, differ, 0.5 * seq_half_scale((double)b->spp, (double)b->half_spp),
+    int differ = gp_pair_of_halves(&in->kit, view, b, gp_rect_of(b), w->rgb, tally);
+    return verdict_on(in, view, b, differ, split_of(b),
                       "observer: COLOR and HALF are the same in a block that is not of one colour: HALF must hold a fixed "
                       "half of the samples",
                       w, tally);
+}
+
+/* What the surroundings of a block let expect of it: whether a few samples of a few pixels have met rare light is luck, and
+ * those beside it had other luck. 0 where there are none. */
+static double error_around(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                           struct worker *w)
+{
+    const struct lull_rect own = gp_rect_of(b), area = window_of(&in->frame, own);
+    struct lull_kit_tally ignored = {0};
+
+    if (!view->all || memcmp(&own, &area, sizeof own) == 0)
+        return 0;
+    int differ = gp_pair_of_halves(&in->kit, view, b, area, w->rgb, &ignored);
+    double error = error_of(in, view, b, area, differ, split_of(b), w);
+    return isnan(error) ? 0 : error / AROUND;
 }
 
 static double error_of_means(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
@@ -112,7 +217,7 @@ static double error_of_means(struct lull_instance *in, const struct lull_view *v
         tally->early = 1;
         return (double)NAN;
     }
-    return verdict_on(in, b, differ, 0.5,
+    return verdict_on(in, view, b, differ, 0.5,
                       "observer: COLOR has not changed since an earlier check of a block that is not of one colour: it "
                       "must hold the mean of all samples",
                       w, tally);
@@ -129,6 +234,9 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
         tally.early = 1;
     else
         error = (in->means.count ? error_of_means : error_of_halves)(in, view, b, w, &tally);
+    /* What surrounds a block is read where it matters: before a stop, and where the answer is all that is wanted. */
+    if (!in->means.count && (error <= in->stop_error || (b->flags & LULL_BLOCK_FINAL && !isnan(error))))
+        error = fmax(error, error_around(in, view, b, w));
     lull_kit_verdict(&in->kit, b, &tally, error, in->stop_error, 0, in->kit.value[P_GROWTH], d);
     if (d->action == LULL_CONTINUE && !isnan(d->predicted_spp)) /* the last steps are short: checks cost little here */
         lull_kit_continue(&in->kit, b, ggn_observer_next((double)b->spp, d->predicted_spp, in->kit.value[P_GROWTH]), d);
@@ -166,13 +274,13 @@ static void workers_release(struct lull_instance *in)
 }
 
 /* Scratch memory for blocks of up to this size; replaces that of an open frame. */
-static int32_t workers_create(struct lull_instance *in, const struct largest *most, struct lull_error *err)
+static int32_t workers_create(struct lull_instance *in, const struct largest *largest, struct lull_error *err)
 {
-    const size_t count = lull_kit_workers(&in->kit), pixels = most->pixels;
-    const size_t doubles = most->patches + ggn_visibility_scratch(most->width);
-    const int fits = pixels <= PTRDIFF_MAX / (8 * sizeof(float)) / count;
+    const size_t count = lull_kit_workers(&in->kit), pixels = largest->pixels;
+    const size_t doubles = largest->patches + ggn_visibility_scratch(largest->width);
+    const int fits = pixels <= PTRDIFF_MAX / (FLOATS * sizeof(float)) / count;
     struct worker *worker = fits ? calloc(count, sizeof *worker) : NULL;
-    float *planes = worker ? malloc(count * 8 * pixels * sizeof *planes) : NULL;
+    float *planes = worker ? malloc(count * FLOATS * pixels * sizeof *planes) : NULL;
     double *scratch = planes ? malloc(count * doubles * sizeof *scratch) : NULL;
 
     if (!scratch) {
@@ -181,17 +289,17 @@ static int32_t workers_create(struct lull_instance *in, const struct largest *mo
         return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: out of memory");
     }
     for (size_t i = 0; i < count; i++) {
-        float *at = planes + i * 8 * pixels;
+        float *at = planes + i * FLOATS * pixels;
         double *texture = scratch + i * doubles;
-        worker[i] =
-            (struct worker){{at, at + 3 * pixels}, {at + 6 * pixels, at + 7 * pixels}, texture, texture + most->patches};
+        worker[i] = (struct worker){
+            {at, at + 3 * pixels}, {at + 6 * pixels, at + 7 * pixels}, at + 8 * pixels, texture, texture + largest->patches};
     }
     workers_release(in);
     in->worker = worker;
     in->pixels = planes;
     in->scratch = scratch;
     in->workers = (uint32_t)count;
-    in->largest = *most;
+    in->largest = *largest;
     return LULL_OK;
 }
 
@@ -220,36 +328,51 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     atomic_flag_clear(&in->warned);
     in->observer = ggn_observer_default;
     in->stop_error = ggn_observer_error_at(&in->observer, in->kit.value[P_VISIBLE]);
+    in->alone = 1 / ggn_observer_error_at(&in->observer, GGN_OBSERVER_VISIBLE);
     gp_temporal_init(&in->temporal, &in->kit, P_FPS, P_PPD);
+    in->kit.need.halo = WINDOW / 2;
     *instance = in;
     return LULL_OK;
+}
+
+static struct lull_rect frame_of(const struct lull_frame *frame)
+{
+    struct lull_rect all = *lull_kit_rect(frame, 0);
+    for (uint32_t i = 1; i < frame->block_count; i++) {
+        const struct lull_rect *r = lull_kit_rect(frame, i);
+        all = (struct lull_rect){least(all.x0, r->x0), least(all.y0, r->y0), most(all.x1, r->x1), most(all.y1, r->y1)};
+    }
+    return all;
 }
 
 static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
 {
     int32_t status = lull_kit_frame_check(in, frame, err);
-    struct largest most = {.pixels = 1, .patches = 1, .width = 1};
+    struct largest largest = {.pixels = 1, .patches = 1, .width = 1};
+    struct lull_rect all;
 
     if (status)
         return status;
+    all = frame_of(frame);
     for (uint32_t i = 0; i < frame->block_count; i++) {
-        const struct lull_rect *r = lull_kit_rect(frame, i);
-        const int32_t width = r->x1 - r->x0, height = r->y1 - r->y0;
+        const struct lull_rect r = window_of(&all, *lull_kit_rect(frame, i));
+        const int32_t width = r.x1 - r.x0, height = r.y1 - r.y0;
         const size_t pixels = (size_t)width * (size_t)height, patches = ggn_visible_patches(width, height);
-        most.pixels = pixels > most.pixels ? pixels : most.pixels;
-        most.patches = patches > most.patches ? patches : most.patches;
-        most.width = width > most.width ? width : most.width;
+        largest.pixels = pixels > largest.pixels ? pixels : largest.pixels;
+        largest.patches = patches > largest.patches ? patches : largest.patches;
+        largest.width = most(width, largest.width);
     }
     struct gp_means means = {0};
     if (!(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)))
         status = gp_means_create(&means, frame, err);
     if (!status)
-        status = workers_create(in, &most, err);
+        status = workers_create(in, &largest, err);
     if (status) {
         gp_means_release(&means);
         return status;
     }
     in->means = means;
+    in->frame = all;
     atomic_flag_clear(&in->warned);
     lull_kit_frame_open(in, frame);
     if (in->means.count)
@@ -293,10 +416,11 @@ static const struct lull_state state = {.struct_size = sizeof state, .save = sta
 static const void *get_extension(const char *id) { return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL; }
 
 const struct lull_criterion ggn_plugin_observer =
-    GP_TABLE(.create = create, .begin_frame = begin_frame, .evaluate = evaluate, .end_frame = end_frame, .destroy = destroy,
-             .get_extension = get_extension, .id = "observer", .name = "Model observer",
+    GP_TABLE(.version = "1.1", .create = create, .begin_frame = begin_frame, .evaluate = evaluate, .end_frame = end_frame,
+             .destroy = destroy, .get_extension = get_extension, .id = "observer", .name = "Model observer",
              .description =
-                 "Noise that people would see, from the two halves of the samples, or, without half buffers, from how\n"
-                 "the mean changes between checks: lightness, slightly blurred and pooled so that a few bright pixels\n"
-                 "count, against a limit that rises with the texture. `error` is the visible noise over that limit\n"
-                 "(1 = just not visible), fitted to human thresholds.");
+                 "Noise that people would see, from the two halves of the samples (without half buffers, from how the\n"
+                 "mean changes between checks) and from their second moments: lightness, slightly blurred and pooled so\n"
+                 "that a few bright pixels count, against a limit that rises with the texture. `error` is the visible\n"
+                 "noise over that limit (1 = just not visible), fitted to human thresholds. Small blocks also wait for\n"
+                 "what surrounds them.");

@@ -5,36 +5,138 @@
 
 static const double FLOAT_STEP = 0x1p-22; /* means that are nearer than their rounding are the same */
 
-enum { COLOR = LULL_PLANE_BIT(LULL_PLANE_COLOR), PLANES = COLOR | LULL_PLANE_BIT(LULL_PLANE_HALF) };
+enum { COLOR = LULL_PLANE_BIT(LULL_PLANE_COLOR), HALF = LULL_PLANE_BIT(LULL_PLANE_HALF) };
+enum { MOMENTS = COLOR | LULL_PLANE_BIT(LULL_PLANE_MOMENT2) | LULL_PLANE_BIT(LULL_PLANE_SPP) };
 
-static int usable(const double a[3], const double m[3])
+/* Two pictures, [3][P], of the pixels of an area. */
+struct target {
+    struct lull_rect area;
+    float *const *rgb;
+};
+
+struct source;
+
+/* One pixel of a span as two colours, in linear radiance; 0: it holds no numbers. */
+typedef int (*two_colours)(const struct source *from, const struct lull_kit_span *s, int32_t i, double one[3],
+                           double other[3]);
+
+struct source {
+    const struct lull_kit *kit;
+    const struct lull_view *view;
+    uint32_t planes;
+    two_colours colours;
+    double deviations;
+};
+
+static int usable(const double a[3], const double b[3])
 {
-    return isfinite(a[0]) && isfinite(a[1]) && isfinite(a[2]) && isfinite(m[0]) && isfinite(m[1]) && isfinite(m[2]);
+    return isfinite(a[0]) && isfinite(a[1]) && isfinite(a[2]) && isfinite(b[0]) && isfinite(b[1]) && isfinite(b[2]);
 }
 
-int gp_pair_of_halves(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
-                      float *const rgb[2], struct lull_kit_tally *tally)
+static int both_halves(const struct source *from, const struct lull_kit_span *s, int32_t i, double one[3], double other[3])
 {
-    const double n = (double)b->spp, h = (double)b->half_spp; /* h of the n samples are in HALF */
-    const size_t plane = (size_t)lull_kit_pixels(b);
+    const double n = (double)s->block->spp, h = (double)s->block->half_spp; /* h of the n samples are in HALF */
+    const double *m = s->value[LULL_PLANE_COLOR][i], *a = s->value[LULL_PLANE_HALF][i];
+    (void)from;
+    for (int c = 0; c < 3; c++) {
+        one[c] = a[c];
+        other[c] = a[c] != m[c] ? (n * m[c] - h * a[c]) / (n - h) : a[c];
+    }
+    return usable(a, m);
+}
+
+static int both_sides(const struct source *from, const struct lull_kit_span *s, int32_t i, double one[3], double other[3])
+{
+    const double n = s->planes & LULL_PLANE_BIT(LULL_PLANE_SPP) ? s->value[LULL_PLANE_SPP][i][0] : (double)s->block->spp;
+    const double *m = s->value[LULL_PLANE_COLOR][i], moment2 = s->value[LULL_PLANE_MOMENT2][i][0];
+    const double y = lull_kit_luminance(from->kit, m), spread = moment2 - y * y;
+    const double share =
+        n >= 2 && y > 0 && spread > FLOAT_STEP * moment2 ? from->deviations * sqrt(spread / (n - 1)) / y : 0;
+    for (int c = 0; c < 3; c++) {
+        one[c] = m[c] * (1 + share);
+        other[c] = m[c] * fmax(1 - share, 0);
+    }
+    return usable(one, other) && isfinite(moment2);
+}
+
+/* The pixels of `rect`, which belong to block b. Returns whether the colours differ anywhere. */
+static int read_part(const struct source *from, const struct lull_block *b, struct lull_rect rect, const struct target *to,
+                     struct lull_kit_tally *tally)
+{
+    const size_t width = (size_t)(to->area.x1 - to->area.x0), plane = width * (size_t)(to->area.y1 - to->area.y0);
+    struct lull_block part = *b;
     struct lull_kit_span s;
-    size_t at = 0;
     int differ = 0;
 
-    for (lull_kit_span_begin(&s, view, b, PLANES); lull_kit_span_next(&s);)
-        for (int32_t i = 0; i < s.count; i++, at++) {
-            const double *m = s.value[LULL_PLANE_COLOR][i], *a = s.value[LULL_PLANE_HALF][i];
-            int good = usable(a, m);
+    part.x0 = rect.x0, part.y0 = rect.y0, part.x1 = rect.x1, part.y1 = rect.y1;
+    for (lull_kit_span_begin(&s, from->view, &part, from->planes); lull_kit_span_next(&s);)
+        for (int32_t i = 0; i < s.count; i++) {
+            const size_t at = (size_t)(s.y - to->area.y0) * width + (size_t)(s.x + i - to->area.x0);
+            double one[3], other[3];
+            const int good = from->colours(from, &s, i, one, other);
             tally->valid += good;
             tally->bad += !good;
             for (size_t c = 0; c < 3; c++) {
-                float *one = &rgb[0][c * plane + at], *other = &rgb[1][c * plane + at];
-                *one = good ? gp_shown(kit, a[c]) : at ? one[-1] : 0;
-                *other = good ? gp_shown(kit, (n * m[c] - h * a[c]) / (n - h)) : at ? other[-1] : 0;
-                differ |= good && a[c] != m[c];
+                float *a = &to->rgb[0][c * plane + at], *z = &to->rgb[1][c * plane + at];
+                *a = good ? gp_shown(from->kit, one[c]) : at ? a[-1] : 0;
+                *z = good ? gp_shown(from->kit, other[c]) : at ? z[-1] : 0;
+                differ |= good && one[c] != other[c];
             }
         }
     return differ;
+}
+
+static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
+
+static int32_t least(int32_t a, int32_t b) { return a < b ? a : b; }
+
+/* All pixels of the area that belong to a block with samples; the rest is black in both pictures. */
+static int read_around(const struct source *from, const struct lull_block *b, const struct target *to,
+                       struct lull_kit_tally *tally)
+{
+    const struct lull_rect area = to->area;
+    const struct lull_view *view = from->view;
+    const size_t values = 3 * (size_t)(area.x1 - area.x0) * (size_t)(area.y1 - area.y0);
+    int differ = 0;
+
+    memset(to->rgb[0], 0, values * sizeof(float));
+    memset(to->rgb[1], 0, values * sizeof(float));
+    for (uint32_t i = 0; i < (view->all ? view->all_count : 1); i++) {
+        const struct lull_block *o = view->all ? lull_kit_at(view->all, view->all_stride, i) : b;
+        o = o->id == b->id ? b : o;
+        const struct lull_rect r = {most(o->x0, area.x0), most(o->y0, area.y0), least(o->x1, area.x1),
+                                    least(o->y1, area.y1)};
+        if (o->spp > 0 && (!(from->planes & HALF) || gp_has_halves(o)) && r.x0 < r.x1 && r.y0 < r.y1)
+            differ |= read_part(from, o, r, to, tally);
+    }
+    return differ;
+}
+
+struct lull_rect gp_rect_of(const struct lull_block *b) { return (struct lull_rect){b->x0, b->y0, b->x1, b->y1}; }
+
+static int read_pair(const struct source *from, const struct lull_block *b, struct lull_rect area, float *const rgb[2],
+                     struct lull_kit_tally *tally)
+{
+    const struct target to = {area, rgb};
+    const struct lull_rect own = gp_rect_of(b);
+    if (memcmp(&area, &own, sizeof area) == 0)
+        return read_part(from, b, own, &to, tally);
+    return read_around(from, b, &to, tally);
+}
+
+int gp_pair_of_halves(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
+                      struct lull_rect area, float *const rgb[2], struct lull_kit_tally *tally)
+{
+    const struct source from = {kit, view, COLOR | HALF, both_halves, 0};
+    return read_pair(&from, b, area, rgb, tally);
+}
+
+int gp_pair_of_moments(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
+                       struct lull_rect area, double deviations, float *const rgb[2])
+{
+    const struct source from = {kit, view, MOMENTS, both_sides, deviations};
+    struct lull_kit_tally ignored = {0}; /* the same pixels are no numbers in other pairs */
+    return read_pair(&from, b, area, rgb, &ignored);
 }
 
 int gp_pair_of_means(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b, const float *base,

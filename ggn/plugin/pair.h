@@ -11,11 +11,18 @@
 #include <lull/criterion_kit.h>
 
 /* rgb: two of [3][P]. A pixel that is no number takes the place of the one before it: neither noise nor texture; the tally
- * counts it. Both return whether the pictures differ anywhere. */
+ * counts it. All return whether the pictures differ anywhere. */
 
-/* The means of the two halves of the samples; the view has COLOR and HALF. */
+struct lull_rect gp_rect_of(const struct lull_block *block);
+
+/* The means of the two halves of the samples, in `area`, of P pixels: the block's own rectangle, or more of the view. There
+ * the pixels of other blocks count as far as the view knows them; the rest is black in both. The view has COLOR and HALF. */
 int gp_pair_of_halves(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *block,
-                      float *const rgb[2], struct lull_kit_tally *tally);
+                      struct lull_rect area, float *const rgb[2], struct lull_kit_tally *tally);
+/* Likewise the mean plus and minus so many standard deviations that the second moments give its luminance; from two samples
+ * on. The view has COLOR and MOMENT2. Samples are taken as independent: of stratified ones it says too much. */
+int gp_pair_of_moments(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *block,
+                       struct lull_rect area, double deviations, float *const rgb[2]);
 /* The mean plus and minus its noise, as the earlier mean `base` tells, of spp_base samples (plugin/means.h); NULL: nothing
  * tells it. Keeps the mean where `keep` is not NULL. */
 int gp_pair_of_means(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *block,

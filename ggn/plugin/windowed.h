@@ -83,7 +83,8 @@ const void *gp_windowed_get_extension(const char *id);
 
 /* Table of such a criterion; see GP_TABLE. */
 #define GP_WINDOWED_TABLE(...) \
-    GP_TABLE(.begin_frame = gp_windowed_begin_frame, .evaluate = gp_windowed_evaluate, .end_frame = gp_windowed_end_frame, \
-             .destroy = gp_windowed_destroy, .get_extension = gp_windowed_get_extension, __VA_ARGS__)
+    GP_TABLE(.version = "1.0", .begin_frame = gp_windowed_begin_frame, .evaluate = gp_windowed_evaluate, \
+             .end_frame = gp_windowed_end_frame, .destroy = gp_windowed_destroy, \
+             .get_extension = gp_windowed_get_extension, __VA_ARGS__)
 
 #endif

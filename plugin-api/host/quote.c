@@ -128,10 +128,15 @@ static int32_t ask_row(const struct lull_host_quote *q, struct lull_host_quote_a
     if (!a->criterion || count == 0 || (blocks->flags & LULL_HOST_UNIFORM))
         return LULL_OK;
     struct lull_decision *decisions = calloc(count, sizeof *decisions);
-    if (!decisions)
+    uint8_t *final = malloc(count); /* the answers are read, and followed by no sample */
+    if (!decisions || !final) {
+        free(decisions);
+        free(final);
         return no_memory(err);
+    }
+    memset(final, 1, count);
     double start_s = base_clock_wall_s();
-    int32_t code = lull_host_evaluate(a->criterion, q->frame, view, due, NULL, count, decisions, err);
+    int32_t code = lull_host_evaluate(a->criterion, q->frame, view, due, final, count, decisions, err);
     a->asked_s += base_clock_wall_s() - start_s;
     a->asked += count;
     for (uint32_t k = 0; k < count && code == LULL_OK; k++) {
@@ -140,6 +145,7 @@ static int32_t ask_row(const struct lull_host_quote *q, struct lull_host_quote_a
             a->first[due[k]] = a->said[due[k]];
     }
     free(decisions);
+    free(final);
     return code;
 }
 

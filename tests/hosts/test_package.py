@@ -831,7 +831,7 @@ def test_quote():
     assert d.run().outcome == "done" and [b.spp for b in f.blocks] == [b.spp for b in plain.blocks]
     taken = d.totals.samples / f.view.pixels
     assert .7 < rows[2].spp[1] / taken < 1.4, (rows[2], taken)
-    assert quote.line(d).startswith("visible 0.35 takes about ") and "; visible 0.9 would take about " in quote.line(d)
+    assert quote.line(d).startswith("visible 0.5 takes about ") and "; visible 0.9 would take about " in quote.line(d)
     f.close()
     f.criterion.close()
     assert len(quote.rows(d)) == 4  # of a render that is over, too

@@ -354,8 +354,8 @@ static const struct lull_state state = {.struct_size = sizeof state, .save = sta
 static const void *get_extension(const char *id) { return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL; }
 
 const struct lull_criterion ggn_plugin_denoised =
-    GP_TABLE(.create = create, .begin_frame = begin_frame, .evaluate = evaluate, .end_frame = end_frame, .destroy = destroy,
-             .get_extension = get_extension, .id = "denoised", .name = "Denoised picture",
+    GP_TABLE(.version = "1.0", .create = create, .begin_frame = begin_frame, .evaluate = evaluate, .end_frame = end_frame,
+             .destroy = destroy, .get_extension = get_extension, .id = "denoised", .name = "Denoised picture",
              .description =
                  "Error that people would see in the denoised picture, its bias included: both halves of the samples are\n"
                  "denoised (Open Image Denoise) and held against each other and against the other half, noisy. `error`\n"
