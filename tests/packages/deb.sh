@@ -1,13 +1,13 @@
 #!/bin/sh
 # The Debian packages: made, held against Debian's rules, installed into a root of their own, used there, and purged.
-# DEB_ROOT=debian (as root, minutes, a package mirror): that root is a Debian with nothing else in it, and apt finds what they
+# DEB_ROOT=debian (as root, minutes, a package mirror): that root is this Debian with nothing else in it, and apt finds what they
 # depend on. Else it is empty, and the programs run with this machine's libraries.
 . "$(dirname "$0")/setup"
 needs dpkg-buildpackage dpkg-dev
 needs dh debhelper
 root=$tmp/root
 if [ "${DEB_ROOT-}" = debian ]; then
-    mmdebstrap --variant=apt --include=g++,pkg-config bookworm "$root" >"$tmp/log" 2>&1 || {
+    mmdebstrap --variant=apt --include=g++,pkg-config "$(. /etc/os-release && echo "$VERSION_CODENAME")" "$root" >"$tmp/log" 2>&1 || {
         echo "not ok 1 - mmdebstrap"
         tail "$tmp/log" | sed 's/^/# /'
         exit 1
@@ -36,16 +36,17 @@ else n=$((n + 1)); echo "ok $n - lintian # SKIP no lintian: apt-get install lint
 field() { dpkg-deb -f build/deb/lull_*.deb "$1"; }
 t "MPI and its launcher are suggested, and not needed" sh -c "echo '$(field Suggests)' | grep -q 'libopenmpi.*openmpi-bin' && ! echo '$(field Depends)' | grep -q mpi"
 t "images are recommended" sh -c "echo '$(field Recommends)' | grep -q openimageio && ! echo '$(field Depends)' | grep -q openimageio"
-t "criteria and modules have no soname" sh -c "objdump -p $root/usr/lib/lull/*.so $root/usr/lib/lull/modules/*.so >$tmp/elf && ! grep SONAME $tmp/elf"
-t "the host library has one, by which its package is named" sh -c "objdump -p $root/usr/lib/liblull-host.so.1 | grep -q 'SONAME *liblull-host.so.1'"
+multiarch=lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)
+t "criteria and modules have no soname" sh -c "objdump -p $root/usr/$multiarch/lull/*.so $root/usr/$multiarch/lull/modules/*.so >$tmp/elf && ! grep SONAME $tmp/elf"
+t "the host library has one, by which its package is named" sh -c "objdump -p $root/usr/$multiarch/liblull-host.so.1 | grep -q 'SONAME *liblull-host.so.1'"
 cp tests/cli/room.pbrt "$work"
 t "a scene is rendered" inside "$usr/bin/lull-render room.pbrt --size 60x40 --block 20 --spp-max 32 -q -o a.exr --stop-map a.csv && cat a.csv"
 t "  …by each criterion" inside "for c in fixed halfbuf variance ggn attributes; do $usr/bin/lull-render room.pbrt --size 60x40 --block 20 --spp-max 32 -q -c \$c -o \$c.exr || exit 1; done"
 t "lull-check holds an installed criterion against its contract" inside "$usr/bin/lull-check -q halfbuf"
-t "the example host is built against it" inside "export PKG_CONFIG_PATH=$usr/lib/pkgconfig PKG_CONFIG_SYSROOT_DIR=${usr%/usr} &&
+t "the example host is built against it" inside "export PKG_CONFIG_PATH=$usr/$multiarch/pkgconfig PKG_CONFIG_SYSROOT_DIR=${usr%/usr} &&
     c++ -std=c++11 $usr/share/doc/lull-dev/examples/host.cpp \$(pkg-config --cflags --libs lull-host) -o host"
-t "  …finds the criteria, and stops its noisy half later" inside "LD_LIBRARY_PATH=$usr/lib ./host observer stops.csv && awk -F';' 'NR == 2 { exit !(\$NF + 0 > \$2 + 0) }' stops.csv"
-t "the example criterion is built, and keeps the contract" inside "cc -shared -fPIC -fvisibility=hidden \$(PKG_CONFIG_PATH=$usr/lib/pkgconfig \
+t "  …finds the criteria, and stops its noisy half later" inside "LD_LIBRARY_PATH=$usr/$multiarch ./host observer stops.csv && awk -F';' 'NR == 2 { exit !(\$NF + 0 > \$2 + 0) }' stops.csv"
+t "the example criterion is built, and keeps the contract" inside "cc -shared -fPIC -fvisibility=hidden \$(PKG_CONFIG_PATH=$usr/$multiarch/pkgconfig \
     PKG_CONFIG_SYSROOT_DIR=${usr%/usr} pkg-config --cflags lull-criterion) -Wl,--version-script=$usr/share/doc/lull-dev/examples/plugin.map \
     $usr/share/doc/lull-dev/examples/null.c -o mine.so -lm && $usr/bin/lull-check -q ./mine.so"
 doc=$root/usr/share/doc/lull
