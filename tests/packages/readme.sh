@@ -5,6 +5,7 @@ sed -n '/^## Install/,/^## /p' README.md | sed -n '/^```sh/,/^```/p' | grep -v '
 run_by() { # run_by LINE: a test takes it, or tests/e2e/demo.sh runs what it ends in
     case $1 in
     "make demo") make -n -o all demo 2>/dev/null | grep -qx scripts/demo && grep -q 'scripts/demo$' tests/e2e/demo.sh ;;
+    "make test") grep -q '^make .* test ' .ci/run ;;
     *) sed -n 's/.*readme_line "\(.*\)").*/\1/p' tests/packages/*.sh | while read -r start; do case $1 in "$start"*) echo "$start" ;; esac; done | grep . ;;
     esac
 }
