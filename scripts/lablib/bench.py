@@ -217,6 +217,34 @@ def compare_rays(scenes, rounds, passes):
         row("  paths", median([r["paths_per_s"] for r in results]) / 1e6, unit=" Mpaths/s")
 
 
+def embree_of(program):
+    """The major version of Embree that a program calls."""
+    found = re.search(r"libembree([0-9]+)", answer(["ldd", program]))
+    if not found:
+        raise tool.Refused(program + " calls no Embree")
+    return found[1]
+
+
+def bench_embree(rounds, quick):
+    """Rays by Embree 4 against 3, of which each build has one: tests/distributions/embree3 makes the second."""
+    second = os.path.join(BUILD, "embree3", "bench", "pt_rays")
+    if not os.path.exists(second):
+        return missing("Embree 4 against 3", "no second build (tests/distributions/embree3, on Debian 13)")
+    programs = {embree_of(program): program for program in (RAYS, second)}
+    if set(programs) != {"3", "4"}:
+        raise tool.Refused("both builds call Embree %s" % ", ".join(programs))
+    with tempfile.TemporaryDirectory() as scratch:
+        for name, scene, depth in (("Cornell box", BOX, "8"), ("terrain of 3.5 M triangles", write_terrain(scratch, 1323), "0")):
+            found = {version: [] for version in programs}
+            for _ in range(rounds):
+                for version, program in programs.items():
+                    found[version].append(json.loads(answer([program, scene, "400x400", "1" if quick else "5", depth])))
+            for what, key in (("whole paths", "rays_per_s"), ("tracing alone", "ray_only_per_s")):
+                rates = {version: [r[key] / 1e6 for r in found[version]] for version in ("4", "3")}
+                row("%s, %s: rays by Embree 4 against 3" % (name, what), median(rates["4"]), unit=" Mrays/s", limit=median(rates["3"]))
+                row("  ratio, median of the rounds", median([a / b for a, b in zip(rates["4"], rates["3"])]), unit=" x")
+
+
 # Scenes with several lights; the first three with many.
 NOISE_SCENES = ("many-lights corridor garage office candles night-street night-lamps paper-lamps library gallery bathroom crockery "
                 "still-life gems delta-lights museum glossy-row window").split()
@@ -375,7 +403,7 @@ def bench_limits():
 
 
 # What a part runs, below BUILD.
-NEEDS = {"peers": ["bin/lull-render"], "host": ["bin/lull-render"], "rays": ["bench/pt_rays"], "noise": ["bench/pt_noise"],
+NEEDS = {"peers": ["bin/lull-render"], "host": ["bin/lull-render"], "rays": ["bench/pt_rays"], "embree": ["bench/pt_rays"], "noise": ["bench/pt_noise"],
          "start": ["bin/lull-render"], "networks": ["bin/ggn"], "avx2": ["bin/ggn", "bin/lull-render", "bench/pt_rays"], "study": ["bin/lull-study"],
          "reading": ["bench/pt_readings", "bench/ggn_readings"], "limits": ["bin/lull-render", "bin/ggn"]}
 
@@ -390,7 +418,7 @@ def build(parts):
 
 def main(o):
     parts = {"peers": lambda: bench_peers(o.rounds, o.quick), "host": lambda: bench_host(o.rounds, o.quick),
-             "rays": lambda: bench_rays(o.rounds, o.quick), "noise": lambda: bench_noise(o.quick),
+             "rays": lambda: bench_rays(o.rounds, o.quick), "embree": lambda: bench_embree(o.rounds, o.quick), "noise": lambda: bench_noise(o.quick),
              "start": lambda: bench_start(o.rounds), "networks": lambda: bench_networks(o.rounds),
              "avx2": lambda: bench_avx2(o.rounds, o.quick), "study": lambda: bench_study(o.rounds),
              "reading": lambda: bench_reading(o.write), "limits": bench_limits}

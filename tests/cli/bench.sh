@@ -39,6 +39,8 @@ assert "processors" in told["processor"] and len(told["commit"]) >= 7
 P
 t "  …and fill the page" sh -c '[ "$(head -n 1 "$1")" = before ] && [ "$(tail -n 1 "$1")" = after ] && grep -q "median of these" "$1" && ! grep -q gone "$1"' - "$tmp/docs/speed.md"
 t "  …where the first row of another run says so" grep -qF '| kept (from here: 2 January 2020, old one, commit 0ld, load before 0.00) | 2 |  |  | >= 3 | **no** |' "$tmp/docs/speed.md"
+t "Embree 4 against 3: not without a second build, which is said" sh -c "env PATH='$tmp/bin:$PATH' MADE='$tmp/made' BUILD='$tmp/build' \
+    scripts/lab bench --quick --rounds 1 --only embree | grep -q '| Embree 4 against 3 | not measured: no second build (tests/distributions/embree3'"
 rm -r "$tmp/build"
 NO_MAKE=1 && export NO_MAKE
 t "what cannot be made is said" sh -c "! env PATH='$tmp/bin:$PATH' MADE='$tmp/made' BUILD='$tmp/build' scripts/lab bench --only noise,rays 2>'$tmp/out'"
