@@ -69,25 +69,29 @@ static const char *processor_name(char text[128])
     return text[0] ? text : NULL;
 }
 
+/* What the files say of a render, whose picture is the noisy one. */
+static struct pt_output_info describe(const struct pt_cli *cli, const struct pt_open *o, const char *quote,
+                                      const char *processor)
+{
+    return (struct pt_output_info){.scene = cli->scene,
+                                   .params = cli->params.list,
+                                   .param_count = cli->params.count,
+                                   .mask = cli->mask,
+                                   .effects = o->scene->effects,
+                                   .kernel = o->kernel_name,
+                                   .reproducible = cli->files.reproducible,
+                                   .scene_bytes = o->scene->stats.bytes,
+                                   .command = (const char *const *)cli->argv,
+                                   .command_count = cli->argc,
+                                   .processor = processor,
+                                   .quote = quote};
+}
+
 /* Writes what was asked for; goes on after a failure so that one missing folder, or a denoiser that fails, does not cost the
  * other files. */
-static int write_outputs(const struct pt_cli *cli, const struct pt_open *o, const char *quote, int was_interrupted,
-                         struct base_log *log, struct base_err *err)
+static int write_outputs(const struct pt_cli *cli, const struct pt_open *o, struct pt_output_info info, struct base_log *log,
+                         struct base_err *err)
 {
-    char processor[128];
-    struct pt_output_info info = {.scene = cli->scene,
-                                  .params = cli->params.list,
-                                  .param_count = cli->params.count,
-                                  .mask = cli->mask,
-                                  .effects = o->scene->effects,
-                                  .kernel = o->kernel_name,
-                                  .reproducible = cli->files.reproducible,
-                                  .scene_bytes = o->scene->stats.bytes,
-                                  .interrupted = was_interrupted,
-                                  .command = (const char *const *)cli->argv,
-                                  .command_count = cli->argc,
-                                  .processor = processor_name(processor),
-                                  .quote = quote};
     struct pt_denoised denoised = {0};
     struct base_err why = {0};
     double *noisy_error = NULL;
@@ -152,6 +156,8 @@ static int render_image(const struct pt_cli *cli, struct pt_open *o, const char 
 {
     enum pt_render_outcome outcome;
     struct pt_watch watch;
+    char processor[128];
+    struct pt_output_info info = describe(cli, o, quote, processor_name(processor));
     if (cli->checkpoint.resume) {
         int rc = pt_checkpoint_load(cli->checkpoint.path, o->render, o->settings, err);
         if (rc)
@@ -159,7 +165,7 @@ static int render_image(const struct pt_cli *cli, struct pt_open *o, const char 
     }
     if (cli->table && plan_blocks(cli, o->render, err) != 0)
         return BASE_EINVAL;
-    pt_watch_init(&watch, o, &cli->checkpoint, cli->files.preview, log);
+    pt_watch_init(&watch, o, &cli->checkpoint, &cli->files, &info, log);
     if (cli->display) {
         int rc = pt_watch_display(&watch, cli->display, cli->scene, err);
         if (rc)
@@ -173,7 +179,8 @@ static int render_image(const struct pt_cli *cli, struct pt_open *o, const char 
         *status = pt_action_status(outcome);
         return rc;
     }
-    if (write_outputs(cli, o, quote, pt_action_status(outcome) != 0, log, &write_err) != 0) {
+    info.interrupted = pt_action_status(outcome) != 0;
+    if (write_outputs(cli, o, info, log, &write_err) != 0) {
         if (rc)
             base_log_say(log, "%s", write_err.text); /* besides the render's own error: it tells where the image is */
         else

@@ -49,7 +49,7 @@ int pt_action_pilot(const struct pt_cli *cli, struct pt_open *o, struct base_log
     int rc = open_quote(cli, o, log, &pilot.quote, err);
     if (rc)
         return rc;
-    pt_watch_init(&pilot.watch, o, &cli->checkpoint, NULL, log);
+    pt_watch_init(&pilot.watch, o, &cli->checkpoint, NULL, NULL, log);
     struct pt_render_hooks hooks = pt_watch_hooks(&pilot.watch);
     hooks.judged = ask_quote;
     rc = pt_render_run(o->render, &hooks, &outcome, err);

@@ -15,7 +15,7 @@ int pt_action_record(const struct pt_cli *cli, struct pt_open *o, struct base_lo
         rc = base_inputs_crc32(&o->scene_files, &config.inputs_crc, err);
     if (rc)
         return rc;
-    pt_watch_init(&watch, o, &cli->checkpoint, NULL, log);
+    pt_watch_init(&watch, o, &cli->checkpoint, NULL, NULL, log);
     const struct pt_render_hooks hooks = pt_watch_hooks(&watch);
     rc = pt_sequence_record(&config, o->scene, o->kernel, o->threads, o->criterion, &hooks, &was_interrupted, err);
     base_log_clear(log);

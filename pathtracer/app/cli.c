@@ -290,6 +290,8 @@ static const struct base_option options[] = {
     {"stop-map", 0, "FILE.png|FILE.csv", .set = set_stop_map, .output = BASE_FILE,
      .help = "Samples per block as a picture or a table; may be repeated"},
     {"report", 0, "FILE.json", TO(files.report), .output = BASE_FILE, .words = json, .help = "Everything about the run"},
+    {"live", 0, NULL, TO(files.live),
+     .help = "Write --report and --stop-map while rendering, too, and --preview more often, for python3 -m lull watch"},
     {"html", 0, "FILE.html", TO(files.page), .output = BASE_FILE, .words = html,
      .help =
          "All of that as one page for a browser: the picture beside maps of samples, error and time, the history of each "
@@ -507,6 +509,8 @@ static int check_together(struct pt_cli *cli, struct base_err *err)
         return base_fail(err, BASE_EINVAL, "--resume needs --checkpoint FILE");
     if (cli->sequence.directory ? check_sequence(cli, err) != 0 : check_no_sequence(cli, err) != 0)
         return BASE_EINVAL;
+    if (cli->files.live && !cli->files.preview && !cli->files.report && cli->files.stop_map_count == 0)
+        return base_fail(err, BASE_EINVAL, "--live belongs to --report, --stop-map and --preview");
     if (cli->files.quoted && !cli->files.page)
         return base_fail(err, BASE_EINVAL, "--quoted belongs to --html");
     if (cli->mask && cli->spp > 0)

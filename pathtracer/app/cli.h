@@ -29,6 +29,7 @@ struct pt_image_files {
     const char *stop_maps[PT_CLI_MAX_STOP_MAPS];
     int stop_map_count;
     int reproducible;          /* leave times out of the EXR */
+    int live;                  /* stop maps and report are written while rendering, too */
     int whole_only;            /* nothing is written of an image that was interrupted */
     char default_output[1024]; /* of pt_open, when nothing is asked for */
 };

@@ -37,12 +37,14 @@ static void tell_quality(const struct pt_open *o, char *text, size_t room)
 }
 
 void pt_watch_init(struct pt_watch *w, const struct pt_open *open, const struct pt_checkpoint_plan *checkpoint,
-                   const char *preview, struct base_log *log)
+                   const struct pt_image_files *files, const struct pt_output_info *info, struct base_log *log)
 {
+    static const struct pt_image_files none;
     *w = (struct pt_watch){.log = log,
                            .open = open,
                            .checkpoint = checkpoint,
-                           .preview = preview,
+                           .files = files ? files : &none,
+                           .info = info,
                            .checkpoint_at_s = base_clock_wall_s() + checkpoint->every_s};
     pt_progress_init(&w->progress, log);
     w->progress.map = log->terminal && speaks_utf8();
@@ -83,31 +85,55 @@ static int is_interrupted(void *data)
     return base_interrupted != 0;
 }
 
-/* The picture so far: after the first slice, then when three times as long has passed, at most so often that it takes a
- * hundredth of the time; denoised, which takes some 10 us a pixel and processor, when that is less than a hundredth. One
- * that cannot be written costs nothing yet: the last one is what fails. */
-static void show_preview(struct pt_watch *w, const struct pt_render *render)
+/* Denoised, which takes some 10 us a pixel and processor, when that is less than a hundredth of the time so far. */
+static void write_preview(const struct pt_watch *w, const struct pt_render *render, struct base_err *err)
 {
-    const double ratio = 3.0, longest_s = 60.0, share = 0.01, denoised_s = 10e-6;
+    const double share = 0.01, denoised_s = 10e-6;
     const struct pt_open *o = w->open;
-    struct base_err ignored = {0};
     struct pt_denoised denoised = {0};
-    double begin_s = base_clock_wall_s(), to_denoise_s = denoised_s * (double)render->film.pixels;
-    if (o->picture != PT_PICTURE_NOISY && to_denoise_s / base_threads_count(o->threads) < share * (begin_s - o->start_s))
-        pt_denoised_make(render, PT_PICTURE_DENOISED, o->denoiser, is_interrupted, &denoised, &ignored);
+    const double so_far_s = base_clock_wall_s() - o->start_s, to_denoise_s = denoised_s * (double)render->film.pixels;
+    if (o->picture != PT_PICTURE_NOISY && to_denoise_s / base_threads_count(o->threads) < share * so_far_s)
+        pt_denoised_make(render, PT_PICTURE_DENOISED, o->denoiser, is_interrupted, &denoised, err);
     const struct pt_output_info info = {.denoised = denoised.rgb ? &denoised : NULL};
-    pt_output_preview(w->preview, render, &info, &ignored);
+    pt_output_preview(w->files->preview, render, &info, err);
     pt_denoised_release(&denoised);
-    double now_s = base_clock_wall_s();
-    w->preview_at_s = now_s + fmax(fmin(ratio * (now_s - w->open->start_s), longest_s), (now_s - begin_s) / share);
+}
+
+/* The report last: who watches it finds the others as new as it is, or newer. */
+static void write_live(const struct pt_watch *w, const struct pt_render *render, struct base_err *err)
+{
+    const struct pt_progress_now progress = pt_progress_of(render);
+    struct pt_output_info info = *w->info;
+    info.progress = &progress;
+    for (int i = 0; i < w->files->stop_map_count; i++)
+        pt_output_stop_map(w->files->stop_maps[i], render, &info, err);
+    if (w->files->report)
+        pt_output_report(w->files->report, render, &info, err);
+}
+
+/* The picture so far: after the first slice, then when three times as long has passed, at most so often that it takes a
+ * hundredth of the time. Live files: each second, if that takes less than a twentieth. A file that cannot be written costs
+ * nothing yet: the last one is what fails. */
+static void write_files(struct pt_watch *w, const struct pt_render *render)
+{
+    const double ratio = 3.0, longest_s = 60.0, share = 0.01, live_s = 1.0, live_share = 0.05;
+    struct base_err ignored = {0};
+    double begin_s = base_clock_wall_s();
+    if (w->files->preview)
+        write_preview(w, render, &ignored);
+    if (w->files->live)
+        write_live(w, render, &ignored);
+    double now_s = base_clock_wall_s(), took_s = now_s - begin_s;
+    double later_s = fmax(fmin(ratio * (now_s - w->open->start_s), longest_s), took_s / share);
+    w->files_at_s = w->files->live ? fmax(begin_s + live_s, now_s + took_s / live_share) : now_s + later_s;
 }
 
 static int after_slice(void *data, struct pt_render *render, struct base_err *err)
 {
     struct pt_watch *w = data;
     (void)err;
-    if (w->preview && !base_interrupted && base_clock_wall_s() >= w->preview_at_s)
-        show_preview(w, render);
+    if ((w->files->preview || w->files->live) && !base_interrupted && base_clock_wall_s() >= w->files_at_s)
+        write_files(w, render);
     struct pt_host_view show;
     if (w->display)
         lull_host_display_update(w->display, pt_host_show(&render->film, render->blocks, &show), NULL);

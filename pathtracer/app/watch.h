@@ -3,6 +3,7 @@
 #define PT_WATCH_H
 
 #include "open.h"
+#include "render/output.h"
 #include "render/progress.h"
 
 struct pt_watch {
@@ -10,14 +11,15 @@ struct pt_watch {
     struct pt_progress progress;
     const struct pt_open *open;                  /* of whom the settings are saved */
     const struct pt_checkpoint_plan *checkpoint; /* path NULL: none */
-    const char *preview;                         /* NULL: none */
+    const struct pt_image_files *files;          /* the preview; live: stop maps and the report */
+    const struct pt_output_info *info;           /* what they say */
     struct lull_host_display *display;           /* owns; NULL: none */
-    double checkpoint_at_s, preview_at_s;        /* wall times of the next ones */
+    double checkpoint_at_s, files_at_s;          /* wall times of the next ones */
 };
 
-/* All is borrowed. */
+/* All is borrowed. files, info: NULL, nothing is written. */
 void pt_watch_init(struct pt_watch *watch, const struct pt_open *open, const struct pt_checkpoint_plan *checkpoint,
-                   const char *preview, struct base_log *log);
+                   const struct pt_image_files *files, const struct pt_output_info *info, struct base_log *log);
 /* Shows the render in a viewer, under the name of the scene, until pt_watch_end. */
 int pt_watch_display(struct pt_watch *watch, const char *address, const char *scene, struct base_err *err);
 /* Closes the live view, with the picture as it is, and takes the progress line away. */

@@ -9,6 +9,7 @@
 
 #include "base/colour.h"
 #include "base/files.h"
+#include "base/json.h"
 #include "picture/png.h"
 #include "base/version.h"
 #include "image/exr.h"
@@ -284,17 +285,6 @@ static struct lull_host_report describe(const struct pt_render *r, const struct 
     return report;
 }
 
-int pt_output_report(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
-{
-    const char *effects[PT_FX_COUNT];
-    const struct lull_host_report report = describe(r, info, effects);
-    struct lull_error e = {.struct_size = sizeof e};
-    int32_t code = lull_host_report_write(r->frame, &report, path, &e);
-    return code == LULL_OK ? 0 : pt_output_fail(code, &e, err);
-}
-
-/* --- page ----------------------------------------------------------------------------------------------------------- */
-
 static int32_t write_text(const struct lull_writer *writer, const void *data, uint64_t size)
 {
     return fwrite(data, 1, (size_t)size, writer->context) == size ? LULL_OK : LULL_E_MEMORY;
@@ -315,6 +305,36 @@ static char *report_text(const struct pt_render *r, const struct pt_output_info 
     free(text);
     return NULL;
 }
+
+/* Of a render that goes on: the same, and how far it is. */
+static int write_report_so_far(const char *path, const struct pt_render *r, const struct pt_output_info *info,
+                               struct base_err *err)
+{
+    char *text = report_text(r, info);
+    cJSON *root = text ? cJSON_Parse(text) : NULL;
+    int failed = !root;
+    cJSON *progress = base_json_object(root, "progress", &failed);
+    base_json_number(progress, "share", info->progress->share, &failed);
+    base_json_number(progress, "left_s", info->progress->left_s, &failed);
+    base_json_bool(progress, "known", info->progress->known, &failed);
+    int rc = base_json_write(path, root, failed, err);
+    cJSON_Delete(root);
+    free(text);
+    return rc;
+}
+
+int pt_output_report(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
+{
+    const char *effects[PT_FX_COUNT];
+    if (info->progress)
+        return write_report_so_far(path, r, info, err);
+    const struct lull_host_report report = describe(r, info, effects);
+    struct lull_error e = {.struct_size = sizeof e};
+    int32_t code = lull_host_report_write(r->frame, &report, path, &e);
+    return code == LULL_OK ? 0 : pt_output_fail(code, &e, err);
+}
+
+/* --- page ----------------------------------------------------------------------------------------------------------- */
 
 int pt_output_page(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {

@@ -7,6 +7,7 @@
 
 #include "base/err.h"
 #include "render/denoised.h"
+#include "render/progress.h"
 #include "render/render.h"
 
 struct pt_output_info {
@@ -19,7 +20,8 @@ struct pt_output_info {
     int reproducible;    /* leave times out of the EXR, so that equal renders are equal files */
     int64_t scene_bytes; /* memory of the scene; < 0 = not known */
     int interrupted;
-    const char *const *command; /* [command_count] words of the command line */
+    const struct pt_progress_now *progress; /* for the report; NULL: the render is over */
+    const char *const *command;             /* [command_count] words of the command line */
     int command_count;
     const char *processor;              /* its name; NULL: not known */
     const char *quote;                  /* JSON of the quote that the page compares with; NULL: none */

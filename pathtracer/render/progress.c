@@ -27,6 +27,15 @@ static struct lull_host_forecast look(const struct pt_render *r, double *wall_s)
     return f;
 }
 
+struct pt_progress_now pt_progress_of(const struct pt_render *r)
+{
+    struct pt_progress_now now;
+    const struct lull_host_forecast f = look(r, &now.left_s);
+    now.share = f.left_s > 0.0 ? f.done_s / (f.done_s + f.left_s) : 1.0;
+    now.known = f.known != 0;
+    return now;
+}
+
 void pt_progress_text(const struct pt_render *r, double *percent_shown, char *text, size_t room)
 {
     double left_s;

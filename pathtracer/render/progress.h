@@ -19,6 +19,14 @@ struct pt_progress {
     char quality[48];     /* the criterion's quality parameter, told beside the map; "": it has none */
 };
 
+/* How far a render is that goes on. */
+struct pt_progress_now {
+    double share;  /* of its work that is done; the least if not known */
+    double left_s; /* wall seconds; INFINITY: nobody knows */
+    int known;     /* where every block will stop is predicted; else left_s is the most */
+};
+struct pt_progress_now pt_progress_of(const struct pt_render *render);
+
 void pt_progress_init(struct pt_progress *progress, struct base_log *log);
 /* Shows a line if it is time for one. */
 void pt_progress_update(struct pt_progress *progress, const struct pt_render *render);

@@ -573,7 +573,7 @@ static void between_two_slices(void **state)
     double before_s = base_clock_wall_s();
     hear_begin(&heard);
     heard.log.quiet = 1;
-    pt_watch_init(&w, &open, &plan, NULL, &heard.log);
+    pt_watch_init(&w, &open, &plan, NULL, NULL, &heard.log);
     assert_true(w.checkpoint_at_s >= before_s + 1000 && w.checkpoint_at_s <= base_clock_wall_s() + 1000);
     const struct pt_render_hooks hooks = pt_watch_hooks(&w);
     base_interrupted = 0;
@@ -597,20 +597,29 @@ static void between_two_slices(void **state)
     plan.path = NULL;
     assert_int_equal(hooks.suspend(hooks.data, &render, &err), 0);
     static const double waits[2][2] = {{15, 45}, {100, 60}};
-    w.preview = "/missing/p.png";
+    const struct pt_output_info info = {0};
+    struct pt_image_files files = {.preview = "/missing/p.png"};
+    w.files = &files;
+    w.info = &info;
     render.config.crop[2] = render.config.crop[3] = 1;
     for (int i = 0; i < 2; i++) {
         before_s = base_clock_wall_s();
         open.start_s = before_s - waits[i][0];
-        w.preview_at_s = before_s + 1e6;
+        w.files_at_s = before_s + 1e6;
         hooks.slice(hooks.data, &render, &err);
-        assert_true(w.preview_at_s == before_s + 1e6);
-        w.preview_at_s = 0;
+        assert_true(w.files_at_s == before_s + 1e6);
+        w.files_at_s = 0;
         hooks.slice(hooks.data, &render, &err);
         after_s = base_clock_wall_s();
-        assert_true(w.preview_at_s >= before_s + waits[i][1]);
-        assert_true(w.preview_at_s <= after_s + fmax(waits[i][1] + 4 * (after_s - before_s), 100 * (after_s - before_s)));
+        assert_true(w.files_at_s >= before_s + waits[i][1]);
+        assert_true(w.files_at_s <= after_s + fmax(waits[i][1] + 4 * (after_s - before_s), 100 * (after_s - before_s)));
     }
+    files.live = 1; /* each second, at most a twentieth of the time */
+    w.files_at_s = 0;
+    before_s = base_clock_wall_s();
+    hooks.slice(hooks.data, &render, &err);
+    after_s = base_clock_wall_s();
+    assert_true(w.files_at_s >= before_s + 1 && w.files_at_s <= after_s + fmax(1, 20 * (after_s - before_s)));
 }
 
 /* --explain, but for the times. */

@@ -25,10 +25,12 @@ except ImportError:
     managed = sys.prefix == sys.base_prefix and os.path.exists(os.path.join(sysconfig.get_path("stdlib"), "EXTERNALLY-MANAGED"))
     NEEDED = ("lull needs numpy, which this Python does not have: " +
               ("sudo apt install python3-numpy" if managed else "python3 -m pip install numpy"))
-    if sys.argv[:1] == ["-m"]:  # a program of the package, as which Python starts it: one line for people
+    if sys.argv[:2] == ["-m", "watch"]:  # python3 -m lull watch, the one that does without
+        pass
+    elif sys.argv[:1] == ["-m"]:  # a program of the package, as which Python starts it: one line for people
         print(NEEDED, file=sys.stderr)
         sys.exit(2)
-    if "bpy" not in sys.modules:  # in Blender, register() says it
+    elif "bpy" not in sys.modules:  # in Blender, register() says it
         raise ImportError(NEEDED) from None
 
 if not NEEDED:

@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""python3 -m lull: what it finds, one line each. Exit status 2 without the library or any criterion."""
+"""python3 -m lull: what it finds, one line each. Exit status 2 without the library or any criterion. python3 -m lull watch:
+watch.py."""
 import importlib.util
 import os
 import shutil
 import sys
 from pathlib import Path
 
-from . import __version__, abi, criteria
-from .criterion import load
-from .library import LullError, call, library
+if sys.argv[1:2] == ["watch"]:
+    from .watch import main as watch
+    sys.exit(watch(sys.argv[2:]))
+
+from . import __version__, abi, criteria  # noqa: E402 (needs numpy)
+from .criterion import load  # noqa: E402
+from .library import LullError, call, library  # noqa: E402
 
 
 def _trial(spec: str, denoiser: str) -> str:
