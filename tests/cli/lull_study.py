@@ -308,6 +308,11 @@ for option in ("--trials", "--show", "--gap"):
     refuses(option + " of settings", option + " does nothing in this task (adjustment)", "--task", "thresholds", "--views", levels, option, "60")
 refuses("catch trials of settings", "--catch does nothing in this task (adjustment)", "--task", "thresholds", "--views", levels, "--catch", "0")
 refuses("trials of a validation", "--trials does nothing in this task (validation)", "--task", "validation", "--views", levels, "--trials", "30")
+nowhere = os.path.join(TMP.name, "nowhere")
+refuses("a view that is not there", "nowhere", "--task", "thresholds", "--views", nowhere)
+os.makedirs(os.path.join(TMP.name, "empty"))
+refuses("a view without a picture", "neither manifest.json nor a picture called reference", "--task", "thresholds", "--views", os.path.join(TMP.name, "empty"))
+refuses("a block that no view has", "has no block 99", "--task", "thresholds", "--views", levels + ":99", "--block", "16")
 check(
     definition["asked_by"] == ASKING[1] and definition["contact"] == ASKING[3] and definition["min_ms"] == 150 and definition["max_fast"] == 0.1,
     "study.json says who asks, and which answers are too fast",

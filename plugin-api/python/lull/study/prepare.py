@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Makes a study: `ggn stimuli` chooses blocks and levels and writes every picture that is shown; then come texts.json and
-study.json. Nothing is left in DIR that looks like a study unless all went well: study.json is written last."""
+study.json, which is written last. What was made is gone unless all went well."""
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
@@ -10,7 +11,7 @@ import secrets
 import shutil
 import subprocess
 import sys
-from typing import Any
+from typing import Any, Iterator
 
 from .definition import (ADJUSTMENT, KINDS, MAX_FPS, MAX_LINE, MAX_TRIALS, MIN_MS, TWO_INTERVAL, VALIDATION, Block, Study,
                          View, fit_intervals, is_plain_line, write_study)
@@ -98,24 +99,45 @@ def _make_stimuli(folder: str, study: Study, o: dict[str, Any]) -> dict[str, Any
     return json.loads(ran.stdout)
 
 
+@contextlib.contextmanager
+def _made(folder: str) -> Iterator[None]:
+    """A folder; one that was not there before goes again with all that is in it when what follows fails."""
+    was_there = os.path.lexists(folder)
+    make_folder(folder)
+    try:
+        yield
+    except BaseException:
+        if not was_there:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
 def prepare(folder: str, page: str, o: dict[str, Any]) -> None:
     study = _define(o)
-    make_folder(folder)
+    with _made(folder):
+        _fill(folder, page, study, o)
+    views = len(study.views)
+    print(f"{folder}: {views} view{'' if views == 1 else 's'}, {plan_count(study)} trials for each person, some "
+          f"{math.ceil(plan_minutes(study))} min; `lull-study serve {folder}` opens it")
+
+
+def _fill(folder: str, page: str, study: Study, o: dict[str, Any]) -> None:
     if os.path.exists(os.path.join(folder, "study.json")):
         raise Refused(f"{folder}: there is a study already")
     texts = os.path.join(folder, "texts.json")
     if os.path.exists(texts):
         raise Refused(f"{texts}: is there and would be replaced; move it away, and back after init")
-    make_folder(os.path.join(folder, "stimuli"))
-    shown = _make_stimuli(folder, study, o)
+    with _made(os.path.join(folder, "stimuli")):
+        _show(study, _make_stimuli(folder, study, o))
+        write_line(texts, read_file(os.path.join(page, "texts.en.json"), 1 << 20).decode().removesuffix("\n"))
+        write_study(folder, study)
+
+
+def _show(study: Study, shown: dict[str, Any]) -> None:
+    """What is shown, and whether people can be asked so much."""
     for view in shown["views"]:
         study.views.append(View(**{**view, "blocks": [Block(**block) for block in view.get("blocks", [])]}))
     study.conditions = shown.get("conditions", [])
     fit_intervals(study)
     if plan_count(study) > MAX_TRIALS:
         raise Refused(f"more than {MAX_TRIALS} trials for one person: take fewer views, trials or repeats")
-    write_line(texts, read_file(os.path.join(page, "texts.en.json"), 1 << 20).decode().removesuffix("\n"))
-    write_study(folder, study)
-    views = len(study.views)
-    print(f"{folder}: {views} view{'' if views == 1 else 's'}, {plan_count(study)} trials for each person, some "
-          f"{math.ceil(plan_minutes(study))} min; `lull-study serve {folder}` opens it")
