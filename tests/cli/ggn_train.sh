@@ -183,9 +183,9 @@ fails "no noise picture in the published preset" "preset paper has neither noise
 mkdir "$tmp/empty"
 fails "no sequence" "no recorded sequence" $ggn train --data "$tmp/empty"
 fails "no such scene" "no scene 'nowhere'" $ggn train --data $data --validation nowhere
-fails "a crop larger than a block" "crop 64 is not in 16..32, the side of the blocks" $ggn train --data $data --crop 64
+fails "a crop larger than a block" "crop 64 is not in 16..40, the side of the blocks" $ggn train --data $data --crop 64
 $ggn train --data $data --kr 3 --km 3 --kd 4 --ratio 0 --batch 8 --steps-denoiser 2 --steps 2 --out "$tmp/small.ggn" -q 2>"$tmp/err" &&
-    grep -q '"crop":[[:space:]]*32,' "$tmp/small.ggn.card.json"
+    grep -q '"crop":[[:space:]]*40,' "$tmp/small.ggn.card.json"
 check "without --crop the crops of small blocks are whole" $?
 cp -r $data "$tmp/cut" && head -c 3000 $data/scene1/block-00001.lseq >"$tmp/cut/scene1/block-00001.lseq"
 fails "a truncated block" "block-00001" $ggn train --data "$tmp/cut" --crop 32
