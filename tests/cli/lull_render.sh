@@ -161,7 +161,7 @@ mkdir plugins && cp "$(dirname "$P")/../lib/lull/fixed.so" plugins/mine.so
 t "a criterion by path" "$P" "$scene" -q -c ./plugins/mine.so -p spp=3 --spp-min 1 --stop-map path.csv
 t "  …and it decided" test "$(spp_of path.csv)" = "3 "
 t "a criterion by path and id" "$P" "$scene" -q -c plugins/mine.so:fixed -p spp=3 --spp-min 1 --stop-map path.csv
-t "LULL_PLUGIN_PATH" env LULL_PLUGIN_PATH="$dir/plugins" "$P" "$scene" -q -c mine -p spp=3 --spp-min 1 --stop-map path.csv
+t "LULL_PLUGIN_PATH" env LULL_PLUGIN_PATH="$dir/plugins" "$P" "$scene" -q -c mine:fixed -p spp=3 --spp-min 1 --stop-map path.csv
 # Checks that may take next to nothing: the first, before which none took anything, and the one at the end.
 ask="$scene -q --block 16 -c observer --visible 0.001 --spp-min 4 --spp-max 100"
 "$P" $ask --report many.json && "$P" $ask --max-check-overhead 1e-9 --report few.json && "$P" $ask --max-check-overhead 1 --report all.json
