@@ -4,6 +4,7 @@ Each scene is rendered with default settings, its planes kept look by look (test
 more with other seeds as references. The criteria themselves are then asked about these looks, in blocks of several sizes, as a
 renderer asks them; a block that was stopped keeps its samples. True errors are those of the model observer against both references,
 whose own noise is taken out (scripts/lablib/law.py). Interrupted, the same command goes on. Needs numpy (python3-numpy)."""
+import functools
 import glob
 import math
 import os
@@ -98,33 +99,30 @@ class Reference:
         return self.law.true(*cut, self.law.texture(*cut[1:])) / tool.observer_law()
 
 
-def replay(lull, name, looks, size, block, reference):
-    """[(samples at its stop or 0, true error there, samples from which it was low enough or 0)] of each block."""
+def replay(lull, name, looks, size, block, errors):
+    """[(samples at its stop or 0, true error there, samples from which it was low enough or 0)] of each block. errors(rect): of each
+    look, [(samples, true error)]."""
     import numpy as np
-    from lablib import law
     criterion, _, parameter = name.partition(":")
     pairs = dict([parameter.split("=")]) if parameter else {}
     frame = lull.HostFrame(lull.load(criterion, threads=1, log=lambda *_: None, **pairs), size, size, [p for p, _ in PLANES], block=block,
                            spp_max=1 << 30)
     shown = {p: np.zeros((size, size, c), np.float32) for p, c in PLANES}
-    next_spp, stopped, errors = [0] * len(frame.blocks), {}, [[] for _ in frame.blocks]
+    next_spp, stopped = [0] * len(frame.blocks), {}
     for spp, half_spp, planes in looks:
-        going = [i for i in range(len(frame.blocks)) if i not in stopped]
-        light = law.lightness(planes["color"])
         for i, b in enumerate(frame.blocks):
-            errors[i].append((spp, reference.error(light, b.rect)))
-            if i in stopped:
-                continue
-            b.spp, b.half_spp = spp, half_spp
-            for p in shown:
-                shown[p][b.y0:b.y1, b.x0:b.x1] = planes[p][b.y0:b.y1, b.x0:b.x1]
-        due = [i for i in going if spp >= next_spp[i]]
+            if i not in stopped:
+                b.spp, b.half_spp = spp, half_spp
+                for p in shown:
+                    shown[p][b.y0:b.y1, b.x0:b.x1] = planes[p][b.y0:b.y1, b.x0:b.x1]
+        due = [i for i in range(len(frame.blocks)) if i not in stopped and spp >= next_spp[i]]
         for i, d in zip(due, frame.evaluate(due, {p: lull.Plane(a) for p, a in shown.items()})):
             next_spp[i] = d.next_spp
             if d.action == 1:
                 stopped[i] = spp
     found = []
-    for i, of in enumerate(errors):
+    for i, b in enumerate(frame.blocks):
+        of = errors(b.rect)
         low = [k for k in range(len(of)) if all(e <= ENOUGH for _, e in of[k:])]
         found.append((stopped.get(i, 0), dict(of).get(stopped.get(i), math.nan), of[low[0]][0] if low else 0))
     return found
@@ -141,9 +139,11 @@ def judge(o, scene):
     reference, found = Reference(*references), {}
     for folder in folders:
         looks = list(looks_of(folder))
+        light = [(spp, reference.law.lightness(planes["color"])) for spp, _, planes in looks]
+        errors = functools.lru_cache(maxsize=None)(lambda rect: [(spp, reference.error(of, rect)) for spp, of in light])
         for name in o.criteria:
             for size in o.sizes:
-                found.setdefault("%s %d" % (name, size), []).extend(replay(lull, name, looks, o.size, size, reference))
+                found.setdefault("%s %d" % (name, size), []).extend(replay(lull, name, looks, o.size, size, errors))
     print("%s: judged" % name_of(scene), file=sys.stderr, flush=True)
     return found
 
