@@ -81,6 +81,7 @@ check "the attributes stop blocks" $?
 # count, from halves that the recording rounds: measured, shares differ by up to 0.0001. Others are judged at counts of the render's
 # own, between recorded levels: a bright sample that a replay sees one level later moves the stop by one step, at most 1.5.
 watch() {
+    rm -rf "$tmp/out" # without a model the scene is one to train on
     $render --spp-max 250 --visible "$1" --report "$tmp/report.json" </dev/null 2>"$tmp/err" &&
         "$BUILD/bin/ggn" evaluate --data "$tmp/data" --visible "$1" --recorded --no-quality -o "$tmp/out" >"$tmp/log" 2>"$tmp/err"
     check "observer, visible $1: rendered and replayed" $?
