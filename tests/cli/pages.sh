@@ -1,6 +1,6 @@
 #!/bin/sh
 # Pages lead somewhere: every relative link of every page, with its section; every file that docs/tour.md names, and in it the functions
-# that the step names.
+# that the step names; the index of docs/ is whole.
 . "$(dirname "$0")/ggn_setup"
 command -v git >"$tmp/out" && git rev-parse -q --git-dir >"$tmp/out" 2>&1 || { echo "ok 1 # SKIP no repository"; echo "1..1"; exit 0; }
 cat >"$tmp/pages.py" <<'END'
@@ -25,7 +25,10 @@ def steps():
         missing = [n for n in names if "." in n and not [f for f in FILES if ("/" + f).endswith("/" + n)]]
         missing += [n for n in names if "." not in n and not re.search(rf"\b{n}\b", text)]
         yield from (f"docs/tour.md: {row.split('|')[1].strip()}: {n}" for n in missing)
-bad = list({"links": links, "tour": steps}[sys.argv[1]]())
+def index():
+    listed = re.findall(r"\]\(([^)\s]+)\)", open("docs/README.md", encoding="utf-8").read())
+    yield from (f for f in FILES if re.fullmatch(r"docs/[^/]+\.md", f) and f != "docs/README.md" and f[5:] not in listed)
+bad = list({"links": links, "tour": steps, "index": index}[sys.argv[1]]())
 print("\n".join(bad))
 sys.exit(bool(bad))
 END
@@ -33,5 +36,7 @@ python3 "$tmp/pages.py" links >"$tmp/out" 2>"$tmp/err"
 check "every link of a page leads to a file and a section" $?
 python3 "$tmp/pages.py" tour >"$tmp/out" 2>"$tmp/err"
 check "every file and function of the tour is there" $?
+python3 "$tmp/pages.py" index >"$tmp/out" 2>"$tmp/err"
+check "docs/README.md lists every page of docs/" $?
 echo "1..$n"
 exit $bad

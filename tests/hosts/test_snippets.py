@@ -27,13 +27,14 @@ VENV = ROOT / "build/hosts/venv/bin/python3"
 # Shell snippets, by page and place: what is run of them. A regular expression: lines that are not, and why.
 NOT_HERE = r"tev|scripts/setup|lull-denoiser-setup|python3 -m lull\.blender"  # a viewer with a window; from the network; tests/hosts/test_blender_command.py
 RUN = {("docs/denoised.md", 1): NOT_HERE, ("docs/quote.md", 1): None, ("docs/shots.md", 1): None, ("docs/watching.md", 1): NOT_HERE,
-       ("docs/watching.md", 2): NOT_HERE, ("plugin-api/README.md", 1): None}
+       ("docs/watching.md", 3): NOT_HERE, ("plugin-api/README.md", 1): None}
 # Those of which only the words are checked, and where they are run, or why not.
 CHECKED = {("README.md", 1): "tests/packages/readme.sh", ("docs/hosting.md", 1): "tests/hosts/test_blender_command.py, tests/packages/wheel.sh",
            ("docs/denoised.md", 2): "49 renders; tests/cli/lull_study.sh", ("docs/shots.md", 2): "days of samples; tests/cli/lull_study_views.sh",
            ("docs/results.md", 1): "needs the recorded data set, hours", ("docs/scale.md", 1): "tests/cli/mpi.sh",
            ("docs/scale.md", 2): "a measurement, minutes", ("docs/scale.md", 3): "a measurement, minutes",
            ("docs/scale.md", 4): "a measurement, hours", ("docs/study.md", 1): "a server, a training; tests/cli/lull_study.sh, ggn_train.sh",
+           ("docs/watching.md", 2): "a server; tests/cli/watch.sh",
            ("plugin-api/python/README.md", 1): "tests/packages/wheel.sh"}
 CODE = {("docs/denoised.md", "python", 1), ("docs/hosting.md", "python", 1), ("docs/hosting.md", "cpp", 1), ("plugin-api/README.md", "c", 1),
         ("plugin-api/README.md", "c", 2), ("plugin-api/python/README.md", "python", 1), ("plugin-api/python/README.md", "python", 2)}
