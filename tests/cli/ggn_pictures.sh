@@ -98,7 +98,7 @@ $bin/lull-render tests/cli/room.pbrt -q --size 80x80 --block 40 --sampler indepe
         "$(for id in 0 1 2 3; do printf '%s{"id": %d, "threshold": 20, "censored": false}' "$([ $id = 0 ] || echo ,)" $id; done)" \
         >"$tmp/short/view/labels.json" &&
     $ggn evaluate -d "$tmp/short" -m "$tmp/m.ggn" --recorded --no-quality -o "$tmp/few" >"$tmp/out" 2>"$tmp/err" &&
-    [ -s "$tmp/few/train-score-spp.png" ] && [ ! -e "$tmp/few/train-score-mggn.png" ] && [ -s "$tmp/few/train-stops-mggn.csv" ]
+    [ -s "$tmp/few/test-score-spp.png" ] && [ ! -e "$tmp/few/test-score-mggn.png" ] && [ -s "$tmp/few/test-stops-mggn.csv" ]
 check "a method that judged nothing has no picture of its scores" $?
 # The denoiser's strip is noisy image, denoised image and reference; its title has the SSIM of the first two against the third.
 oiiotool "$tmp/kept/validation-denoiser.png.part0.png" -d uint8 -o "$tmp/strip.ppm" >"$tmp/out" 2>&1
