@@ -13,6 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <time.h>
@@ -46,6 +47,14 @@ int clock_gettime(clockid_t id, struct timespec *t)
         return (int)syscall(SYS_clock_gettime, id, t);
     const long looks = atomic_fetch_add(&all_looks[id != CLOCK_MONOTONIC], 1);
     *t = (struct timespec){.tv_sec = looks * 331 / 8, .tv_nsec = looks * 331 % 8 * 125000000};
+    return 0;
+}
+
+/* No child has taken any of them, whatever else ran in this process. */
+int getrusage(__rusage_who_t who, struct rusage *usage)
+{
+    (void)who;
+    *usage = (struct rusage){0};
     return 0;
 }
 

@@ -106,7 +106,7 @@ static void default_plans(void **state)
         double jitter;
         int synthetic, extend;
     } want[] = {{0, 6, {16, 20, 64}, 0, 16, 64, 0, 30, 0, 0, 2e-4, 0, 0, 0, 0, 0, 0},
-                {1.1, 6, {8, 10, 32}, 96, 16, 16, 2000, 30, 100, 8, 1e-3, 8, 1, 1, 0.3, 1, 1}};
+                {1.1, 6, {8, 10, 32}, 0, 16, 16, 2000, 30, 100, 8, 1e-3, 8, 1, 1, 0.3, 1, 1}};
 
     for (int preset = 0; preset < 2; preset++) {
         const struct ggn_train_plan p = ggn_train_plan_default((enum ggn_preset)preset);
