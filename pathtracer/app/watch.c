@@ -100,9 +100,9 @@ static void write_preview(const struct pt_watch *w, const struct pt_render *rend
 }
 
 /* The report last: who watches it finds the others as new as it is, or newer. */
-static void write_live(const struct pt_watch *w, const struct pt_render *render, struct base_err *err)
+static void write_live(struct pt_watch *w, const struct pt_render *render, struct base_err *err)
 {
-    const struct pt_progress_now progress = pt_progress_of(render);
+    const struct pt_progress_now progress = pt_progress_of(&w->progress.pace, render);
     struct pt_output_info info = *w->info;
     info.progress = &progress;
     for (int i = 0; i < w->files->stop_map_count; i++)

@@ -10,13 +10,21 @@
 #include "base/log.h"
 #include "render/render.h"
 
+/* Threads that are at work: what other programs leave of the processors, over a part of the time so far. Of a few seconds it
+ * would make the time left rise and fall with all that they do. */
+struct pt_progress_pace {
+    double done_s, at_s; /* thread seconds and wall seconds of sampling, as looked at last */
+    double busy;         /* threads; 0: not known */
+};
+
 struct pt_progress {
     struct base_log *log; /* borrows */
     double next_s;        /* wall time of the next line */
-    double percent;       /* of the work, as the last line said … */
-    uint64_t samples;     /* … when the render had so many */
-    int map;              /* above the line stand the blocks (render/progress_map.h), as large as a terminal has room */
-    char quality[48];     /* the criterion's quality parameter, told beside the map; "": it has none */
+    struct pt_progress_pace pace;
+    double percent;   /* of the work, as the last line said … */
+    uint64_t samples; /* … when the render had so many */
+    int map;          /* above the line stand the blocks (render/progress_map.h), as large as a terminal has room */
+    char quality[48]; /* the criterion's quality parameter, told beside the map; "": it has none */
 };
 
 /* How far a render is that goes on. */
@@ -25,13 +33,14 @@ struct pt_progress_now {
     double left_s; /* wall seconds; INFINITY: nobody knows */
     int known;     /* where every block will stop is predicted; else left_s is the most */
 };
-struct pt_progress_now pt_progress_of(const struct pt_render *render);
+struct pt_progress_now pt_progress_of(struct pt_progress_pace *pace, const struct pt_render *render);
 
 void pt_progress_init(struct pt_progress *progress, struct base_log *log);
 /* Shows a line if it is time for one. */
 void pt_progress_update(struct pt_progress *progress, const struct pt_render *render);
 
 /* The line itself, without newline. *percent: what the line before said, at first 0; it never falls. */
-void pt_progress_text(const struct pt_render *render, double *percent, char *text, size_t room);
+void pt_progress_text(struct pt_progress_pace *pace, const struct pt_render *render, double *percent, char *text,
+                      size_t room);
 
 #endif
