@@ -52,7 +52,10 @@ t "the report tells 36 blocks" test "$(grep -c '"reason"' "$dir/report.json")" -
 t "preview is the image" sh -c "oiiotool $dir/demo.exr --ch R,G,B --clamp:min=0:max=1 --colorconvert linear sRGB -d uint8 -o $dir/x.png && oiiotool --fail 0.005 --failpercent 0 --hardfail 0.01 $dir/x.png $dir/demo.png --diff"
 # the demo's own scene with the default criterion: sky and lit paving are done long before the shade behind the door
 oiiotool scenes/demo-reference.png --resize 240x240 -o "$dir/reference.png"
-t "the demo's own scene runs" env DEMO_DENOISE=0 DEMO_DIR="$dir/own" DEMO_REFERENCE="$dir/reference.png" DEMO_BLOCK=60 DEMO_ARGS="--size 240x240 --block 60 --spp-max 400 --seed 3 -q" scripts/demo
+own() { DEMO_DENOISE=0 DEMO_DIR="$dir/own" DEMO_REFERENCE="$dir/reference.png" DEMO_BLOCK=60 DEMO_ARGS="--size 240x240 --block 60 --spp-max 400 --seed 3 -q" scripts/demo >"$dir/said"; }
+t "the demo's own scene runs" own
+saved=$(tr ';' '\n' <"$dir/own/stop-map.csv" | sed 1d | grep . | sort -n | awk '{s += $1; b = $1} END {printf "%d samples per pixel; as many everywhere as its worst block took are %d, %.1f times that", s / NR, b, b * NR / s}')
+t "  …and says what it saves" grep -qxF "demo: $saved" "$dir/said"
 t "the default criterion stopped blocks" grep -q '"reason":[[:space:]]*"criterion"' "$dir/own/report.json"
 used=$(tr -d ' \t\n' <"$dir/own/report.json" | sed -n 's/.*"criterion":{"id":"\([a-z-]*\)".*/\1/p')
 named=$("${BUILD:-build}/bin/lull-render" --help | tr -s ' \n' ' ' | sed -n 's/.*shared object; default \([a-z-]*\) .*/\1/p')
