@@ -109,7 +109,7 @@ static int setup(struct bench *b, struct base_err *err)
     options.batch = b->o.batch;
     options.bf16 = b->o.precision;
     b->threads = base_threads_create(b->o.threads, err);
-    b->trainer = b->threads ? ggn_trainer_create(&hyper, &options, b->threads, NULL, err) : NULL;
+    b->trainer = b->threads ? ggn_trainer_create(&hyper, &options, b->threads, err) : NULL;
     if (!b->trainer)
         return BASE_ENOMEM;
     b->r = ggn_exec_create(&b->trainer->graph[GGN_NET_R], NULL, 1, flags, b->threads, err);

@@ -109,7 +109,7 @@ static int part(const char *command, int status)
 /* These share out their work; another command would do it as often as there are processes. */
 static int is_shared(const struct command *command)
 {
-    return command->run == ggn_cmd_label || command->run == ggn_cmd_train || command->run == ggn_cmd_evaluate;
+    return command->run == ggn_cmd_label || command->run == ggn_cmd_evaluate;
 }
 
 static int run(const struct command *command, int argc, char **argv)

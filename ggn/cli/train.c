@@ -10,7 +10,6 @@
 struct settings {
     struct ggn_train_plan plan;
     int preset, quiet;
-    double rank_timeout_s;
 };
 #define TO(member) BASE_TO(struct settings, member)
 static const struct base_option list[] = {
@@ -80,10 +79,7 @@ static const struct base_option list[] = {
     {"early-rate", 0, "N", TO(plan.early_rate), 0, 1,
      .help = "share of validation blocks that the threshold may stop early (0.02)"},
     {"threads", 0, "N", TO(plan.threads), 0, 1024,
-     .help = "threads, 0 = all processors (of several processes on a host, their share); the result does not depend on it "
-             "(0)"},
-    {"rank-timeout", 0, "SECONDS", TO(rank_timeout_s), 0.1, 1e6,
-     .help = "under mpirun: give up when a process has owed its part for so long (120)"},
+     .help = "threads, 0 = all processors; the result does not depend on it (0)"},
     {0}};
 
 /* What training leaves beside the model has longer names, and could be what it begins with. */
@@ -110,10 +106,8 @@ int ggn_cmd_train(int argc, char **argv)
     static const struct base_options options = {.list = list,
                                                 .doc = "Trains a stopping criterion on a data set of block sequences.\vThe "
                                                        "same data, options and seed give the same model bytes, also "
-                                                       "after an interruption and --resume, with any number of threads. "
-                                                       "Under mpirun processes share the batches: the same bytes for "
-                                                       "as many of them, within rounding for another number."};
-    struct settings s = {.preset = GGN_PRESET_LULL, .rank_timeout_s = 120};
+                                                       "after an interruption and --resume, with any number of threads."};
+    struct settings s = {.preset = GGN_PRESET_LULL};
     struct base_err err = {0};
 
     /* Twice: the preset decides the defaults that other options override, wherever it stands. */
@@ -121,20 +115,17 @@ int ggn_cmd_train(int argc, char **argv)
     s.plan = ggn_train_plan_default((enum ggn_preset)s.preset);
     if (!rc)
         rc = base_options_parse(&options, argc, argv, &s, &err);
-    if (!rc && job_rank(ggn_cmd_job) == 0) /* the others write nothing */
+    if (!rc)
         rc = check_beside(&s.plan, &err);
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
-    s.plan.progress = s.quiet || job_rank(ggn_cmd_job) > 0 ? NULL : stderr;
+    s.plan.progress = s.quiet ? NULL : stderr;
     s.plan.interrupted = &base_interrupted;
-    s.plan.job = ggn_cmd_job;
-    job_watch(ggn_cmd_job, s.rank_timeout_s, &base_interrupted);
     base_interrupt_catch();
-    ggn_cmd_follow_rank_0();
     rc = ggn_train(&s.plan, &err);
-    if (rc == GGN_TRAIN_INTERRUPTED && job_rank(ggn_cmd_job) == 0)
+    if (rc == GGN_TRAIN_INTERRUPTED) {
         fprintf(stderr, "%s: interrupted; --resume continues from the last validation\n", argv[0]);
-    if (rc == GGN_TRAIN_INTERRUPTED)
         return GGN_EXIT_INTERRUPTED;
+    }
     return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
 }

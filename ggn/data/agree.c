@@ -42,8 +42,8 @@ static int files_crc(const char *const *files, int n, uint32_t *crc, struct base
     return rc;
 }
 
-int ggn_agree(struct job *job, const struct ggn_series_set *set, const char *const *files, int n_files, uint32_t options,
-              int threads, struct base_err *err)
+int ggn_agree(struct job *job, const struct ggn_series_set *set, const char *const *files, int n_files, int threads,
+              struct base_err *err)
 {
     uint32_t files_are = 0;
     char text[512];
@@ -53,7 +53,7 @@ int ggn_agree(struct job *job, const struct ggn_series_set *set, const char *con
     int rc = files_crc(files, n_files, &files_are, err);
     if (rc)
         return rc;
-    snprintf(text, sizeof text, "version=%s\ninstructions=%s (LULL_ISA)\ndata-crc=%08x\nfiles-crc=%08x\noptions-crc=%08x\n",
-             BASE_VERSION, base_isa_name(base_isa_best()), data_crc(set), (unsigned)files_are, (unsigned)options);
+    snprintf(text, sizeof text, "version=%s\ninstructions=%s (LULL_ISA)\ndata-crc=%08x\nfiles-crc=%08x\n", BASE_VERSION,
+             base_isa_name(base_isa_best()), data_crc(set), (unsigned)files_are);
     return job_handshake(job, text, threads, 1, err);
 }

@@ -6,9 +6,9 @@
 #include "data/series.h"
 
 /* The handshake of a job (job/job.h) with what makes its processes compute the same: refuses (BASE_EINVAL) one of another
- * version, with vectors of another length, with other images or labels, other bytes in files[n_files] or other options (any
- * number that stands for them). Nothing without a job. */
-int ggn_agree(struct job *job, const struct ggn_series_set *set, const char *const *files, int n_files, uint32_t options,
-              int threads, struct base_err *err);
+ * version, with vectors of another length, with other images or labels, or other bytes in files[n_files]. Nothing without
+ * a job. */
+int ggn_agree(struct job *job, const struct ggn_series_set *set, const char *const *files, int n_files, int threads,
+              struct base_err *err);
 
 #endif

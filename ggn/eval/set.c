@@ -479,7 +479,7 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
     for (size_t c = 0; c < COLUMNS && !rc; c++)
         columns[c] = (struct ggn_eval_values){s.spp + c * s.n, sizeof *s.spp, NULL};
     if (!rc)
-        rc = ggn_agree(s.job, &s.images, o->files, o->n_files, 0, base_threads_count(threads), err);
+        rc = ggn_agree(s.job, &s.images, o->files, o->n_files, base_threads_count(threads), err);
     if (!rc)
         rc = ggn_eval_each_block(&s, threads, fill_block, &f, columns, COLUMNS, err);
     s.law = o->without_halves ? s.visible_means : s.visible;

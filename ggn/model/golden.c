@@ -66,7 +66,7 @@ static int setup(struct state *s, const struct ggn_golden_seeds *seeds, int trai
     s->reference = malloc((size_t)W_COUNT * 3 * AREA * sizeof *s->reference);
     if (!s->noisy || !s->reference)
         return base_fail_nomem(err, "golden windows");
-    s->t = ggn_trainer_create(&hyper, &options, threads, NULL, err);
+    s->t = ggn_trainer_create(&hyper, &options, threads, err);
     if (!s->t)
         return BASE_ENOMEM;
     for (int net = 0; net < GGN_NETS; net++) {

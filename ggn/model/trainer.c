@@ -88,26 +88,26 @@ static int create_execs(struct ggn_trainer *t, struct base_err *err)
     const int drop = t->options.dropout ? 0 : GGN_EXEC_NO_DROPOUT, per_sample = paper ? 1 : 2;
 
     if (t->options.parts & GGN_TRAIN_R) {
-        t->r = ggn_exec_create_shared(&t->graph[GGN_NET_R], NULL, batch, GGN_EXEC_GRADS, t->threads, t->job, 1, err);
+        t->r = ggn_exec_create(&t->graph[GGN_NET_R], NULL, batch, GGN_EXEC_GRADS, t->threads, err);
         t->ssim = t->r ? ggn_ssim_create(t->hyper.height, t->hyper.width, t->threads, err) : NULL;
         if (!t->ssim)
             return BASE_ENOMEM;
     }
     if (t->options.parts & GGN_TRAIN_MD) {
         const struct ggn_graph *m = &t->graph[GGN_NET_M];
-        t->m = ggn_exec_create_shared(m, NULL, per_sample * batch, GGN_EXEC_GRADS, t->threads, t->job, per_sample, err);
-        t->d = ggn_exec_create_shared(&t->graph[GGN_NET_D], NULL, batch, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD | drop,
-                                      t->threads, t->job, 1, err);
+        t->m = ggn_exec_create(m, NULL, per_sample * batch, GGN_EXEC_GRADS, t->threads, err);
+        t->d =
+            ggn_exec_create(&t->graph[GGN_NET_D], NULL, batch, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD | drop, t->threads, err);
         if (!t->m || !t->d)
             return BASE_ENOMEM;
-        if (paper && !(t->m2 = ggn_exec_create_shared(m, NULL, batch, GGN_EXEC_GRADS, t->threads, t->job, 1, err)))
+        if (paper && !(t->m2 = ggn_exec_create(m, NULL, batch, GGN_EXEC_GRADS, t->threads, err)))
             return BASE_ENOMEM;
     }
     return 0;
 }
 
 struct ggn_trainer *ggn_trainer_create(const struct ggn_hyper *hyper, const struct ggn_train_options *options,
-                                       struct base_threads *threads, struct job *job, struct base_err *err)
+                                       struct base_threads *threads, struct base_err *err)
 {
     if (ggn_hyper_check(hyper, err))
         return NULL;
@@ -123,7 +123,6 @@ struct ggn_trainer *ggn_trainer_create(const struct ggn_hyper *hyper, const stru
     t->hyper = *hyper;
     t->options = *options;
     t->threads = threads;
-    t->job = job;
     int rc = 0;
     for (int net = 0; net < GGN_NETS && !rc; net++)
         rc = create_net(t, net, err);
@@ -154,15 +153,6 @@ void ggn_trainer_destroy(struct ggn_trainer *t)
     ggn_exec_destroy(t->d);
     ggn_ssim_destroy(t->ssim);
     free(t);
-}
-
-/* The samples of a batch that this process has: how many, and *first of them. */
-static int mine(const struct ggn_trainer *t, int count, int *first)
-{
-    const int rank = job_rank(t->job);
-
-    *first = (int)job_first(t->job, count, rank);
-    return (int)job_first(t->job, count, rank + 1) - *first;
 }
 
 static double grad_l2(const struct ggn_trainer *t, int net, size_t n)
@@ -241,9 +231,8 @@ static double denoiser_loss(struct ggn_trainer *t, const real *const *reference,
     const int out = t->graph[GGN_NET_R].n_values - 1;
     const struct ggn_value *v = &t->graph[GGN_NET_R].value[out], *in = &t->graph[GGN_NET_R].value[0];
     double total = 0;
-    int first, n = mine(t, count, &first);
 
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < count; i++) {
         const real *x[3], *y[3];
         real *dx[3];
         for (int c = 0; c < 3; c++) {
@@ -256,7 +245,6 @@ static double denoiser_loss(struct ggn_trainer *t, const real *const *reference,
         }
         total += ggn_ssim_mean(t->ssim, x, y, dx, 3, v->row, -1.0 / count);
     }
-    job_sum(t->job, &total, 1, sizeof total);
     return 1 - total / count;
 }
 
@@ -264,22 +252,19 @@ static double denoiser_loss(struct ggn_trainer *t, const real *const *reference,
 static int denoiser_forward(struct ggn_trainer *t, const real *const *x, int x_stride, const real *const *reference,
                             int count, double *loss, struct base_err *err)
 {
-    int first, n = mine(t, count, &first);
 
-    for (int i = 0; i < n; i++)
+    for (int i = 0; i < count; i++)
         set_input(t->r, i, x + (size_t)i * (size_t)x_stride, 3);
     ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_TRAIN);
     *loss = denoiser_loss(t, reference, count);
-    int rc = job_failed(t->job, err);
-    return rc ? rc : check(t, GGN_NET_R, *loss, "loss", err);
+    return check(t, GGN_NET_R, *loss, "loss", err);
 }
 
 /* R's gradient, into grad. */
-static int denoiser_backward(struct ggn_trainer *t, struct base_err *err)
+static void denoiser_backward(struct ggn_trainer *t)
 {
     zero_grad(t, GGN_NET_R);
     ggn_exec_backward(t->r, t->weights[GGN_NET_R], t->grad[GGN_NET_R]);
-    return job_failed(t->job, err);
 }
 
 static int check_batch(const struct ggn_trainer *t, int count, int parts, struct base_err *err)
@@ -298,10 +283,10 @@ int ggn_trainer_denoiser_step(struct ggn_trainer *t, const real *const *x, const
 
     if (!rc)
         rc = denoiser_forward(t, x, 3, reference, count, loss, err);
-    if (!rc)
-        rc = denoiser_backward(t, err);
-    if (!rc)
-        rc = update(t, GGN_NET_R, t->graph[GGN_NET_R].n_params, err);
+    if (rc)
+        return rc;
+    denoiser_backward(t);
+    rc = update(t, GGN_NET_R, t->graph[GGN_NET_R].n_params, err);
     if (!rc)
         t->steps++;
     return rc;
@@ -313,7 +298,7 @@ struct maps {
     int step, first;
 };
 
-/* D's input (NFM of denoised, NFM of noisy) from generator outputs, or back for the gradients; count: this process's. */
+/* D's input (NFM of denoised, NFM of noisy) from generator outputs, or back for the gradients. */
 static void exchange_maps(struct ggn_trainer *t, const struct maps of[2], int count, int back)
 {
     const int out = t->graph[GGN_NET_M].n_values - 1;
@@ -373,20 +358,13 @@ static double classify(struct ggn_trainer *t, const struct ggn_batch *b, double 
     const double share = 1.0 / b->count;
     double each[GGN_BATCH_MAX], total = 0;
     double *z = logits ? logits : each;
-    int first, n = mine(t, b->count, &first);
 
     t->d->dropout_seed = ggn_hash((uint32_t)t->steps, ggn_hash((uint32_t)t->adam_t[GGN_NET_D], t->options.seed));
     ggn_exec_forward(t->d, t->weights[GGN_NET_D], b->count, GGN_TRAIN);
-    memset(z, 0, (size_t)b->count * sizeof *z);
-    for (int i = 0; i < n; i++)
-        z[first + i] = t->hyper.reach > 0 ? t->options.scale * ggn_trainer_answer(t, i, b->law[first + i])
-                                          : ggn_trainer_answer(t, i, 0);
-    job_sum(t->job, z, (size_t)b->count, sizeof *z);
     for (int i = 0; i < b->count; i++) {
+        z[i] = t->hyper.reach > 0 ? t->options.scale * ggn_trainer_answer(t, i, b->law[i]) : ggn_trainer_answer(t, i, 0);
         total += share * ggn_bce(z[i], b->label[i]);
-        if (i >= first && i < first + n)
-            *ggn_exec_grad(t->d, out, i - first, 0) =
-                (real)(share * slope_of(t, i - first) * ggn_bce_grad(z[i], b->label[i]));
+        *ggn_exec_grad(t->d, out, i, 0) = (real)(share * slope_of(t, i) * ggn_bce_grad(z[i], b->label[i]));
     }
     ggn_exec_backward(t->d, t->weights[GGN_NET_D], t->grad[GGN_NET_D]);
     return total;
@@ -403,28 +381,23 @@ int ggn_trainer_classifier_step(struct ggn_trainer *t, const struct ggn_batch *b
     if (t->hyper.preset == GGN_PRESET_PAPER)
         return base_fail(err, BASE_EINVAL, "the published preset trains in its own order");
     const struct maps maps[2] = {{t->m, 2, 0}, {t->m, 2, 1}}; /* a sample's two windows lie side by side */
-    int first, n = mine(t, b->count, &first);
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < b->count; i++) {
         set_input(t->m, 2 * i, b->denoised + (size_t)i * (size_t)planes, planes);
         set_input(t->m, 2 * i + 1, b->noisy + (size_t)i * (size_t)planes, planes);
     }
     zero_grad(t, GGN_NET_M);
     zero_grad(t, GGN_NET_D);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], 2 * b->count, GGN_TRAIN);
-    exchange_maps(t, maps, n, 0);
-    ggn_trainer_set_noise_maps(t, b->noise_map, n);
-    ggn_trainer_set_scalars(t, b->scalars, n);
+    exchange_maps(t, maps, b->count, 0);
+    ggn_trainer_set_noise_maps(t, b->noise_map, b->count);
+    ggn_trainer_set_scalars(t, b->scalars, b->count);
     *bce = classify(t, b, logits);
-    rc = job_failed(t->job, err);
-    if (!rc)
-        rc = check(t, GGN_NET_D, *bce, "loss", err);
+    rc = check(t, GGN_NET_D, *bce, "loss", err);
     if (rc)
         return rc;
-    exchange_maps(t, maps, n, 1);
+    exchange_maps(t, maps, b->count, 1);
     ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
-    rc = job_failed(t->job, err);
-    if (!rc)
-        rc = update(t, GGN_NET_D, t->graph[GGN_NET_D].n_params, err);
+    rc = update(t, GGN_NET_D, t->graph[GGN_NET_D].n_params, err);
     if (!rc)
         rc = update(t, GGN_NET_M, t->graph[GGN_NET_M].n_params, err);
     if (!rc)
@@ -441,10 +414,10 @@ static int paper_denoise_image(struct ggn_trainer *t, const struct ggn_batch *b,
 
     if (rc || b->denoiser_rests)
         return rc;
-    rc = denoiser_backward(t, err);
-    if (!rc && k == 0)
+    denoiser_backward(t);
+    if (k == 0)
         record->denoiser_grad_l2 = grad_l2(t, GGN_NET_R, t->graph[GGN_NET_R].n_params);
-    return rc ? rc : update(t, GGN_NET_R, t->graph[GGN_NET_R].n_params, err);
+    return update(t, GGN_NET_R, t->graph[GGN_NET_R].n_params, err);
 }
 
 /* Step 1 of the published order: R on each image of the window, its output kept as the generator's denoised input. */
@@ -453,13 +426,12 @@ static int paper_denoise(struct ggn_trainer *t, const struct ggn_batch *b, struc
 {
     const int out = t->graph[GGN_NET_R].n_values - 1;
     const struct ggn_value *v = &t->graph[GGN_NET_R].value[out];
-    int first, n = mine(t, b->count, &first);
 
     for (int k = 0; k < t->hyper.window; k++) {
         int rc = paper_denoise_image(t, b, k, record, err);
         if (rc)
             return rc;
-        for (int i = 0; i < n; i++)
+        for (int i = 0; i < b->count; i++)
             for (int c = 0; c < 3; c++)
                 ggn_plane_copy(v, ggn_exec_plane(t->m, 0, i, 3 * k + c), ggn_exec_plane(t->r, out, i, c), v->row);
     }
@@ -499,38 +471,31 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
         return rc;
 
     const struct maps maps[2] = {{t->m, 1, 0}, {t->m2, 1, 0}};
-    int first, n = mine(t, b->count, &first);
     zero_grad(t, GGN_NET_M);
     zero_grad(t, GGN_NET_D);
-    for (int i = 0; i < n; i++)
+    for (int i = 0; i < b->count; i++)
         set_input(t->m2, i, b->noisy + (size_t)i * (size_t)planes, planes);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
     ggn_exec_forward(t->m2, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
-    exchange_maps(t, maps, n, 0);
+    exchange_maps(t, maps, b->count, 0);
 
     record->bce_before = classify(t, b, record_all ? record->logit_before : NULL);
-    rc = job_failed(t->job, err);
-    if (!rc)
-        rc = check(t, GGN_NET_D, record->bce_before, "loss", err);
+    rc = check(t, GGN_NET_D, record->bce_before, "loss", err);
     if (rc)
         return rc;
-    exchange_maps(t, maps, n, 1);
+    exchange_maps(t, maps, b->count, 1);
     record->d_grad_l2 = grad_l2(t, GGN_NET_D, d->n_params);
-    rc = job_failed(t->job, err);
-    if (!rc)
-        rc = update(t, GGN_NET_D, d->n_params, err);
+    rc = update(t, GGN_NET_D, d->n_params, err);
     if (rc)
         return rc;
 
     zero_grad(t, GGN_NET_D);
     record->bce_after = classify(t, b, record_all ? record->logit_after : NULL);
-    add_map_gradients(t, maps, n);
+    add_map_gradients(t, maps, b->count);
     ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
     ggn_exec_backward(t->m2, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
     record->m_grad_l2_accumulated = grad_l2(t, GGN_NET_M, m_trained);
-    rc = job_failed(t->job, err);
-    if (!rc)
-        rc = update(t, GGN_NET_M, m_trained, err);
+    rc = update(t, GGN_NET_M, m_trained, err);
     if (!rc)
         t->steps++;
     return rc;

@@ -5,9 +5,6 @@
  * ggn_trainer_state, so that resuming continues bit-exactly. Results do not depend on the number of threads. One call at a
  * time. Parts that a phase does not use (the denoiser when training on cached denoised windows) can be left out.
  *
- * A batch may be shared by the processes of a job: the trainers of all of them make the same steps and hold the same state,
- * equal to that of one process but for rounding. Each is given the samples of the batch that are its own.
- *
  * Every step checks its losses and gradients: when one is not finite or has exploded, nothing of the step remains, the
  * trainer returns to the last good state (ggn_trainer_keep) and the step returns GGN_EDIVERGED with the tensor's name.
  */
@@ -39,15 +36,14 @@ struct ggn_train_options {
 /* Published: lr 2e-4, betas (0.5, 0.999), dropout. LULL adds He initialisation and clipping at 1. */
 struct ggn_train_options ggn_train_options_default(enum ggn_preset preset);
 
-/* A batch. Pictures are planes of height × width elements without gaps, values 0..1; of the `mine` samples from
- * job_first on that this process has (alone: mine = count). */
+/* A batch. Pictures are planes of height × width elements without gaps, values 0..1. */
 struct ggn_batch {
-    int count;                    /* of the whole batch */
-    const real *const *noisy;     /* [mine][3S] windows, noisiest image first (M's input order: image, channel) */
-    const real *const *denoised;  /* [mine][3S] for ggn_trainer_classifier_step */
-    const real *const *reference; /* [mine][3] for ggn_trainer_paper_step */
-    const real *const *noise_map; /* [mine] noise maps, GGN_NOISE_MAP_GAIN · codes, NULL: none; with hyper.noise_map */
-    const real *const *scalars;   /* [mine][GGN_SCALARS], with hyper.scalars */
+    int count;
+    const real *const *noisy;     /* [count][3S] windows, noisiest image first (M's input order: image, channel) */
+    const real *const *denoised;  /* [count][3S] for ggn_trainer_classifier_step */
+    const real *const *reference; /* [count][3] for ggn_trainer_paper_step */
+    const real *const *noise_map; /* [count] noise maps, GGN_NOISE_MAP_GAIN · codes, NULL: none; with hyper.noise_map */
+    const real *const *scalars;   /* [count][GGN_SCALARS], with hyper.scalars */
     const double *law;            /* [count] with hyper.reach: log2 of the law's error */
     int denoiser_rests;           /* ggn_trainer_paper_step: R denoises, but learns nothing */
     const double *label;          /* [count] 1 = still noisy, 0 = not, between = uncertain */
@@ -57,7 +53,6 @@ struct ggn_trainer {
     struct ggn_hyper hyper;
     struct ggn_train_options options;
     struct base_threads *threads; /* borrows */
-    struct job *job;              /* borrows; NULL: alone */
     struct ggn_graph graph[GGN_NETS];
     struct ggn_weights *weights[GGN_NETS];     /* owns */
     real *grad[GGN_NETS];                      /* [n_params] of the last step */
@@ -70,10 +65,9 @@ struct ggn_trainer {
     uint64_t good_t[GGN_NETS], good_steps;
 };
 
-/* NULL on failure. Weights are initialised and packed. job (NULL: alone) shares the batches; its failures are those of the
- * steps. */
+/* NULL on failure. Weights are initialised and packed. */
 struct ggn_trainer *ggn_trainer_create(const struct ggn_hyper *hyper, const struct ggn_train_options *options,
-                                       struct base_threads *threads, struct job *job, struct base_err *err);
+                                       struct base_threads *threads, struct base_err *err);
 void ggn_trainer_destroy(struct ggn_trainer *trainer);
 
 /* Remembers the present state as the one to return to after a divergence (create does so too). */
@@ -83,7 +77,7 @@ void ggn_trainer_keep(struct ggn_trainer *trainer);
  * the end. After writing into them call ggn_weights_pack on weights[net]. */
 real *ggn_trainer_state(struct ggn_trainer *trainer, int net, int i, size_t *count);
 
-/* One Adam step of R on `count` images (x and reference: [mine][3] planes). *loss = mean of 1 − SSIM before it. The
+/* One Adam step of R on `count` images (x and reference: [count][3] planes). *loss = mean of 1 − SSIM before it. The
  * denoised images stay in trainer->r (value n_values − 1) until the next step. */
 int ggn_trainer_denoiser_step(struct ggn_trainer *trainer, const real *const *x, const real *const *reference, int count,
                               double *loss, struct base_err *err);

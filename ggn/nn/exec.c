@@ -103,13 +103,12 @@ static void place_memory(struct ggn_exec *e, char *memory, int workers)
     e->leaf_size = leaf_size(e->graph, e->flags);
 }
 
-struct ggn_exec *ggn_exec_create_shared(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity,
-                                        int flags, struct base_threads *threads, struct job *job, int images,
-                                        struct base_err *err)
+struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity, int flags,
+                                 struct base_threads *threads, struct base_err *err)
 {
-    const int workers = threads ? base_threads_count(threads) : 1, here = images * (int)job_most(job, capacity / images);
+    const int workers = threads ? base_threads_count(threads) : 1;
     const struct ggn_kernels *k = kernels ? kernels : ggn_kernels_best();
-    size_t bytes = total_size(graph, k, here, flags, workers) * sizeof(real), sums = sum_values(graph, here);
+    size_t bytes = total_size(graph, k, capacity, flags, workers) * sizeof(real), sums = sum_values(graph, capacity);
     struct ggn_exec *e = calloc(1, sizeof *e);
     /* calloc: fresh pages are zero already, and the zero padding of the layout is never written with anything else */
     char *memory = e ? calloc(1, bytes + ALIGN_BYTES) : NULL;
@@ -118,14 +117,11 @@ struct ggn_exec *ggn_exec_create_shared(const struct ggn_graph *graph, const str
         *e = (struct ggn_exec){.graph = graph,
                                .kernels = k,
                                .threads = threads,
-                               .capacity = here,
+                               .capacity = capacity,
                                .flags = flags,
-                               .job = job,
-                               .images = images,
                                .memory = memory,
-                               .sums = malloc((sums + 1) * sizeof *e->sums),
-                               .shared = job ? malloc((graph->n_params + 1) * sizeof *e->shared) : NULL};
-    if (!memory || !e->sums || (job && !e->shared)) {
+                               .sums = malloc((sums + 1) * sizeof *e->sums)};
+    if (!memory || !e->sums) {
         ggn_exec_destroy(e);
         base_fail_nomem(err, "network activations");
         return NULL;
@@ -134,18 +130,11 @@ struct ggn_exec *ggn_exec_create_shared(const struct ggn_graph *graph, const str
     return e;
 }
 
-struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity, int flags,
-                                 struct base_threads *threads, struct base_err *err)
-{
-    return ggn_exec_create_shared(graph, kernels, capacity, flags, threads, NULL, 1, err);
-}
-
 void ggn_exec_destroy(struct ggn_exec *e)
 {
     if (!e)
         return;
     free(e->sums);
-    free(e->shared);
     free(e->memory);
     free(e);
 }
@@ -174,22 +163,10 @@ static const struct ggn_layer *fusible_bn(const struct ggn_exec *e, int i)
     return l + 1;
 }
 
-/* Which images of the batch are this process's. With running statistics each process has a batch of its own. */
-static void share_batch(struct ggn_exec *e, int batch, enum ggn_mode mode)
-{
-    const struct job *job = mode == GGN_TRAIN ? e->job : NULL;
-    const int samples = batch / e->images, rank = job_rank(job);
-
-    e->mode = mode;
-    e->total = batch;
-    e->tells = rank == 0;
-    e->first = e->images * (int)job_first(job, samples, rank);
-    e->batch = e->images * (int)job_first(job, samples, rank + 1) - e->first;
-}
-
 void ggn_exec_forward(struct ggn_exec *e, struct ggn_weights *weights, int batch, enum ggn_mode mode)
 {
-    share_batch(e, batch, mode);
+    e->mode = mode;
+    e->batch = batch;
     for (int i = 0; i < e->graph->n_layers; i++) {
         struct ggn_task t = {.e = e, .w = weights, .l = &e->graph->layer[i], .bn = fusible_bn(e, i)};
         double start = e->layer_s ? base_clock_wall_s() : 0;
@@ -200,26 +177,11 @@ void ggn_exec_forward(struct ggn_exec *e, struct ggn_weights *weights, int batch
     }
 }
 
-static void backward(struct ggn_exec *e, const struct ggn_weights *weights, real *params_grad)
+void ggn_exec_backward(struct ggn_exec *e, const struct ggn_weights *weights, real *params_grad)
 {
     e->params_grad = params_grad;
     for (int i = e->graph->n_layers - 1; i >= 0; i--) {
         struct ggn_task t = {.e = e, .w = (struct ggn_weights *)(size_t)weights, .l = &e->graph->layer[i]};
         passes[t.l->op]->backward(&t);
     }
-}
-
-void ggn_exec_backward(struct ggn_exec *e, const struct ggn_weights *weights, real *params_grad)
-{
-    const size_t n = e->graph->n_params;
-
-    if (e->mode != GGN_TRAIN || !e->job) {
-        backward(e, weights, params_grad);
-        return;
-    }
-    memset(e->shared, 0, n * sizeof *e->shared);
-    backward(e, weights, e->shared);
-    job_sum(e->job, e->shared, n, sizeof *e->shared);
-    for (size_t i = 0; i < n; i++)
-        params_grad[i] += e->shared[i];
 }

@@ -3,16 +3,12 @@
  *
  * An executor owns activations (and gradients) for up to `capacity` images and borrows graph and threads. Numbers do not
  * depend on the number of threads, nor, with running statistics (GGN_EVAL), on which images share a batch. One call at a
- * time per executor; several executors may read the same weights at once. Nothing is allocated after create but messages.
- *
- * A batch in GGN_TRAIN may be shared by the processes of a job: each has some of the images; statistics and gradients are
- * all-reduced.
+ * time per executor; several executors may read the same weights at once. Nothing is allocated after create.
  */
 #ifndef GGN_NN_EXEC_H
 #define GGN_NN_EXEC_H
 
 #include "base/threads.h"
-#include "job/job.h"
 #include "nn/weights.h"
 
 #define GGN_BN_MOMENTUM 0.1
@@ -33,14 +29,10 @@ enum {
 struct ggn_exec {
     const struct ggn_graph *graph;
     const struct ggn_kernels *kernels;
-    struct base_threads *threads; /* NULL: the calling thread alone */
-    int capacity, batch, flags;   /* images of this process: most; of the last forward pass */
-    struct job *job;              /* borrows; NULL: alone */
-    int images;                   /* of one sample: samples are what a job shares out */
-    int first, total;             /* of the batch in all processes: images before those of this one; images */
-    int tells;                    /* this process adds to a gradient what all processes know of the whole batch */
-    enum ggn_mode mode;           /* of the last forward pass */
-    uint32_t dropout_seed;        /* masks are a function of it; change it between passes */
+    struct base_threads *threads;              /* NULL: the calling thread alone */
+    int capacity, batch, flags;                /* images: most; of the last forward pass */
+    enum ggn_mode mode;                        /* of the last forward pass */
+    uint32_t dropout_seed;                     /* masks are a function of it; change it between passes */
     size_t offset[GGN_MAX_LAYERS + 1], n_acts; /* where each value starts in one image's activations; their total */
     real *acts, *grads;                        /* [capacity][n_acts] */
     real *bn_mean, *bn_inv;                    /* [n_stats] of the last training-mode pass */
@@ -48,7 +40,6 @@ struct ggn_exec {
     size_t scratch_size;
     void *memory;      /* owns */
     double *sums;      /* owns; of one batch norm: [2][channels] of the batch, then [capacity][channels][2] of its images */
-    real *shared;      /* owns; [n_params] the gradient of this process's images, NULL: alone */
     real *params_grad; /* of the backward pass under way */
     real *leaves;      /* [capacity][leaf_size] the weights' gradient of each image, one convolution at a time */
     size_t leaf_size;
@@ -60,11 +51,6 @@ size_t ggn_exec_bytes(const struct ggn_graph *graph, int capacity, int flags, in
 /* `kernels` must be those of the weights (NULL = the best). NULL on failure. */
 struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity, int flags,
                                  struct base_threads *threads, struct base_err *err);
-/* For batches that a job shares: capacity is that of all processes, of which job_most(job, capacity / images) · images find
- * room in this one. capacity is a multiple of `images`, the images that make one sample. */
-struct ggn_exec *ggn_exec_create_shared(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity,
-                                        int flags, struct base_threads *threads, struct job *job, int images,
-                                        struct base_err *err);
 void ggn_exec_destroy(struct ggn_exec *exec);
 
 /* Element (0,0) of plane `c` of value `value` of image `n`; rows are graph->value[value].row apart. Value 0 is the input,
@@ -76,9 +62,7 @@ real *ggn_exec_grad(const struct ggn_exec *exec, int value, int n, int c);
 /* Copies one plane of the size of `v` from rows that lie `row` apart to rows as `v` has them. */
 void ggn_plane_copy(const struct ggn_value *v, real *to, const real *from, int row);
 
-/* Images 0..batch−1; of a shared executor in GGN_TRAIN: the images of all processes, of which those of this one are filled
- * in, numbered from 0. GGN_TRAIN updates the running statistics in `weights` (not the packed ones: pack before evaluating).
- */
+/* Images 0..batch−1. GGN_TRAIN updates the running statistics in `weights` (not the packed ones: pack before evaluating). */
 void ggn_exec_forward(struct ggn_exec *exec, struct ggn_weights *weights, int batch, enum ggn_mode mode);
 /* Adds to params_grad [n_params]. Activations stay, so that it may be called again for another gradient of the output. */
 void ggn_exec_backward(struct ggn_exec *exec, const struct ggn_weights *weights, real *params_grad);

@@ -45,13 +45,11 @@ static void bn_combine(const struct ggn_task *t)
     for (int n = 0; n < t->e->batch; n++)
         for (int c = 0; c < v->c; c++)
             means[c] += bn_sums_of(t, n, c)[0];
-    job_sum(t->e->job, means, (size_t)v->c, sizeof *means);
     for (int n = 0; n < t->e->batch; n++)
         for (int c = 0; c < v->c; c++) {
-            const double *image = bn_sums_of(t, n, c), off = image[0] - means[c] / t->e->total;
+            const double *image = bn_sums_of(t, n, c), off = image[0] - means[c] / t->e->batch;
             squares[c] += image[1] + pixels * off * off;
         }
-    job_sum(t->e->job, squares, (size_t)v->c, sizeof *squares);
 }
 
 /* Of channel c: biased variance to normalise, unbiased for the running estimate. */
@@ -59,8 +57,8 @@ static void bn_statistics(const struct ggn_task *t, long c)
 {
     const struct ggn_value *v = &t->e->graph->value[t->l->out];
     const size_t s = t->l->stats + (size_t)c;
-    const double count = (double)v->h * v->w * t->e->total;
-    const double mean = bn_total(t, 0)[c] / t->e->total, var = bn_total(t, 1)[c] / count;
+    const double count = (double)v->h * v->w * t->e->batch;
+    const double mean = bn_total(t, 0)[c] / t->e->batch, var = bn_total(t, 1)[c] / count;
 
     t->e->bn_mean[s] = (real)mean;
     t->e->bn_inv[s] = (real)(1 / sqrt(var + GGN_BN_EPS));
@@ -121,15 +119,13 @@ static void bn_back_channel(void *data, long c, int worker)
     const struct ggn_graph *g = t->e->graph;
     const struct ggn_value *v = &g->value[t->l->out];
     const size_t s = t->l->stats + (size_t)c;
-    const double count = (double)v->h * v->w * t->e->total;
+    const double count = (double)v->h * v->w * t->e->batch;
     const double inv = (double)t->e->bn_inv[s], mean = (double)t->e->bn_mean[s];
     const double gamma = (double)t->w->params[t->l->weight + (size_t)c];
     const double sum[2] = {bn_total(t, 0)[c], bn_total(t, 1)[c]};
 
-    if (t->e->tells) {
-        t->e->params_grad[t->l->weight + (size_t)c] += (real)(sum[1] * inv);
-        t->e->params_grad[t->l->bias + (size_t)c] += (real)sum[0];
-    }
+    t->e->params_grad[t->l->weight + (size_t)c] += (real)(sum[1] * inv);
+    t->e->params_grad[t->l->bias + (size_t)c] += (real)sum[0];
     double b = t->e->mode == GGN_TRAIN ? -gamma * inv * inv * inv * sum[1] / count : 0;
     double shift = t->e->mode == GGN_TRAIN ? -gamma * inv * sum[0] / count - b * mean : 0;
     for (int n = 0; n < t->e->batch; n++)
@@ -149,8 +145,6 @@ static void bn_backward(struct ggn_task *t)
         for (int c = 0; c < channels; c++)
             for (int k = 0; k < 2; k++)
                 bn_total(t, k)[c] += bn_sums_of(t, n, c)[k];
-    if (t->e->mode == GGN_TRAIN)
-        job_sum(t->e->job, t->e->sums, 2 * (size_t)channels, sizeof *t->e->sums);
     ggn_task_run(t, channels, bn_back_channel);
 }
 
@@ -292,10 +286,9 @@ static void flatten_plane(const struct ggn_task *t, const struct pair *p, int ba
 
 PLANE_LAYER(flatten, flatten_plane(t, &p, 0), flatten_plane(t, &p, 1))
 
-/* 0 or 1/(1 − drop), a function of the seed, the layer, the image of the whole batch and the element. */
+/* 0 or 1/(1 − drop), a function of the seed, the layer, the image of the batch and the element. */
 static real dropout_factor(const struct ggn_task *t, long i)
 {
-    i += (long)t->e->first * t->e->graph->value[t->l->in].c;
     if (t->e->mode == GGN_EVAL || (t->e->flags & GGN_EXEC_NO_DROPOUT))
         return 1;
     uint32_t layer = (uint32_t)(t->l - t->e->graph->layer);

@@ -33,7 +33,6 @@ typedef double real;
 
 #define ggn_exec_bytes GGN_TYPED(ggn_exec_bytes)
 #define ggn_exec_create GGN_TYPED(ggn_exec_create)
-#define ggn_exec_create_shared GGN_TYPED(ggn_exec_create_shared)
 #define ggn_exec_destroy GGN_TYPED(ggn_exec_destroy)
 #define ggn_exec_plane GGN_TYPED(ggn_exec_plane)
 #define ggn_exec_grad GGN_TYPED(ggn_exec_grad)

@@ -173,7 +173,7 @@ int ggn_session_finish(struct ggn_session *s, struct base_err *err)
     double accuracy = (double)NAN;
     int rc = ggn_classify_validation(s, s->validation.n, &v, err), right = 0;
 
-    if (rc || job_rank(s->plan->job) > 0) {
+    if (rc) {
         ggn_classified_release(&v);
         return rc;
     }

@@ -40,17 +40,6 @@ static int write_files(struct ggn_session *s, struct base_err *err)
     return ggn_resume_save(s, path, err);
 }
 
-/* Rank 0 decides when to stop, so that all do it after the same step. It is also asked to stop when a process has died. */
-static int asked_to_stop(const struct ggn_session *s)
-{
-    int stop = s->plan->interrupted && *s->plan->interrupted;
-
-    if (stop)
-        job_find_dead(s->plan->job, NULL);
-    job_broadcast(s->plan->job, &stop, sizeof stop);
-    return stop;
-}
-
 /* One epoch; on divergence the trainer is back at the epoch's start and so is the step. */
 static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct base_err *err)
 {
@@ -60,10 +49,9 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
     double start = base_clock_wall_s(), processor = base_clock_process_s(), loss, right;
 
     while (s->progress.step < begin + n) {
-        int stop = asked_to_stop(s), rc = job_failed(s->plan->job, err);
-        if (rc || stop)
-            return rc ? rc : GGN_TRAIN_INTERRUPTED;
-        rc = phase->step(s, s->progress.step, phase->steps, &loss, &right, err);
+        if (s->plan->interrupted && *s->plan->interrupted)
+            return GGN_TRAIN_INTERRUPTED;
+        int rc = phase->step(s, s->progress.step, phase->steps, &loss, &right, err);
         if (rc) {
             s->progress.step = begin;
             return rc;
@@ -77,12 +65,7 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
     if (rc)
         return rc;
     s->progress.seconds[row.phase] += base_clock_wall_s() - start;
-    processor = base_clock_process_s() - processor;
-    job_sum(s->plan->job, &processor, 1, sizeof processor);
-    rc = job_failed(s->plan->job, err); /* which says what the other processes did */
-    if (rc)
-        return rc;
-    s->progress.processor_s[row.phase] += processor;
+    s->progress.processor_s[row.phase] += base_clock_process_s() - processor;
     ggn_trainer_keep(s->trainer);
     row.lr = s->trainer->options.lr[phase->net];
     row.step = (double)s->progress.step;
@@ -92,7 +75,7 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
     if (rc)
         return rc;
     say(s, &row, phase, (double)n * phase->batch / fmax(seconds, 1e-9));
-    return job_rank(s->plan->job) == 0 ? write_files(s, err) : 0;
+    return write_files(s, err);
 }
 
 /* The denoiser's own phase is not cut short, and there is no model without a validation. */

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "figures/stats.h"
-#include "job/farm.h"
 #include "model/window.h"
 #include "nn/hash.h"
 #include "nn/loss.h"
@@ -34,7 +33,6 @@ struct fill {
     const struct ggn_windows *windows;
     const int *index; /* of the windows */
     uint64_t step;
-    int first; /* place of the first of them in the batch */
     int augment, denoised;
 };
 
@@ -47,7 +45,7 @@ static void fill_window(void *data, long i, int worker)
     const struct ggn_augment_options how = {s->plan->flips, s->set.width == s->set.height,
                                             s->plan->reach > 0 ? 0 : s->plan->jitter, s->plan->noise_map};
     struct ggn_augment augment =
-        f->augment ? ggn_augment_draw(f->step, f->first + (int)i, ggn_session_seed(s) ^ 2, &how) : ggn_augment_none();
+        f->augment ? ggn_augment_draw(f->step, (int)i, ggn_session_seed(s) ^ 2, &how) : ggn_augment_none();
     float *at = s->buffer + (size_t)i * sample_values(s), *noise_map = at + 2 * window_values(s);
 
     ggn_window_planes(c, w->last, s->hyper.window, s->set.width, s->set.height, 0, &augment, difference(s), at);
@@ -120,18 +118,16 @@ static double law_of(const struct ggn_session *s, const struct ggn_windows *wind
     return s->hyper.reach > 0 ? ggn_session_law(s, &s->set.series[w->series], w->last) : 0;
 }
 
-/* Raw logits of windows list[index[i]], i < n, with the weights as they are; each process computes some of them. */
+/* Raw logits of windows list[index[i]], i < n, with the weights as they are. */
 static void logits(struct ggn_session *s, const struct ggn_windows *windows, const int *index, int n, double *logit)
 {
     struct ggn_trainer *t = s->trainer;
-    const int most = (int)job_most(s->plan->job, s->plan->batch);
-    int mine, first = ggn_session_first(s, n, &mine);
+    const int most = s->plan->batch;
 
     ggn_weights_pack(t->weights[GGN_NET_M], NULL);
     ggn_weights_pack(t->weights[GGN_NET_D], NULL);
-    memset(logit, 0, (size_t)n * sizeof *logit);
-    for (int end = first + mine; first < end; first += most) {
-        int count = end - first < most ? end - first : most;
+    for (int first = 0; first < n; first += most) {
+        int count = n - first < most ? n - first : most;
         struct fill f = {.s = s, .windows = windows, .index = index + first, .denoised = 1};
         struct ggn_batch b = fill_batch(s, &f, count);
         generate(s, b.denoised, count, 0);
@@ -142,124 +138,50 @@ static void logits(struct ggn_session *s, const struct ggn_windows *windows, con
         for (int i = 0; i < count; i++)
             logit[first + i] = ggn_trainer_answer(t, i, law_of(s, windows, index[first + i]));
     }
-    job_sum(s->plan->job, logit, (size_t)n, sizeof *logit);
 }
 
 enum { DENOISED_AT_ONCE = 4 }; /* images */
 
-struct denoise {
-    struct ggn_session *s;
-    struct ggn_exec *exec;
-    struct ggn_level_series **series; /* owns; [n] */
-    uint32_t n;
-};
-
-static void denoise_images(const struct denoise *d, struct ggn_level_series *c, int first, int count)
+/* Levels [first, first + count) of a series, in evaluation mode. */
+static void denoise_images(const struct ggn_session *s, struct ggn_exec *exec, struct ggn_level_series *c, int first,
+                           int count)
 {
-    const struct ggn_value *in = &d->exec->graph->value[0];
-    const int out = d->exec->graph->n_values - 1, width = d->s->set.width, height = d->s->set.height;
-    const size_t values = ggn_series_set_values(&d->s->set);
+    const struct ggn_value *in = &exec->graph->value[0], *out = &exec->graph->value[exec->graph->n_values - 1];
+    const int width = s->set.width, height = s->set.height;
+    const size_t values = ggn_series_set_values(&s->set);
 
     for (int i = 0; i < count; i++)
         ggn_tile_load_u8(c->noisy + (size_t)(first + i) * values, width, height, 0, 0, width, height, 1.0F / 255,
-                         ggn_exec_plane(d->exec, 0, i, 0), (size_t)in->row, in->plane);
-    ggn_exec_forward(d->exec, d->s->r, count, GGN_EVAL);
+                         ggn_exec_plane(exec, 0, i, 0), (size_t)in->row, in->plane);
+    ggn_exec_forward(exec, s->r, count, GGN_EVAL);
     for (int i = 0; i < count; i++)
         ggn_tile_store_u16(c->denoised + (size_t)(first + i) * values, width, height, 0, 0, width, height,
-                           ggn_exec_plane(d->exec, out, i, 0), (size_t)d->exec->graph->value[out].row,
-                           d->exec->graph->value[out].plane);
+                           ggn_exec_plane(exec, exec->graph->n_values - 1, i, 0), (size_t)out->row, out->plane);
 }
 
-static size_t denoised_bytes(const struct ggn_session *s, const struct ggn_level_series *c)
+static int denoise_series(const struct ggn_session *s, struct ggn_exec *exec, struct ggn_level_series *c,
+                          struct base_err *err)
 {
-    return (size_t)c->n_levels * ggn_series_set_values(&s->set) * sizeof *c->denoised;
-}
-
-static void denoise_chain(const struct denoise *d, struct ggn_level_series *c)
-{
+    if (!c->denoised)
+        c->denoised = malloc((size_t)c->n_levels * ggn_series_set_values(&s->set) * sizeof *c->denoised + 1);
+    if (!c->denoised)
+        return base_fail_nomem(err, "denoised images");
     for (int k = 0; k < c->n_levels; k += DENOISED_AT_ONCE)
-        denoise_images(d, c, k, c->n_levels - k < DENOISED_AT_ONCE ? c->n_levels - k : DENOISED_AT_ONCE);
-}
-
-static int denoise_here(void *data, uint32_t first, uint32_t n, int thread, struct base_err *err)
-{
-    const struct denoise *d = data;
-
-    for (uint32_t i = first; i < first + n; i++)
-        denoise_chain(d, d->series[i]);
-    (void)thread;
-    (void)err;
+        denoise_images(s, exec, c, k, c->n_levels - k < DENOISED_AT_ONCE ? c->n_levels - k : DENOISED_AT_ONCE);
     return 0;
 }
 
-static int denoise_task(void *data, struct job_task *task, uint32_t k, uint32_t n, void *answer, int thread,
-                        struct base_err *err)
-{
-    const struct denoise *d = data;
-
-    denoise_here(data, task->first + k, n, thread, err);
-    for (uint32_t i = 0; i < n; i++) {
-        const struct ggn_level_series *c = d->series[task->first + k + i];
-        memcpy((char *)answer + i * task->answer_bytes, c->denoised, denoised_bytes(d->s, c));
-    }
-    return 0;
-}
-
-static int apply_denoised(void *data, uint32_t i, const void *answer)
-{
-    const struct denoise *d = data;
-
-    memcpy(d->series[i]->denoised, answer, denoised_bytes(d->s, d->series[i]));
-    return 0;
-}
-
-/* Denoises the listed series, shared out to the processes of a job; then all of them have them. */
-static int share_denoised(struct denoise *d, struct base_err *err)
-{
-    struct job *job = d->s->plan->job;
-    const struct job_service service = {denoise_task, d};
-    struct job_farm farm = {
-        .whole = 1, .count = d->n, .here = denoise_here, .apply = apply_denoised, .data = d, .answer_bytes = 8};
-
-    for (uint32_t i = 0; i < d->n; i++)
-        while (farm.answer_bytes < denoised_bytes(d->s, d->series[i]))
-            farm.answer_bytes += 8;
-    int rc = job_share(job, d->s->threads, &farm, &service, err);
-    for (uint32_t i = 0; i < d->n && !rc; i++)
-        job_broadcast(job, d->series[i]->denoised, denoised_bytes(d->s, d->series[i]));
-    return rc ? rc : job_failed(job, err);
-}
-
-/* The series of one split (GGN_SPLITS: all), with room for what is denoised. */
-static int list_chains(struct denoise *d, enum ggn_split split, struct base_err *err)
-{
-    struct ggn_series_set *set = &d->s->set;
-
-    for (int i = 0; i < set->n; i++) {
-        struct ggn_level_series *c = &set->series[i];
-        if (split != GGN_SPLITS && c->split != split)
-            continue;
-        if (!c->denoised)
-            c->denoised = malloc(denoised_bytes(d->s, c) + 1);
-        if (!c->denoised)
-            return base_fail_nomem(err, "denoised images");
-        d->series[d->n++] = c;
-    }
-    return 0;
-}
-
-/* Denoises the series of one split with s->r, in evaluation mode. */
+/* Denoises the series of one split (GGN_SPLITS: all) with s->r. */
 static int denoise(struct ggn_session *s, enum ggn_split split, struct base_err *err)
 {
-    struct denoise d = {.s = s, .series = malloc(((size_t)s->set.n + 1) * sizeof *d.series)};
+    struct ggn_exec *exec = ggn_exec_create(&s->r_graph, NULL, DENOISED_AT_ONCE, 0, s->threads, err);
+    int rc = exec ? 0 : BASE_ENOMEM;
 
-    d.exec = d.series ? ggn_exec_create(&s->r_graph, NULL, DENOISED_AT_ONCE, 0, s->threads, err) : NULL;
-    int rc = d.exec ? list_chains(&d, split, err) : base_fail_nomem(err, "denoised images");
     ggn_weights_pack(s->r, NULL);
-    if (!rc)
-        rc = share_denoised(&d, err);
-    ggn_exec_destroy(d.exec);
-    free(d.series);
+    for (int i = 0; i < s->set.n && !rc; i++)
+        if (split == GGN_SPLITS || s->set.series[i].split == split)
+            rc = denoise_series(s, exec, &s->set.series[i], err);
+    ggn_exec_destroy(exec);
     return rc;
 }
 
@@ -331,16 +253,8 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
         label[i] = s->train.list[index[i]].label;
         law[i] = law_of(s, &s->train, index[i]);
     }
-    int mine, first = ggn_session_first(s, n, &mine);
-    struct fill f = {.s = s,
-                     .windows = &s->train,
-                     .index = index + first,
-                     .step = step,
-                     .first = first,
-                     .augment = !paper,
-                     .denoised = !paper};
-    struct ggn_batch b = fill_batch(s, &f, mine);
-    b.count = n;
+    struct fill f = {.s = s, .windows = &s->train, .index = index, .step = step, .augment = !paper, .denoised = !paper};
+    struct ggn_batch b = fill_batch(s, &f, n);
     b.label = label;
     b.law = law;
     b.denoiser_rests = step % (uint64_t)s->plan->denoiser_every != 0;
@@ -393,10 +307,8 @@ int ggn_classify_validation(struct ggn_session *s, int most, struct ggn_classifi
     }
     if (!rc && n) {
         logits(s, &s->validation, index, n, o->logit);
-        rc = job_failed(s->plan->job, err);
-    }
-    if (!rc && n)
         rc = ggn_stats_auc(o->logit, o->noisy, (size_t)n, &o->auc, err);
+    }
     free(index);
     return rc;
 }

@@ -232,25 +232,7 @@ int ggn_resume_phase(const char *path, int *phase, struct base_err *err)
     return 0;
 }
 
-/* Rank 0 has the state: now everybody. */
-static int share_state(struct ggn_session *s, struct base_err *err)
-{
-    struct ggn_trainer *t = s->trainer;
-    size_t count;
-    float *array;
-
-    job_broadcast(s->plan->job, &s->progress, sizeof s->progress);
-    job_broadcast(s->plan->job, &t->steps, sizeof t->steps);
-    job_broadcast(s->plan->job, t->adam_t, sizeof t->adam_t);
-    for (int i = 0; (array = state_array(s, i, &count)); i++)
-        job_broadcast(s->plan->job, array, count * sizeof *array);
-    for (int net = 0; net < GGN_NETS; net++)
-        ggn_weights_pack(t->weights[net], NULL);
-    ggn_trainer_keep(t);
-    return job_failed(s->plan->job, err);
-}
-
-static int load(struct ggn_session *s, const char *path, struct base_err *err)
+int ggn_resume_load(struct ggn_session *s, const char *path, struct base_err *err)
 {
     struct ggn_container c = {0};
     cJSON *root = NULL;
@@ -270,14 +252,11 @@ static int load(struct ggn_session *s, const char *path, struct base_err *err)
     }
     if (!rc)
         rc = restore(s, root, path, err);
+    for (int net = 0; net < GGN_NETS && !rc; net++)
+        ggn_weights_pack(s->trainer->weights[net], NULL);
+    if (!rc)
+        ggn_trainer_keep(s->trainer);
     cJSON_Delete(root);
     ggn_container_release(&c);
     return rc;
-}
-
-int ggn_resume_load(struct ggn_session *s, const char *path, struct base_err *err)
-{
-    int rc = job_rank(s->plan->job) == 0 ? load(s, path, err) : 0;
-
-    return rc ? rc : share_state(s, err);
 }

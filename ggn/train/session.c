@@ -46,14 +46,6 @@ void ggn_session_load_best(struct ggn_session *s)
             ggn_weights_copy(net == GGN_NET_R ? s->r : s->trainer->weights[net], s->best[net]);
 }
 
-int ggn_session_first(const struct ggn_session *s, int n, int *mine)
-{
-    const int rank = job_rank(s->plan->job), first = (int)job_first(s->plan->job, n, rank);
-
-    *mine = (int)job_first(s->plan->job, n, rank + 1) - first;
-    return first;
-}
-
 static int side_of(const struct ggn_session *s) { return s->set.width < s->set.height ? s->set.width : s->set.height; }
 
 static int check_plan(const struct ggn_session *s, struct base_err *err)
@@ -91,7 +83,7 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     const struct ggn_train_plan *p = s->plan;
     const int paper = p->preset == GGN_PRESET_PAPER;
 
-    s->threads = base_threads_create(p->threads > 0 ? p->threads : job_threads(p->job), err);
+    s->threads = base_threads_create(p->threads > 0 ? p->threads : base_threads_available(), err);
     struct ggn_series_set_options data = p->data;
     data.noise_maps = p->noise_map > 0;
     data.measures = data.keep_recorded = p->reach > 0;
@@ -133,8 +125,8 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     s->r = rc ? NULL : ggn_weights_create(&s->r_graph, NULL, 0, err);
     if (!s->r)
         return rc ? rc : BASE_ENOMEM;
-    size_t crops = 6 * (size_t)job_most(p->job, p->batch_r) * (size_t)s->crop * (size_t)s->crop;
-    size_t windows = (size_t)job_most(p->job, p->batch) * (2 * (size_t)p->window + 1) * ggn_series_set_values(&s->set);
+    size_t crops = 6 * (size_t)p->batch_r * (size_t)s->crop * (size_t)s->crop;
+    size_t windows = (size_t)p->batch * (2 * (size_t)p->window + 1) * ggn_series_set_values(&s->set);
     size_t pointers = 6 * (size_t)p->batch_r + (6 * (size_t)p->window + 2) * (size_t)p->batch;
     s->buffer = malloc((crops > windows ? crops : windows) * sizeof *s->buffer);
     s->planes = malloc(pointers * sizeof *s->planes);
@@ -187,6 +179,6 @@ int ggn_session_begin(struct ggn_session *s, int parts, int batch, int height, i
     o.lr[GGN_NET_R] = s->plan->lr_r;
     o.lr[GGN_NET_M] = o.lr[GGN_NET_D] = s->plan->lr;
     ggn_trainer_destroy(s->trainer);
-    s->trainer = ggn_trainer_create(&hyper, &o, s->threads, s->plan->job, err);
+    s->trainer = ggn_trainer_create(&hyper, &o, s->threads, err);
     return s->trainer ? 0 : BASE_ENOMEM;
 }

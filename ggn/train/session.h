@@ -20,7 +20,7 @@ struct ggn_progress {
     int divergences; /* each one halves the learning rates and changes the draws */
     double best_loss;
     uint64_t best_step;
-    double seconds[2], processor_s[2]; /* spent in the phases; the latter by all processes together */
+    double seconds[2], processor_s[2]; /* spent in the phases */
 };
 
 struct ggn_session {
@@ -38,7 +38,7 @@ struct ggn_session {
     float *average[GGN_NETS];    /* with plan->average: the mean of the weights lately; it is what is validated and kept */
     struct ggn_progress progress;
     struct ggn_log log;
-    float *buffer;        /* pixels of this process's part of a batch */
+    float *buffer;        /* pixels of a batch */
     const float **planes; /* pointers into it */
     double scale;         /* with plan->reach: of the logistic, per octave of noise */
 };
@@ -60,8 +60,6 @@ void ggn_session_load_best(struct ggn_session *session);
 double ggn_session_lr(const struct ggn_session *session, double lr, uint64_t step, uint64_t steps);
 /* With plan->reach: log2 of the law's error at level k. */
 double ggn_session_law(const struct ggn_session *session, const struct ggn_level_series *series, int k);
-/* Of n samples in order, the first that is this process's; *mine: how many are. */
-int ggn_session_first(const struct ggn_session *session, int n, int *mine);
 /* Seed of the draws. */
 uint32_t ggn_session_seed(const struct ggn_session *session);
 /* plan->out + suffix. */

@@ -3,7 +3,6 @@
 #include <stdio.h>
 #include <sys/stat.h>
 
-#include "data/agree.h"
 #include "train/finish.h"
 #include "train/phase_denoiser.h"
 #include "train/phase_classifier.h"
@@ -36,33 +35,15 @@ static void draw_curves(const struct ggn_session *s)
         fprintf(s->plan->progress, "no picture of the learning curves: %s\n", err.text);
 }
 
-/* --- several processes ------------------------------------------------------------------------------------------------ */
-
-/* Only rank 0 needs to see the checkpoint. *path is set to NULL where there is none. */
+/* *path is set to NULL where there is none. */
 static int find_checkpoint(const struct ggn_train_plan *plan, const char **path, int *phase, struct base_err *err)
 {
     struct stat st;
-    int rc = 0, found[2] = {*phase, 0};
 
-    if (job_rank(plan->job) == 0 && plan->resume && stat(*path, &st) == 0) {
-        rc = ggn_resume_phase(*path, &found[0], err);
-        found[1] = 1;
-    }
-    if (!rc)
-        rc = job_broadcast(plan->job, found, sizeof found);
-    *phase = found[0];
-    *path = found[1] ? *path : NULL;
-    return rc;
-}
-
-static void tell_traffic(const struct ggn_session *s)
-{
-    const struct job_traffic t = job_traffic(s->plan->job);
-    double steps = s->plan->steps_r + (double)s->progress.step;
-
-    if (s->plan->job && s->plan->progress)
-        fprintf(s->plan->progress, "%d processes: %.0f messages, %.2f MB per step at rank 0, which waited %.1f s for them\n",
-                job_count(s->plan->job), (double)t.messages / steps, (double)t.bytes / steps * 1e-6, t.waiting_s);
+    if (plan->resume && stat(*path, &st) == 0)
+        return ggn_resume_phase(*path, phase, err);
+    *path = NULL;
+    return 0;
 }
 
 int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
@@ -80,9 +61,6 @@ int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
         announce(&s);
     if (!rc && plan->init)
         rc = ggn_session_load_init(&s, err);
-    if (!rc)
-        rc = ggn_agree(plan->job, &s.set, &plan->init, plan->init != NULL, ggn_resume_key(&s), base_threads_count(s.threads),
-                       err);
     if (!rc && phase == GGN_PHASE_DENOISER) {
         rc = ggn_phase_denoiser(&s, checkpoint, err);
         checkpoint = NULL;
@@ -91,10 +69,8 @@ int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
         rc = ggn_phase_classifier(&s, checkpoint, err);
     if (!rc)
         rc = ggn_session_finish(&s, err);
-    if (!rc && job_rank(plan->job) == 0) {
+    if (!rc)
         draw_curves(&s);
-        tell_traffic(&s);
-    }
     ggn_session_release(&s);
     return rc;
 }

@@ -5,7 +5,6 @@
 #include <signal.h>
 #include <stdio.h>
 
-#include "job/job.h"
 #include "data/series.h"
 #include "model/networks.h"
 
@@ -42,10 +41,9 @@ struct ggn_train_plan {
     int validation_windows; /* most windows per validation */
     double early_rate;      /* share of validation blocks that may be stopped early (ggn_stopping.early_rate) */
     uint32_t seed;
-    int threads;                              /* of this process; 0: all that it may use */
-    struct job *job;                          /* borrows; whose processes train together, all with this plan; NULL: alone */
-    FILE *progress;                           /* lines for people, or NULL; rank 0 */
-    const volatile sig_atomic_t *interrupted; /* checked between steps, or NULL; rank 0 */
+    int threads;                              /* 0: all that the process may use */
+    FILE *progress;                           /* lines for people, or NULL */
+    const volatile sig_atomic_t *interrupted; /* checked between steps, or NULL */
 };
 
 struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset);

@@ -20,5 +20,7 @@ says='ggn [a-z]*'
 printf x >shared/b/block-00000.lseq
 mpi_refused "block-00000.lseq" 3 "$G" label shared
 mpi_refused "unknown option" 3 "$G" label --nonsense shared
+mpi_refused "start it without mpirun" 2 "$G" train --data shared --out model.ggn
+t "  …before anything is written" test ! -e model.ggn.ckpt -a ! -e model.ggn.csv
 mpi_refused "start it without mpirun" 2 "$G" inspect "$here/../../ggn/models/lull-3.ggn"
 exit $bad

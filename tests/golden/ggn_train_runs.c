@@ -8,7 +8,6 @@
 
 #include <dirent.h>
 #include <math.h>
-#include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,7 +23,6 @@
 #include "base/files.h"
 #include "model/container.h"
 #include "model/model.h"
-#include "support/base_transport.h"
 #include "support/approve.h"
 #include "support/ggn_heap.h"
 #include "support/ggn_noise.h"
@@ -466,105 +464,6 @@ static void resuming(void **state)
     interrupted_and_resumed("rests", paper, 2);
 }
 
-/* One of several processes: a thread with a plan of its own. */
-struct process {
-    struct ggn_train_plan plan;
-    pthread_t thread;
-    int rc;
-    struct base_err err;
-};
-
-static void *take_part(void *data_of)
-{
-    struct process *p = data_of;
-    struct base_err err = {0};
-
-    p->rc = ggn_train(&p->plan, &p->err);
-    job_close(p->plan.job, p->rc, p->err.text, &err);
-    return NULL;
-}
-
-/* The validation loss of the last row of the curves. */
-static double last_loss(const char *name)
-{
-    char *csv;
-    size_t size;
-    double loss = 0;
-
-    assert_int_equal(base_file_read(path_of(name, ".csv"), 1 << 24, &csv, &size, NULL), 0);
-    for (char *row = csv; row && row[0] != '\0'; row = strchr(row, '\n') ? strchr(row, '\n') + 1 : NULL)
-        sscanf(row, "%*[^,],%*[^,],%*[^,],%*[^,],%lf", &loss);
-    free(csv);
-    return loss;
-}
-
-/* Processes that share a training, from the beginning or from one process's checkpoint: the curves of one but for rounding, the
- * same model again; what rank 0 says. */
-static void together(const char *name, struct ggn_train_plan plan, int count, const char *checkpoint, int again)
-{
-    struct process list[3] = {{.rc = 0}};
-    struct base_transport *transport = base_transport_create(count);
-    char *said = NULL, command[256];
-    size_t size;
-
-    plan.out = path_of("together", "");
-    plan.resume = checkpoint != NULL;
-    snprintf(command, sizeof command, "/bin/cp %s %s", checkpoint ? checkpoint : "/dev/null", path_of("together", ".ckpt"));
-    assert_int_equal(system(command), 0);
-    FILE *f = open_memstream(&said, &size);
-    for (int r = 0; r < count; r++) {
-        list[r].plan = plan;
-        list[r].plan.progress = r ? NULL : f;
-        assert_int_equal(job_create(base_transport_of(transport, r), &list[r].plan.job, NULL), 0);
-    }
-    for (int r = 0; r < count; r++)
-        assert_int_equal(pthread_create(&list[r].thread, NULL, take_part, &list[r]), 0);
-    for (int r = 0; r < count; r++)
-        pthread_join(list[r].thread, NULL);
-    fclose(f);
-    for (int r = 0; r < count; r++)
-        if (list[r].rc)
-            fail_msg("process %d: %s", r, list[r].err.text);
-    assert_true(fabs(last_loss(name) - last_loss("together")) <= 0.01 * last_loss(name));
-    if (again)
-        same_file("together", "first", "");
-    assert_int_equal(rename(path_of("together", ""), path_of("first", "")), 0);
-    const char *traffic = strstr(said, " processes: ");
-    int processes = 0;
-    double messages = 0, mb = 0; /* how many depends on who was quicker */
-    assert_non_null(traffic);
-    assert_int_equal(sscanf(traffic - 1, "%d processes: %lf messages, %lf MB", &processes, &messages, &mb), 3);
-    assert_true(processes == count && messages > 10 && messages < 500 && mb > 0.05 && mb < 5);
-    free(said);
-    base_transport_destroy(transport);
-}
-
-static void processes(void **state)
-{
-    struct ggn_train_plan paper = small("paper", GGN_PRESET_PAPER), all = full("all"), first = full("half");
-    (void)state;
-    paper.steps = paper.epoch_steps = 0;
-    paper.epochs = 2;
-    paper.batch = 5;
-    for (int again = 0; again < 2; again++)
-        together("all", all, 3, NULL, again);
-    for (int again = 0; again < 2; again++)
-        together("paper", paper, 2, NULL, again);
-    for (rows_left = 1; rows_left <= 4; rows_left += 3) { /* begun by one process, in either phase */
-        char checkpoint[128];
-        const int rows = rows_left;
-        struct base_err err = {0};
-        snprintf(checkpoint, sizeof checkpoint, "%s", path_of("half", ".ckpt"));
-        first.interrupted = &interrupted;
-        interrupted = 0;
-        first.progress = fopencookie(NULL, "w", (cookie_io_functions_t){.write = count_rows});
-        assert_int_equal(ggn_train(&first, &err), GGN_TRAIN_INTERRUPTED);
-        fclose(first.progress);
-        together("all", all, 2, checkpoint, 0);
-        rows_left = rows;
-    }
-}
-
 /* --- what is refused ------------------------------------------------------------------------------------------------------------------- */
 
 static void try(const char *name, struct ggn_train_plan plan)
@@ -759,10 +658,9 @@ static void keys_of_runs(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(presets),       cmocka_unit_test(divergences),
-                                       cmocka_unit_test(resuming),      cmocka_unit_test(hours),
-                                       cmocka_unit_test(plans),         cmocka_unit_test(checkpoints),
-                                       cmocka_unit_test(keys_of_runs),  cmocka_unit_test(processes),
-                                       cmocka_unit_test(nothing_stays), cmocka_unit_test(approve_reports)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(presets),      cmocka_unit_test(divergences),   cmocka_unit_test(resuming),
+        cmocka_unit_test(hours),        cmocka_unit_test(plans),         cmocka_unit_test(checkpoints),
+        cmocka_unit_test(keys_of_runs), cmocka_unit_test(nothing_stays), cmocka_unit_test(approve_reports)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

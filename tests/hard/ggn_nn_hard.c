@@ -374,7 +374,7 @@ static struct ggn_trainer *trainer(double lr, double clip)
     o.clip = clip;
     for (int net = 0; net < GGN_NETS; net++)
         o.lr[net] = lr;
-    struct ggn_trainer *t = ggn_trainer_create(&hyper, &o, NULL, NULL, NULL);
+    struct ggn_trainer *t = ggn_trainer_create(&hyper, &o, NULL, NULL);
     assert_non_null(t);
     return t;
 }

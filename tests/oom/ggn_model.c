@@ -79,7 +79,7 @@ static int train(struct base_err *err)
 {
     struct ggn_train_options o = ggn_train_options_default(GGN_PRESET_LULL);
     o.batch = 1;
-    struct ggn_trainer *t = ggn_trainer_create(&hyper, &o, NULL, NULL, err);
+    struct ggn_trainer *t = ggn_trainer_create(&hyper, &o, NULL, err);
     int rc = t ? 0 : BASE_ENOMEM;
 
     ggn_trainer_destroy(t);

@@ -2,14 +2,12 @@
 #include "support/ggn_cmocka.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "model/trainer.h"
 #include "nn/hash.h"
-#include "support/base_transport.h"
 
 enum { H = 17, W = 21, AREA = H * W, WINDOW = 2, PLANES = 3 * WINDOW, BATCH = 4 };
 
@@ -46,7 +44,7 @@ static int setup(void **state)
 
 static int with_picture; /* of the networks that are made next */
 
-static struct ggn_trainer *make_one_of(enum ggn_preset preset, double lr, struct base_threads *threads, struct job *job)
+static struct ggn_trainer *make(enum ggn_preset preset, double lr, struct base_threads *threads)
 {
     struct ggn_hyper hyper = {preset, H, W, WINDOW, 4, 6, 4, with_picture, 0, 0};
     struct ggn_train_options options = ggn_train_options_default(preset);
@@ -56,15 +54,10 @@ static struct ggn_trainer *make_one_of(enum ggn_preset preset, double lr, struct
     options.dropout = preset == GGN_PRESET_PAPER;
     for (int net = 0; net < GGN_NETS; net++)
         options.lr[net] = lr;
-    struct ggn_trainer *t = ggn_trainer_create(&hyper, &options, threads, job, &err);
+    struct ggn_trainer *t = ggn_trainer_create(&hyper, &options, threads, &err);
     if (!t)
         fail_msg("%s", err.text);
     return t;
-}
-
-static struct ggn_trainer *make(enum ggn_preset preset, double lr, struct base_threads *threads)
-{
-    return make_one_of(preset, lr, threads, NULL);
 }
 
 static double judge(struct ggn_trainer *t)
@@ -315,7 +308,7 @@ static void test_refusals(void **state)
         struct ggn_train_options o = ggn_train_options_default(GGN_PRESET_LULL);
         char want[64];
         o.batch = size;
-        assert_null(ggn_trainer_create(&hyper, &o, NULL, NULL, &err));
+        assert_null(ggn_trainer_create(&hyper, &o, NULL, &err));
         snprintf(want, sizeof want, "batch size %d is not in 1..1024", size);
         assert_string_equal(err.text, want);
     }
@@ -344,7 +337,7 @@ static void test_refusals(void **state)
         size_t count;
         o.parts = parts;
         o.batch = BATCH;
-        struct ggn_trainer *t = ggn_trainer_create(&hyper, &o, NULL, NULL, &err);
+        struct ggn_trainer *t = ggn_trainer_create(&hyper, &o, NULL, &err);
         assert_non_null(t);
         assert_true((t->r != NULL) == (parts == GGN_TRAIN_R) && (t->d != NULL) == (parts == GGN_TRAIN_MD) && !t->m2);
         int rc = parts == GGN_TRAIN_MD ? ggn_trainer_denoiser_step(t, data.p_first, data.p_reference, BATCH, &loss, &err)
@@ -403,135 +396,6 @@ static void test_clip_and_explode(void **state)
     (void)state;
 }
 
-/* --- several processes ------------------------------------------------------------------------------------------------ */
-
-/* One of them: a thread with a trainer of its own, which is given the samples that are its share. */
-struct process {
-    struct job *job;
-    struct ggn_trainer *trainer;
-    enum ggn_preset preset;
-    int rc;
-    int steps;
-    double loss[6];
-    pthread_t thread;
-};
-
-/* Batches of 4 and of 3, so that shares change; all processes have all logits. */
-static int take_steps(struct process *p)
-{
-    struct base_err err = {0};
-    double logits[BATCH];
-    int rc = 0;
-
-    for (int step = 0; step < p->steps && !rc; step++) {
-        const int count = step == 1 ? BATCH - 1 : BATCH, first = (int)job_first(p->job, count, job_rank(p->job));
-        const float *const none[BATCH] = {NULL};
-        struct ggn_batch b = {.count = count,
-                              .noisy = data.p_noisy + first * PLANES,
-                              .label = data.label,
-                              .noise_map = none,
-                              .denoised = data.p_denoised + first * PLANES,
-                              .reference = data.p_reference + 3 * first};
-        struct ggn_paper_record record;
-        if (p->preset == GGN_PRESET_PAPER) {
-            rc = ggn_trainer_paper_step(p->trainer, &b, &record, &err);
-            p->loss[step] = record.bce_after + record.logit_before[count - 1];
-            continue;
-        }
-        rc = ggn_trainer_denoiser_step(p->trainer, data.p_first + 3 * first, data.p_reference + 3 * first, count,
-                                       &p->loss[step], &err);
-        if (!rc)
-            rc = ggn_trainer_classifier_step(p->trainer, &b, &p->loss[3 + step], logits, &err);
-        p->loss[step] += logits[count - 1];
-    }
-    return rc;
-}
-
-static void *train_together(void *data_of)
-{
-    struct process *p = data_of;
-    struct base_err err = {0};
-    p->rc = take_steps(p);
-    p->rc |= job_close(p->job, 0, "", &err);
-    return NULL;
-}
-
-/* Leaves rank 0's part in *out. */
-static void run_processes(enum ggn_preset preset, int count, int steps, struct process *out)
-{
-    struct process list[BASE_TRANSPORT_MAX] = {{0}};
-    struct base_transport *transport = base_transport_create(count);
-    struct base_threads *threads = base_threads_create(2, NULL);
-
-    assert_non_null(transport);
-    for (int r = 0; r < count; r++) {
-        list[r].preset = preset;
-        list[r].steps = steps;
-        assert_int_equal(job_create(base_transport_of(transport, r), &list[r].job, NULL), 0);
-        list[r].trainer = make_one_of(preset, 1e-3, r == 0 ? threads : NULL, list[r].job);
-    }
-    for (int r = 0; r < count; r++)
-        assert_int_equal(pthread_create(&list[r].thread, NULL, train_together, &list[r]), 0);
-    for (int r = 0; r < count; r++)
-        pthread_join(list[r].thread, NULL);
-    for (int r = 0; r < count; r++) {
-        assert_int_equal(list[r].rc, 0);
-        assert_memory_equal(list[0].loss, list[r].loss, sizeof list[0].loss);
-        same_state(list[0].trainer, list[r].trainer);
-        if (r > 0)
-            ggn_trainer_destroy(list[r].trainer);
-    }
-    *out = list[0];
-    base_threads_destroy(threads);
-    base_transport_destroy(transport);
-}
-
-/* Sums over images in another order: gradients differ by rounding, in the published order after updates of the denoiser; and
- * what Adam makes of gradients that are nothing but rounding may differ by a whole step. */
-static void near(const struct process *a, const struct process *b)
-{
-    for (int i = 0; i < 6; i++)
-        if (!(fabs(a->loss[i] - b->loss[i]) <= 1e-3 * (1 + fabs(a->loss[i]))))
-            fail_msg("loss %d: %.9g, %.9g", i, a->loss[i], b->loss[i]);
-    for (int net = 0; net < GGN_NETS; net++) {
-        double sum = 0, off = 0;
-        for (size_t i = 0; i < a->trainer->graph[net].n_params; i++) {
-            const double x = a->trainer->grad[net][i], d = x - b->trainer->grad[net][i];
-            sum += x * x;
-            off += d * d;
-        }
-        const double most = a->preset == GGN_PRESET_PAPER ? 0.03 : 1e-3;
-        if (!(sum > 0 && sqrt(off) <= most * sqrt(sum)))
-            fail_msg("gradient of network %d: %g of %g", net, sqrt(off), sqrt(sum));
-    }
-}
-
-/* One process against 2, 3 and 5 (of which some have no sample): after one step the losses and gradients but for rounding
- * (further steps multiply it); all processes have the same state, and again the next time. */
-static void test_processes(void **state)
-{
-    const int counts[] = {2, 3, 5};
-
-    for (int preset = GGN_PRESET_PAPER; preset <= GGN_PRESET_LULL; preset++)
-        for (int steps = 1; steps <= 3; steps += 2) {
-            struct process alone = {
-                .trainer = make((enum ggn_preset)preset, 1e-3, NULL), .preset = (enum ggn_preset)preset, .steps = steps};
-            assert_int_equal(take_steps(&alone), 0);
-            for (int k = 0; k < 3; k++) {
-                struct process one, again;
-                run_processes((enum ggn_preset)preset, counts[k], steps, &one);
-                run_processes((enum ggn_preset)preset, counts[k], steps, &again);
-                same_state(one.trainer, again.trainer);
-                if (steps == 1)
-                    near(&alone, &one);
-                ggn_trainer_destroy(one.trainer);
-                ggn_trainer_destroy(again.trainer);
-            }
-            ggn_trainer_destroy(alone.trainer);
-        }
-    (void)state;
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_learns),
@@ -540,7 +404,6 @@ int main(void)
                                        cmocka_unit_test(test_adam),
                                        cmocka_unit_test(test_paper),
                                        cmocka_unit_test(test_copy),
-                                       cmocka_unit_test(test_processes),
                                        cmocka_unit_test(test_refusals),
                                        cmocka_unit_test(test_clip_and_explode)};
     return cmocka_run_group_tests(tests, setup, NULL);

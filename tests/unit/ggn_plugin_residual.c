@@ -34,7 +34,7 @@ static void write_model(float last)
     struct ggn_model *m = ggn_model_create(&hyper, NULL);
     struct ggn_policy p = ggn_policy_default();
     options.batch = 2;
-    struct ggn_trainer *t = ggn_trainer_create(&hyper, &options, NULL, NULL, NULL);
+    struct ggn_trainer *t = ggn_trainer_create(&hyper, &options, NULL, NULL);
 
     assert_true(m && t);
     for (int net = 0; net < GGN_NETS; net++)
