@@ -8,7 +8,6 @@
 #include "base/options.h"
 #include "job/job.h"
 #include "pbrt/xform.h"
-#include "render/cells.h"
 #include "render/checkpoint.h"
 #include "render/film.h"
 #include "render/output.h"
@@ -54,14 +53,6 @@ static int set_seam(void *into, const char *value, struct base_err *err)
     struct pt_cli *cli = into;
     if (strcmp(value, "0") != 0 && !base_parse_real(value, 1, 1e6, &cli->render.max_seam))
         return expected(err, "0 or a number from 1 to 1e+06");
-    return 0;
-}
-
-static int set_cells(void *into, const char *value, struct base_err *err)
-{
-    struct pt_cli *cli = into;
-    if (strcmp(value, "0") != 0 && !get_list(value, 'x', 1, 8, 4096, &cli->render.cell))
-        return expected(err, "0 or a side from 8 to 4096");
     return 0;
 }
 
@@ -247,9 +238,6 @@ static const struct base_option options[] = {
      .help = "The same number of samples everywhere; a criterion, if given, is asked once at the end"},
     {"time-budget", 0, "SECONDS", TO(render.time_budget_s), 0, 1e9, .help = "Stop after so long; 0 = no limit (default)"},
     {"block", 0, "N|WxH", .set = set_block, .help = "Block size in pixels (default 200)"},
-    {"cells", 0, "N", .set = set_cells,
-     .help = "Share out a block's samples to cells of NxN pixels, by the noise seen in them so far: from half to four times "
-             "the block's mean; 0 = every pixel of a block gets the same (default)"},
     {"max-check-overhead", 0, "SHARE", TO(render.max_check_overhead), 0, 1,
      .help = "Leave out checks while they took more than this share of the time, e.g. 0.03; 0 = no bound (default). With a "
              "bound, as with a time budget, the result depends on the clock"},
@@ -437,13 +425,6 @@ static int check_samples(struct pt_cli *cli, struct base_err *err)
         r->spp_min = r->uniform ? cli->spp : 16;
     if (!r->spp_max)
         r->spp_max = r->uniform ? cli->spp : 10000;
-    if (r->cell > 0 && (r->uniform || cli->sequence.directory || cli->shot.table || cli->shot.plan))
-        return base_fail(err, BASE_EINVAL,
-                         "--cells goes with none of --spp, --sequence, --plan-shot and --shot-table, which give every pixel "
-                         "of a block the same samples");
-    if (r->cell > 0 && (r->spp_max % PT_CELLS_STEP != 0 || r->spp_max > PT_CELLS_SPP_MAX))
-        return base_fail(err, BASE_EINVAL, "--cells: expected --spp-max as a multiple of %d up to %d, not %llu",
-                         PT_CELLS_STEP, PT_CELLS_SPP_MAX, (unsigned long long)r->spp_max);
     if (r->spp_min > r->spp_max)
         return base_fail(err, BASE_EINVAL, "--spp-min %llu is above --spp-max %llu", (unsigned long long)r->spp_min,
                          (unsigned long long)r->spp_max);

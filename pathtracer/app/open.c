@@ -196,8 +196,6 @@ static int write_settings(const struct pt_cli *cli, struct pt_open *o, struct ba
     used += (size_t)snprintf(o->settings + used, room - used, "fov=%.17g\nlook-at=", view->fov_deg);
     for (int k = 0; view->has_look_at && k < 9; k++)
         used += (size_t)snprintf(o->settings + used, room - used, "%.17g ", view->look_at_world[k]);
-    if (c->cell > 0 && used < room)
-        used += (size_t)snprintf(o->settings + used, room - used, "\ncells=%d", c->cell);
     const struct lull_criterion *t = o->criterion ? lull_host_table(o->criterion) : NULL;
     used +=
         (size_t)snprintf(o->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none", t ? t->version : "");

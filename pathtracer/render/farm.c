@@ -78,13 +78,8 @@ static void undo(const struct sampling *s)
         if (!s->begun[i])
             continue;
         pt_row_restore(s->slice->film, row, s->before + i * s->stride);
-        *row = (struct pt_row){.block = row->block,
-                               .y = row->y,
-                               .x0 = row->x0,
-                               .x1 = row->x1,
-                               .from = row->from,
-                               .to = row->to,
-                               .check = row->check};
+        *row = (struct pt_row){
+            .block = row->block, .y = row->y, .x0 = row->x0, .x1 = row->x1, .from = row->from, .to = row->to};
     }
 }
 

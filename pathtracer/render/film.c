@@ -17,8 +17,6 @@ static const struct array {
     {PT_FILM_DEPTH, offsetof(struct pt_film, depth_hits), sizeof(uint32_t)},
     {0, offsetof(struct pt_film, dropped), sizeof(uint32_t)},
     {PT_FILM_HALF, offsetof(struct pt_film, dropped_half), sizeof(uint32_t)},
-    {PT_FILM_SPP, offsetof(struct pt_film, spp), sizeof(uint32_t)},
-    {PT_FILM_SPP, offsetof(struct pt_film, goal), sizeof(uint32_t)},
 };
 enum { ARRAYS = sizeof arrays / sizeof arrays[0] };
 _Static_assert((int)ARRAYS == (int)PT_FILM_ARRAYS, "pt_film_list_arrays has room for all");

@@ -2,7 +2,7 @@
  * What has been sampled so far, per pixel: sums in double, one array per plane, planes on demand only.
  *
  * A sample with a non-finite radiance is dropped: it enters no sum of radiance, and `dropped` counts it, so that the
- * mean of a pixel is sum / (pt_film_spp - dropped). Half A is a fixed half of the sample indices (pt_film_in_half).
+ * mean of a pixel is sum / (its block's spp - dropped). Half A is a fixed half of the sample indices (pt_film_in_half).
  * Different threads may work on different pixels at the same time; the bytes depend on the order of samples within a pixel
  * only.
  */
@@ -25,8 +25,7 @@ enum {
     PT_FILM_ALBEDO = 8,
     PT_FILM_NORMAL = 16,
     PT_FILM_DEPTH = 32,
-    PT_FILM_ALL = 63, /* that show something */
-    PT_FILM_SPP = 64  /* samples differ within a block (cells.h) */
+    PT_FILM_ALL = 63
 };
 #define PT_FILM_AUX (PT_FILM_ALBEDO | PT_FILM_NORMAL | PT_FILM_DEPTH)
 
@@ -43,7 +42,6 @@ struct pt_film {
     uint32_t *depth_hits;   /* [pixels] samples in depth */
     uint32_t *dropped;      /* [pixels] */
     uint32_t *dropped_half; /* [pixels] of half A; with PT_FILM_HALF */
-    uint32_t *spp, *goal;   /* [pixels] with PT_FILM_SPP: samples so far, and at the end of the block's wave */
     size_t bytes;           /* of all arrays */
 };
 
@@ -63,12 +61,6 @@ size_t pt_film_pixel_bytes(uint32_t planes);
 static inline size_t pt_film_index(const struct pt_film *film, int x, int y)
 {
     return (size_t)(y - film->y0) * (size_t)(film->x1 - film->x0) + (size_t)(x - film->x0);
-}
-
-/* Samples of a pixel in a block of block_spp. */
-static inline uint64_t pt_film_spp(const struct pt_film *film, size_t index, uint64_t block_spp)
-{
-    return film->spp ? film->spp[index] : block_spp;
 }
 
 /* Is this sample in half A? Even and odd samples are sequences of their own (sample/sampler.h). */
@@ -161,7 +153,7 @@ static inline int pt_film_add(struct pt_film_pixel *p, uint32_t planes, int in_h
 }
 
 /* The arrays that are there, in a fixed order, for saving and loading. Returns how many of out[] were filled. */
-enum { PT_FILM_ARRAYS = 11 };
+enum { PT_FILM_ARRAYS = 9 };
 struct pt_film_array {
     void *data; /* borrows */
     size_t bytes;

@@ -24,7 +24,7 @@ uint32_t pt_host_planes_of(uint32_t film_planes)
     for (size_t i = 0; i < sizeof map / sizeof map[0]; i++)
         if (film_planes & map[i].film)
             planes |= LULL_PLANE_BIT(map[i].abi);
-    return film_planes & PT_FILM_SPP ? planes | LULL_PLANE_BIT(LULL_PLANE_SPP) : planes;
+    return planes;
 }
 
 /* NULL data: no such plane. */
@@ -60,15 +60,11 @@ const struct lull_host_view *pt_host_show(const struct pt_film *film, struct lul
     for (uint32_t i = 0; i < blocks->count; i++)
         blocks->list[i].half_spp = film->half ? pt_film_half_spp(blocks->list[i].spp) : 0;
     *v = (struct pt_host_view){.dropped = counts(film, film->dropped), .dropped_half = counts(film, film->dropped_half)};
-    const int32_t all = film->spp ? LULL_NORM_WEIGHT : LULL_NORM_SPP;
-    v->planes[LULL_PLANE_COLOR] = sums(film, film->color, 3, all);
-    v->planes[LULL_PLANE_HALF] = sums(film, film->half, 3, film->spp ? all : LULL_NORM_HALF_SPP);
-    if (film->spp)
-        v->planes[LULL_PLANE_HALF].scale = 2.0; /* it has half of each pixel's samples (cells.h) */
-    v->planes[LULL_PLANE_SPP] = counts(film, film->spp);
-    v->planes[LULL_PLANE_MOMENT2] = sums(film, film->moment2, 1, all);
-    v->planes[LULL_PLANE_ALBEDO] = sums(film, film->albedo, 3, all);
-    v->planes[LULL_PLANE_NORMAL] = sums(film, film->normal, 3, all);
+    v->planes[LULL_PLANE_COLOR] = sums(film, film->color, 3, LULL_NORM_SPP);
+    v->planes[LULL_PLANE_HALF] = sums(film, film->half, 3, LULL_NORM_HALF_SPP);
+    v->planes[LULL_PLANE_MOMENT2] = sums(film, film->moment2, 1, LULL_NORM_SPP);
+    v->planes[LULL_PLANE_ALBEDO] = sums(film, film->albedo, 3, LULL_NORM_SPP);
+    v->planes[LULL_PLANE_NORMAL] = sums(film, film->normal, 3, LULL_NORM_SPP);
     v->planes[LULL_PLANE_DEPTH] = sums(film, film->depth, 1, LULL_NORM_ONE);
     v->view = (struct lull_host_view){.struct_size = sizeof v->view,
                                       .plane_count = LULL_PLANE_COUNT,

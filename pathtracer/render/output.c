@@ -72,16 +72,15 @@ static void exr_row(void *data, int y, float *const *rows)
     for (int x = x0; x < r->config.crop[2]; x++) {
         const struct lull_host_block *b = block_at(r->blocks, x, y);
         size_t i = pt_film_index(&r->film, x, y), k = (size_t)(x - x0);
-        const uint64_t spp = pt_film_spp(&r->film, i, b->spp);
         double rgb[3];
-        pt_film_mean(&r->film, i, spp, rgb);
+        pt_film_mean(&r->film, i, b->spp, rgb);
         for (int c = 0; c < 3; c++)
             rows[c][k] = (float)rgb[c];
-        rows[SPP][k] = (float)(spp - r->film.dropped[i]);
+        rows[SPP][k] = (float)(b->spp - r->film.dropped[i]);
         rows[P_NOISY][k] = (float)b->p_noisy;
         rows[ERROR][k] = (float)b->error;
         rows[REASON][k] = (float)b->reason;
-        int channels = aov_pixel(&r->film, r->config.planes, i, spp, k, rows);
+        int channels = aov_pixel(&r->film, r->config.planes, i, b->spp, k, rows);
         if (info->denoised)
             denoised_pixel(info->denoised, i, k, channels, rows);
         if (info->denoised && info->noisy_error)
@@ -213,7 +212,7 @@ static uint8_t *encode(const struct pt_render *r, const float *shown, struct bas
         for (int x = crop[0]; x < crop[2]; x++, out += 3) {
             const size_t i = pt_film_index(&r->film, x, y);
             double rgb[3];
-            pt_film_mean(&r->film, i, pt_film_spp(&r->film, i, block_at(r->blocks, x, y)->spp), rgb);
+            pt_film_mean(&r->film, i, block_at(r->blocks, x, y)->spp, rgb);
             for (int c = 0; c < 3; c++)
                 out[c] = base_srgb_code(shown ? (double)shown[3 * i + (size_t)c] : rgb[c]);
         }

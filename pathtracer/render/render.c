@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "render/cells.h"
 #include "render/farm.h"
 #include "render/host_planes.h"
 
@@ -41,8 +40,6 @@ struct pt_render_work {
     uint32_t *due;                   /* [blocks] */
     uint8_t *final;                  /* [blocks] */
     struct lull_decision *decisions; /* [blocks] */
-    unsigned char *cells;            /* [threads][cell_bytes]; NULL: there are no cells */
-    size_t cell_bytes;
 };
 
 int pt_render_threads(const struct pt_render *r)
@@ -50,9 +47,7 @@ int pt_render_threads(const struct pt_render *r)
     return base_threads_count(r->threads) + job_worker_threads(r->config.job);
 }
 
-/* cell: their side, planned by `threads`; 0: there are none. */
-static struct pt_render_work *work_create(const struct lull_host_blocks *blocks, int cell,
-                                          const struct base_threads *threads)
+static struct pt_render_work *work_create(const struct lull_host_blocks *blocks)
 {
     size_t rows = 0, n = blocks->count;
     for (uint32_t i = 0; i < n; i++)
@@ -66,8 +61,6 @@ static struct pt_render_work *work_create(const struct lull_host_blocks *blocks,
     w->due = calloc(n, sizeof *w->due);
     w->final = calloc(n, sizeof *w->final);
     w->decisions = calloc(n, sizeof *w->decisions);
-    w->cell_bytes = cell > 0 ? pt_cells_scratch(blocks->block_width, blocks->block_height, cell) : 0;
-    w->cells = cell > 0 ? calloc((size_t)base_threads_count(threads), w->cell_bytes) : NULL;
     return w;
 }
 
@@ -81,7 +74,6 @@ static void work_destroy(struct pt_render_work *w)
     free(w->due);
     free(w->final);
     free(w->decisions);
-    free(w->cells);
     free(w);
 }
 
@@ -94,7 +86,7 @@ static int begin_frame(struct pt_render *r, uint32_t film_planes, struct base_er
     int independent = c->integrator.sampler == PT_SAMPLER_INDEPENDENT;
     struct lull_host_config config = {
         .struct_size = sizeof config,
-        .flags = LULL_HOST_HALF_KNOWN | (c->cell > 0 ? 0 : LULL_HOST_OPEN_ENDED) | (c->uniform ? LULL_HOST_UNIFORM : 0) |
+        .flags = LULL_HOST_HALF_KNOWN | LULL_HOST_OPEN_ENDED | (c->uniform ? LULL_HOST_UNIFORM : 0) |
                  (deterministic ? LULL_FRAME_DETERMINISTIC : 0) | (independent ? LULL_FRAME_INDEPENDENT : 0),
         .width = (uint32_t)c->width,
         .height = (uint32_t)c->height,
@@ -109,7 +101,6 @@ static int begin_frame(struct pt_render *r, uint32_t film_planes, struct base_er
         .seed = c->integrator.seed,
         .time_budget_s = c->time_budget_s,
         .max_check_overhead = c->max_check_overhead,
-        .check_step = c->cell > 0 ? PT_CELLS_STEP : 0,
         .max_seam = c->max_seam,
         .mask = c->mask,
     };
@@ -136,16 +127,14 @@ int pt_render_create(const struct pt_render_config *config, const struct pt_scen
     r->kernel = kernel;
     r->threads = threads;
     r->criterion = criterion;
-    uint32_t planes = config->planes | (criterion ? pt_host_film_planes(lull_host_needs(criterion)) : 0) |
-                      (config->cell > 0 ? PT_FILM_HALF | PT_FILM_SPP : 0);
+    uint32_t planes = config->planes | (criterion ? pt_host_film_planes(lull_host_needs(criterion)) : 0);
     r->config.integrator.want_aux = (planes & PT_FILM_AUX) != 0;
     int rc = begin_frame(r, planes, err);
     if (!rc)
         rc = pt_film_init(&r->film, r->blocks->x0, r->blocks->y0, r->blocks->x1, r->blocks->y1, planes, err);
     if (!rc) {
-        struct pt_render_work *w = r->work = work_create(r->blocks, config->cell, threads);
-        if (!w || !w->items || !w->order || !w->candidates || !w->due || !w->final || !w->decisions ||
-            (config->cell > 0 && !w->cells))
+        struct pt_render_work *w = r->work = work_create(r->blocks);
+        if (!w || !w->items || !w->order || !w->candidates || !w->due || !w->final || !w->decisions)
             rc = base_fail_nomem(err, "work list");
     }
     if (rc) {
@@ -231,17 +220,10 @@ static int sample_rows(struct pt_render *r, struct base_err *err)
     return pt_farm_sample(r->config.job, r->threads, &slice, err);
 }
 
-/* So many samples, or a few more where pixels get several at a time. */
-static uint64_t whole_steps(const struct pt_render *r, uint64_t spp)
-{
-    const uint64_t step = r->config.cell > 0 ? PT_CELLS_STEP : 1;
-    return (spp + step - 1) / step * step;
-}
-
 /* Samples up to which a block goes now. */
 static uint64_t goal(const struct pt_render *r, const struct lull_host_block *b)
 {
-    uint64_t most = whole_steps(r, r->config.pilot_spp), end = b->next_spp;
+    uint64_t most = r->config.pilot_spp, end = b->next_spp;
     if (end > r->blocks->spp_max)
         end = r->blocks->spp_max;
     return most > 0 && end > most ? most : end;
@@ -299,16 +281,11 @@ static void list_block(struct pt_render *r, const struct candidate *c, double st
     const struct lull_host_block *b = &r->blocks->list[c->block];
     uint64_t end = goal(r, b), most = b->spp > LEAD_SPP ? b->spp : LEAD_SPP;
     most = step < (double)most ? (uint64_t)fmax(step, 1.0) : most;
-    uint64_t to = end - b->spp > most ? whole_steps(r, b->spp + most) : end;
+    uint64_t to = end - b->spp > most ? b->spp + most : end;
     for (int y = b->y0; y < b->y1; y++) {
         w->order[w->count] = (uint32_t)w->count;
-        w->items[w->count++] = (struct pt_row){.block = c->block,
-                                               .y = y,
-                                               .x0 = b->x0,
-                                               .x1 = b->x1,
-                                               .from = (uint32_t)b->spp,
-                                               .to = (uint32_t)to,
-                                               .check = (uint32_t)b->next_spp};
+        w->items[w->count++] = (struct pt_row){
+            .block = c->block, .y = y, .x0 = b->x0, .x1 = b->x1, .from = (uint32_t)b->spp, .to = (uint32_t)to};
     }
 }
 
@@ -359,22 +336,6 @@ static double gather(struct pt_render *r)
 }
 
 static double recent(double before, double now) { return before > 0.0 ? 0.7 * before + 0.3 * now : now; }
-
-static void plan_block(void *data, long i, int worker)
-{
-    struct pt_render *r = data;
-    const struct lull_host_block *b = &r->blocks->list[i];
-    const struct pt_cells_wave wave = {b->x0, b->y0, b->x1, b->y1, r->config.cell, (uint32_t)b->next_spp};
-    if (b->reason == LULL_REASON_NONE && b->spp < b->next_spp)
-        pt_cells_plan(&r->film, &wave, r->work->cells + (size_t)worker * r->work->cell_bytes);
-}
-
-/* Between two waves. */
-static void plan_cells(struct pt_render *r)
-{
-    if (r->config.cell > 0)
-        base_threads_for(r->threads, (long)r->blocks->count, plan_block, r);
-}
 
 /* Samples about SLICE_S worth, less when the time budget ends sooner. *more is 0 when every block is at its check. After a
  * failure, as when it was interrupted on the way, everything is as before. */
@@ -527,7 +488,6 @@ static int end_wave(struct pt_render *r, const struct pt_render_hooks *hooks, en
         lull_host_reopen(r->blocks, r->config.max_seam);
     if (lull_host_active(r->blocks) > 0 && *kept == KEPT)
         *kept = NOT_KEPT;
-    plan_cells(r);
     return rc;
 }
 
@@ -538,7 +498,6 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
     int rc = 0, more = 0;
     enum kept kept = NOT_KEPT;
     *outcome = PT_RENDER_DONE;
-    plan_cells(r);
     while (lull_host_active(r->blocks) > 0) {
         int given_up = slice(r, &more, &why);
         if (!given_up && !more) {

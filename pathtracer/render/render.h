@@ -30,10 +30,8 @@ struct pt_render_config {
     double time_budget_s;      /* 0 = none */
     uint64_t pilot_spp; /* not 0: pt_render_run ends, with the blocks still active, before one gets more samples … */
     double pilot_s;     /* … and after so many seconds */
-    double max_check_overhead; /* share of the elapsed time that checks may take; 0 = no bound */
-    double max_seam;           /* most ratio of samples of neighbouring blocks, 0 = any (lull_host_reopen) */
-    int cell; /* side of the cells that a block's samples are shared out to (cells.h), 0 = none; spp_max is a multiple of
-               * PT_CELLS_STEP then, at most PT_CELLS_SPP_MAX, and the render not uniform */
+    double max_check_overhead;       /* share of the elapsed time that checks may take; 0 = no bound */
+    double max_seam;                 /* most ratio of samples of neighbouring blocks, 0 = any (lull_host_reopen) */
     const struct lull_plane *mask;   /* borrows for pt_render_create; NULL = none */
     uint32_t planes;                 /* PT_FILM_* wanted besides those of the criterion */
     struct pt_integrator integrator; /* want_aux is set by the renderer */

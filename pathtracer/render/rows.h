@@ -17,10 +17,8 @@
 struct pt_row {
     uint32_t block;    /* index in the list of blocks */
     int32_t y, x0, x1; /* pixels, end exclusive */
-    uint32_t from, to; /* samples per pixel, 0 <= from < to; where they differ, of the block in the mean … */
-    uint32_t check;    /* … and those at the end of its wave */
-    uint32_t dropped;
-    uint64_t samples, rays;
+    uint32_t from, to; /* samples per pixel, 0 <= from < to */
+    uint64_t samples, rays, dropped;
     double thread_s;
     uint32_t first_x, first_sample; /* the first dropped sample of the row */
 };

@@ -8,7 +8,7 @@ import os
 import re
 import sys
 
-from lablib import (agreement, ablation, bench, cells, cost_page, denoised, explained, folds, peers, profile, published, quote_accuracy, references,
+from lablib import (agreement, ablation, bench, cost_page, denoised, explained, folds, peers, profile, published, quote_accuracy, references,
                     sampler, scale, shots, tool, truth)
 
 TEMPLATES = os.path.join(tool.ROOT, "scripts", "lablib", "templates")
@@ -42,7 +42,7 @@ def made(docs):
                              undefined=jinja2.StrictUndefined)
     jobs = {name: Job(module, tool.results(docs, name)) for name, module in (
         ("agreement", agreement), ("ablation", ablation), ("bench", bench), ("cost", cost_page), ("quote", quote_accuracy),
-        ("references", references), ("sampler", sampler), ("profile", profile), ("cells", cells), ("scale", scale), ("denoised", denoised),
+        ("references", references), ("sampler", sampler), ("profile", profile), ("scale", scale), ("denoised", denoised),
         ("peers", peers), ("shots", shots), ("explained", explained), ("folds", folds), ("published", published), ("truth", truth))}
 
     def of_figures(name, make):

@@ -24,7 +24,6 @@ same_images() {
     done
 }
 same_images "halfbuf" "$scene" --size 60x44 --block 16 -c halfbuf --spp-min 8 --spp-max 128
-same_images "cells" "$scene" --size 60x44 --block 32 --cells 8 -c halfbuf --spp-min 8 --spp-max 128
 same_images "a uniform image, every plane" "$scene" --size 30x20 --spp 9 --aov albedo,normal,depth
 same_images "a crop" "$scene" --size 64x48 --block 16 --crop 20,10,40,30 -c variance --spp-min 8 --spp-max 64
 same_images "one block" "$scene" --size 24x24 --block 24 -c halfbuf --spp-min 8 --spp-max 64

@@ -51,7 +51,6 @@ static int open_render(struct pt_render **render, struct lull_host_criterion **c
     struct pt_render_config config = pt_fake_config();
     int rc = pt_criterion_create(pt_fake_criterion(), NULL, 0, pool, NULL, criterion, err);
     config.planes = PT_FILM_ALL;
-    config.cell = 8;
     return !rc ? pt_render_create(&config, NULL, pt_fake_nan, pool, *criterion, render, err) : rc;
 }
 

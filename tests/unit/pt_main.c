@@ -81,7 +81,6 @@ static void print_cli(FILE *out, const struct pt_cli *c)
                    {"budget", c->render.time_budget_s, 0},
                    {"overhead", c->render.max_check_overhead, 0},
                    {"seam", c->render.max_seam, 0},
-                   {"cells", c->render.cell, 0},
                    {"width", c->load.width, 0},
                    {"height", c->load.height, 0},
                    {"fov", c->load.view.fov_deg, 0},
