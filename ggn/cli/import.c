@@ -51,44 +51,27 @@ static int import_one(const struct options *o, const struct ggn_import_options *
     return rc;
 }
 
-static int compare_names(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
+static int is_visible(const struct dirent *e) { return e->d_name[0] != '.'; }
 
 /* Every view folder in the root, in order of name. */
 static int import_all(const struct options *o, const struct ggn_import_options *so, struct base_err *err)
 {
-    DIR *d = opendir(o->dir);
-    char **names = NULL;
-    size_t n = 0;
-    int rc = 0, found = 0;
-    if (!d)
+    struct dirent **entries;
+    int rc = 0, found = 0, n = scandir(o->dir, &entries, is_visible, alphasort);
+    if (n < 0)
         return base_fail(err, BASE_EIO, "%s: %s", o->dir, strerror(errno));
-    for (const struct dirent *e; !rc && (e = readdir(d));) {
-        char **more = e->d_name[0] == '.' ? names : realloc(names, (n + 1) * sizeof *names);
-        if (e->d_name[0] == '.')
-            continue;
-        if (more) {
-            names = more;
-            names[n] = strdup(e->d_name);
-        }
-        if (!more || !names[n++])
-            rc = base_fail_nomem(err, o->dir);
-    }
-    closedir(d);
-    if (!rc && n > 0)
-        qsort(names, n, sizeof *names, compare_names);
-    for (size_t i = 0; i < n && !rc && !base_interrupted; i++) {
+    for (int i = 0; i < n; i++) {
         char path[4096];
-        int length = snprintf(path, sizeof path, "%s/%s", o->dir, names[i]);
+        int length = snprintf(path, sizeof path, "%s/%s", o->dir, entries[i]->d_name);
         struct stat st;
-        if (length < 0 || (size_t)length >= sizeof path || stat(path, &st) != 0 || !S_ISDIR(st.st_mode) ||
-            !ggn_import_is_view(path))
+        free(entries[i]);
+        if (rc || base_interrupted || length < 0 || (size_t)length >= sizeof path || stat(path, &st) != 0 ||
+            !S_ISDIR(st.st_mode) || !ggn_import_is_view(path))
             continue;
         found++;
         rc = import_one(o, so, path, err);
     }
-    for (size_t i = 0; i < n; i++)
-        free(names[i]);
-    free(names);
+    free(entries);
     if (!rc && !found)
         rc = base_fail(err, BASE_EINVAL, "%s: no NAME_00020.png (.jpg, .exr, .rawls) … in it or in its folders", o->dir);
     return rc;

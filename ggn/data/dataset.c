@@ -58,23 +58,27 @@ static int compare_views(const void *a, const void *b)
     return strcmp(((const struct ggn_dataset_view *)a)->dir, ((const struct ggn_dataset_view *)b)->dir);
 }
 
-/* Adds the sequences that are folders of `path` itself. */
+static int is_visible(const struct dirent *e) { return e->d_name[0] != '.'; }
+
+/* Adds the sequences that are folders of `path` itself; in order of name, so that the first one that is wrong is the same on
+ * every file system. */
 static int scan(const char *path, enum ggn_split split, struct ggn_dataset *d, struct base_err *err)
 {
-    DIR *dir = opendir(path);
-    if (!dir)
+    struct dirent **entries;
+    int rc = 0, n = scandir(path, &entries, is_visible, alphasort);
+    if (n < 0)
         return base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
-    int rc = 0;
-    for (const struct dirent *e; !rc && (e = readdir(dir));) {
+    for (int i = 0; i < n; i++) {
         char sub[4096];
-        int n = snprintf(sub, sizeof sub, "%s/%s", path, e->d_name);
-        if (e->d_name[0] == '.' || n < 0 || (size_t)n >= sizeof sub || !exists(sub, "manifest.json"))
+        int length = snprintf(sub, sizeof sub, "%s/%s", path, entries[i]->d_name);
+        free(entries[i]);
+        if (rc || length < 0 || (size_t)length >= sizeof sub || !exists(sub, "manifest.json"))
             continue;
         rc = add_view(d, sub, err);
         if (!rc)
             d->views[d->n - 1].split = split;
     }
-    closedir(dir);
+    free(entries);
     return rc;
 }
 

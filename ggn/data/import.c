@@ -102,16 +102,20 @@ static int add_file(struct view *v, const char *name, struct base_err *err)
     return 0;
 }
 
+/* In order of name, so that the first file that is wrong is the same on every file system. */
 static int scan(const char *dir, struct view *v, struct base_err *err)
 {
+    struct dirent **entries;
+    int rc = 0, n = scandir(dir, &entries, NULL, alphasort);
     snprintf(v->dir, sizeof v->dir, "%s", dir);
-    DIR *d = opendir(dir);
-    if (!d)
+    if (n < 0)
         return base_fail(err, BASE_EIO, "%s: %s", dir, strerror(errno));
-    int rc = 0;
-    for (const struct dirent *e; !rc && (e = readdir(d));)
-        rc = add_file(v, e->d_name, err);
-    closedir(d);
+    for (int i = 0; i < n; i++) {
+        if (!rc)
+            rc = add_file(v, entries[i]->d_name, err);
+        free(entries[i]);
+    }
+    free(entries);
     if (v->n > 0)
         qsort(v->levels, (size_t)v->n, sizeof *v->levels, compare_levels);
     return rc;
