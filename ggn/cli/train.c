@@ -44,8 +44,6 @@ static const struct base_option list[] = {
     {"hours", 0, "HOURS", TO(plan.hours), 0, 1e6,
      .help = "end with the first validation of generator and discriminator after so many hours of processors, all sittings "
              "together, 0 = no limit (0)"},
-    {"denoiser-every", 0, "N", TO(plan.denoiser_every), 1, 1e6,
-     .help = "preset paper: the denoiser learns in every Nth step only, which saves up to two thirds of its time (1)"},
     {"patience", 0, "N", TO(plan.patience), 0, 1e6,
      .help = "end after so many validations without a lower loss, 0 = never (lull 8)"},
     {"lr-denoiser", 0, "N", TO(plan.lr_r), 1e-9, 1, .help = "learning rate of the denoiser (lull 1e-3, paper 2e-4)"},
@@ -67,8 +65,6 @@ static const struct base_option list[] = {
      .help = "1: with --residual, also tell the network what was measured (lull 1)"},
     {"painted", 0, "N", TO(plan.painted), 0, 63,
      .help = "with --residual: series per block that are painted with a pattern and exposed otherwise (lull 1)"},
-    {"average", 0, "N", TO(plan.average), 0, 1e6,
-     .help = "steps over which generator and discriminator are averaged, 0 = none; preset lull only (0)"},
     {"synthetic", 0, "N", TO(plan.synthetic), 0, 63,
      .help = "synthetic sequences per block, made from its half buffers (lull 1)"},
     {"extend", 0, "N", TO(plan.extend), 0, 1,

@@ -405,14 +405,14 @@ int ggn_trainer_classifier_step(struct ggn_trainer *t, const struct ggn_batch *b
     return rc;
 }
 
-/* R's answer to image k of the windows, with a step of Adam if it learns. */
+/* R's answer to image k of the windows, with a step of Adam. */
 static int paper_denoise_image(struct ggn_trainer *t, const struct ggn_batch *b, int k, struct ggn_paper_record *record,
                                struct base_err *err)
 {
     const int planes = 3 * t->hyper.window;
     int rc = denoiser_forward(t, b->noisy + 3 * k, planes, b->reference, b->count, &record->denoiser_loss[k], err);
 
-    if (rc || b->denoiser_rests)
+    if (rc)
         return rc;
     denoiser_backward(t);
     if (k == 0)

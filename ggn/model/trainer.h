@@ -45,7 +45,6 @@ struct ggn_batch {
     const real *const *noise_map; /* [count] noise maps, GGN_NOISE_MAP_GAIN · codes, NULL: none; with hyper.noise_map */
     const real *const *scalars;   /* [count][GGN_SCALARS], with hyper.scalars */
     const double *law;            /* [count] with hyper.reach: log2 of the law's error */
-    int denoiser_rests;           /* ggn_trainer_paper_step: R denoises, but learns nothing */
     const double *label;          /* [count] 1 = still noisy, 0 = not, between = uncertain */
 };
 

@@ -35,7 +35,6 @@ static cJSON *describe_run(const struct ggn_session *s, int *failed)
                    {"flips", p->flips},
                    {"jitter", p->jitter},
                    {"picture", p->noise_map},
-                   {"average", p->average},
                    {"synthetic_per_block", p->synthetic},
                    {"extended", p->extend},
                    {"best_step", (double)s->progress.best_step},
@@ -44,8 +43,6 @@ static cJSON *describe_run(const struct ggn_session *s, int *failed)
 
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
         base_json_number(o, numbers[i].name, numbers[i].value, failed);
-    if (p->denoiser_every > 1)
-        base_json_number(o, "denoiser_every", p->denoiser_every, failed);
     if (p->reach > 0) {
         base_json_number(o, "residual", p->reach, failed);
         base_json_number(o, "painted_per_block", p->painted, failed);

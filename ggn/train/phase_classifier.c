@@ -217,29 +217,6 @@ static int paper_window(const struct ggn_session *s, uint64_t step, int i)
     return (int)k;
 }
 
-/* Running mean of the weights; while it is young, over the steps there were. */
-static void average(struct ggn_session *s, uint64_t step)
-{
-    const double share = fmax(1.0 / (s->plan->average + 1), 1.0 / (double)(step + 1));
-
-    for (int net = GGN_NET_M; net < GGN_NETS; net++)
-        for (size_t i = 0; s->average[net] && i < s->trainer->graph[net].n_learned; i++) {
-            float *mean = &s->average[net][i];
-            *mean = (float)((double)*mean + share * ((double)s->trainer->weights[net]->params[i] - (double)*mean));
-        }
-}
-
-/* Puts the averaged weights in the place of the trained ones, or back. */
-static void exchange_average(struct ggn_session *s)
-{
-    for (int net = GGN_NET_M; net < GGN_NETS; net++)
-        for (size_t i = 0; s->average[net] && i < s->trainer->graph[net].n_learned; i++) {
-            float *w = &s->trainer->weights[net]->params[i], trained = *w;
-            *w = s->average[net][i];
-            s->average[net][i] = trained;
-        }
-}
-
 static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, double *loss, double *right,
                       struct base_err *err)
 {
@@ -257,7 +234,6 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
     struct ggn_batch b = fill_batch(s, &f, n);
     b.label = label;
     b.law = law;
-    b.denoiser_rests = step % (uint64_t)s->plan->denoiser_every != 0;
     double scale = paper ? 1 : ggn_session_lr(s, 1, step, steps);
     s->trainer->options.lr[GGN_NET_M] = s->trainer->options.lr[GGN_NET_D] = s->plan->lr * scale;
     s->trainer->options.lr[GGN_NET_R] = s->plan->lr_r * scale;
@@ -267,7 +243,6 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
         return rc;
     if (paper)
         *loss = record.bce_before;
-    average(s, step);
     *right = 0;
     for (int i = 0; i < n; i++) {
         double z = !paper ? logit[i] : i < 64 ? record.logit_before[i] : (double)NAN;
@@ -372,14 +347,10 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_
 {
     int rc = s->hyper.preset == GGN_PRESET_PAPER ? renew_denoiser(s, err) : 0;
 
-    exchange_average(s);
     if (!rc)
         rc = measure(s, row, err);
     if (!rc)
         note_best(s, row);
-    exchange_average(s);
-    for (int net = GGN_NET_M; net < GGN_NETS && s->average[net]; net++)
-        ggn_weights_pack(s->trainer->weights[net], NULL);
     return rc;
 }
 
@@ -399,8 +370,6 @@ static int begin(struct ggn_session *s, struct base_err *err)
         s->best[net] = calloc(s->trainer->graph[net].n_learned, sizeof *s->best[net]);
         if (!s->best[net])
             return base_fail_nomem(err, "the best epoch");
-        if (s->plan->average && !(s->average[net] = calloc(s->trainer->graph[net].n_learned, sizeof *s->average[net])))
-            return base_fail_nomem(err, "averaged weights");
         struct ggn_weights *w = s->trainer->weights[net];
         if (!s->init)
             continue;

@@ -26,7 +26,6 @@ uint32_t ggn_resume_key(const struct ggn_session *s)
                               p->steps,
                               p->epochs,
                               p->epoch_steps,
-                              p->denoiser_every,
                               p->patience,
                               p->lr_r,
                               p->lr,
@@ -38,7 +37,6 @@ uint32_t ggn_resume_key(const struct ggn_session *s)
                               p->reach,
                               p->scalars,
                               p->painted,
-                              p->average,
                               p->synthetic,
                               p->extend,
                               p->validation_windows,
@@ -76,14 +74,13 @@ static float *state_array(struct ggn_session *s, int i, size_t *count)
     if (i < 10)
         return ggn_trainer_state(s->trainer, i < 5 ? GGN_NET_M : GGN_NET_D, i % 5, count);
     static const int net_of[] = {GGN_NET_M, GGN_NET_D, GGN_NET_R};
-    float *const lists[] = {s->best[GGN_NET_M], s->best[GGN_NET_D], s->best[GGN_NET_R], s->average[GGN_NET_M],
-                            s->average[GGN_NET_D]};
+    float *const lists[] = {s->best[GGN_NET_M], s->best[GGN_NET_D], s->best[GGN_NET_R]};
     enum { LISTS = sizeof lists / sizeof lists[0] };
     float *kept[LISTS];
     int nets[LISTS], n = 0;
     for (int k = 0; k < LISTS; k++)
         if (lists[k]) {
-            nets[n] = net_of[k % 3];
+            nets[n] = net_of[k];
             kept[n++] = lists[k];
         }
     i -= 10;

@@ -57,7 +57,7 @@ static int check_plan(const struct ggn_session *s, struct base_err *err)
         return base_fail(err, BASE_EINVAL, "a batch has 1 to 1024 samples");
     if (!paper && (s->crop < 16 || s->crop > s->set.width || s->crop > s->set.height))
         return base_fail(err, BASE_EINVAL, "crop %d is not in 16..%d, the side of the blocks", s->crop, side_of(s));
-    if (paper && (p->noise_map > 0 || p->average > 0 || p->reach > 0))
+    if (paper && (p->noise_map > 0 || p->reach > 0))
         return base_fail(err, BASE_EINVAL, "preset paper has neither noise pictures, averaged weights nor a residual");
     if (p->k_r < 3)
         return base_fail(err, BASE_EINVAL, "the denoiser needs a width of at least 3");
@@ -138,10 +138,8 @@ void ggn_session_release(struct ggn_session *s)
     ggn_trainer_destroy(s->trainer);
     ggn_weights_destroy(s->r);
     ggn_model_destroy(s->init);
-    for (int net = 0; net < GGN_NETS; net++) {
+    for (int net = 0; net < GGN_NETS; net++)
         free(s->best[net]);
-        free(s->average[net]);
-    }
     free(s->buffer);
     free((void *)s->planes);
     ggn_log_release(&s->log);

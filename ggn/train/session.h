@@ -35,7 +35,6 @@ struct ggn_session {
     struct ggn_weights *r;       /* its weights once phase 0 is over (preset paper: a copy, renewed each epoch) */
     struct ggn_trainer *trainer; /* of the present phase */
     float *best[GGN_NETS];       /* the best epoch's networks that the phase trains, as ggn_weights_copy takes them */
-    float *average[GGN_NETS];    /* with plan->average: the mean of the weights lately; it is what is validated and kept */
     struct ggn_progress progress;
     struct ggn_log log;
     float *buffer;        /* pixels of a batch */

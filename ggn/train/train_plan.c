@@ -17,7 +17,6 @@ struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset)
         .steps = lull ? 2000 : 0,
         .epochs = 30,
         .epoch_steps = lull ? 100 : 0,
-        .denoiser_every = 1,
         .patience = lull ? 8 : 0,
         .lr_r = lull ? 1e-3 : 2e-4,
         .lr = lull ? 1e-3 : 2e-4,

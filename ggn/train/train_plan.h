@@ -23,7 +23,6 @@ struct ggn_train_plan {
     int steps_r, steps;        /* steps of the two phases; preset paper: of its one phase, 0 = epochs · windows / batch */
     int epochs;                /* preset paper */
     int epoch_steps;           /* steps between validations and checkpoints */
-    int denoiser_every;        /* preset paper: the denoiser learns in every so many-th step */
     double hours;              /* of processors; once spent, a validation of the last phase ends it. 0: no limit */
     int patience;              /* epochs without a lower calibrated validation loss before the end; 0 = never */
     double lr_r, lr;
@@ -35,7 +34,6 @@ struct ggn_train_plan {
     double reach;     /* preset lull: of a residual model, octaves of noise (model/networks.h); 0: the networks alone */
     int scalars;      /* with reach: the discriminator is told what was measured */
     int painted;      /* with reach: painted series per block, see ggn_series_set_paint */
-    int average;      /* preset lull: steps over which the weights of M and D are averaged; 0: none */
     int synthetic;    /* synthetic series per block */
     int extend;       /* continue recorded series beyond their last level, see ggn_series_set_extend */
     int validation_windows; /* most windows per validation */

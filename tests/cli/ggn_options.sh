@@ -35,7 +35,6 @@ while read -r option value; do changes "$option" "$value"; done <<'END'
 --difference 0
 --soft-labels 0
 --picture 1
---average 2
 --synthetic 0
 --extend 0
 --ratio 1.5

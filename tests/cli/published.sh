@@ -7,7 +7,7 @@ validations() { wc -l <"$tmp/out/$1.ggn.csv"; }
 cat >"$tmp/plan" <<'END'
 common --kr 3 --km 3 --kd 4 --batch 8 -q
 order --preset paper --epoch-steps 2 --steps 8
-rests --preset paper --epoch-steps 2 --steps 8 --denoiser-every 4   # one change
+rests --preset paper --epoch-steps 2 --steps 8 --lr 2e-3   # one change
 END
 published --hours 1e-9 && [ "$(validations order)" -eq 2 ] && [ "$(grep -c '^| \(order\|rests\) | `--preset' "$tmp/table")" -eq 2 ]
 check "a row for each network" $?

@@ -239,7 +239,6 @@ static struct ggn_train_plan full(const char *name)
     struct ggn_train_plan p = small(name, GGN_PRESET_LULL);
 
     p.noise_map = 0.7;
-    p.average = 3;
     p.validation_windows = 7;
     p.early_rate = 0.5;
     return p;
@@ -323,7 +322,6 @@ static void divergences(void **state)
     run("saved", saved);
     late.steps_r = 1;
     late.lr = 1e37;
-    late.average = 2;
     run("late", late);
 }
 
@@ -459,9 +457,6 @@ static void resuming(void **state)
     paper.epochs = 2;
     paper.batch = 5;
     interrupted_and_resumed("paper", paper, 2);
-    paper.denoiser_every = 3;
-    whole("rests", paper);
-    interrupted_and_resumed("rests", paper, 2);
 }
 
 /* --- what is refused ------------------------------------------------------------------------------------------------------------------- */
@@ -519,7 +514,6 @@ static void plans(void **state)
     TRY(good, data.split.validation = "scene9");
     TRY(good, data.split.validation = "scene0,scene1,scene2");
     TRY(paper, noise_map = 0.5);
-    TRY(paper, average = 1);
     TRY(paper, crop = 1);
     of_all.init = path_of("all", "");
     TRY(of_all, k_r = 4);
@@ -633,7 +627,6 @@ static void keys_of_runs(void **state)
     OTHER(flips = 0);
     OTHER(jitter += 1);
     OTHER(noise_map = 0.1);
-    OTHER(average += 1);
     OTHER(synthetic += 1);
     OTHER(extend = 0);
     OTHER(validation_windows += 1);

@@ -118,7 +118,7 @@ static void default_plans(void **state)
         assert_true(p.epochs == want[preset].epochs && p.epoch_steps == want[preset].epoch_steps);
         assert_true(p.patience == want[preset].patience && p.lr == want[preset].lr && p.lr_r == p.lr);
         assert_true(p.difference == want[preset].difference && p.soft_labels == want[preset].soft);
-        assert_true(p.flips == want[preset].flips && p.jitter == want[preset].jitter && p.noise_map == 0 && p.average == 0);
+        assert_true(p.flips == want[preset].flips && p.jitter == want[preset].jitter && p.noise_map == 0);
         assert_true(p.synthetic == want[preset].synthetic && p.extend == want[preset].extend && p.seed == 1);
         assert_true(p.validation_windows == 400 && p.early_rate == 0.02 && p.threads == 0);
         const struct ggn_train_options o = ggn_train_options_default((enum ggn_preset)preset);
