@@ -143,7 +143,10 @@ def judge(o, scene):
         errors = functools.lru_cache(maxsize=None)(lambda rect: [(spp, reference.error(of, rect)) for spp, of in light])
         for name in o.criteria:
             for size in o.sizes:
-                found.setdefault("%s %d" % (name, size), []).extend(replay(lull, name, looks, o.size, size, errors))
+                try:
+                    found.setdefault("%s %d" % (name, size), []).extend(replay(lull, name, looks, o.size, size, errors))
+                except lull.LullError as why:
+                    raise tool.Refused(why) from why
     print("%s: judged" % name_of(scene), file=sys.stderr, flush=True)
     return found
 

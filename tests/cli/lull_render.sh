@@ -237,10 +237,11 @@ done
 same="$scene -q --size 64x48 --block 16 --reproducible --spp"
 "$P" $same 40 -o at_once.exr
 t "--spp goes on, too" sh -c "'$P' $same 7 --checkpoint u.ckp -o first.exr && '$P' $same 40 --checkpoint u.ckp --resume -o more.exr && cmp at_once.exr more.exr"
-"$P" $more --spp-max 150 --visible 0.5 --checkpoint v.ckp -o first.exr --report coarse.json
-t "another --visible goes on" "$P" $more --spp-max 150 --visible 0.05 --checkpoint v.ckp --resume -o more.exr --report fine.json
+dial="$scene -q --size 64x48 --block 32 --reproducible --spp-min 4"
+"$P" $dial --spp-max 400 --visible 0.5 --checkpoint v.ckp -o first.exr --report coarse.json
+t "another --visible goes on" "$P" $dial --spp-max 400 --visible 0.05 --checkpoint v.ckp --resume -o more.exr --report fine.json
 t "  …to more samples" holds "$(total fine.json spp) > $(total coarse.json spp)"
-t "  …and so does a coarser one, without one more" "$P" $more --spp-max 150 --visible 0.9 --checkpoint v.ckp --resume -o more.exr --report after.json
+t "  …and so does a coarser one, without one more" "$P" $dial --spp-max 400 --visible 0.9 --checkpoint v.ckp --resume -o more.exr --report after.json
 t "  …since it sees nothing any more" holds "$(total fine.json spp) == $(total after.json spp)"
 head -c 5000 c.ckp >short.ckp
 refused "damaged or cut off" $long --checkpoint short.ckp --resume
