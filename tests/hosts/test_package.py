@@ -215,7 +215,7 @@ def test_independence():
 
 def test_same_stops_as_lull_render():
     """on the path tracer's recorded sequences the driver stops every block where the path tracer does"""
-    for criterion, parameters in (("halfbuf", {"threshold": .01}), ("ggn", {}), ("observer", {}), ("null", {})):
+    for criterion, parameters in (("halfbuf", {"threshold": .01}), ("ggn", {}), ("null", {})):  # observer has second moments in the path tracer
         options = ["--spp-min", "20", "--spp-max", "700"]
         seed, scene = 7, "scenes/cornell-box.pbrt"
         pairs = [a for k, v in parameters.items() for a in ("-p", f"{k}={v}")]
@@ -227,10 +227,7 @@ def test_same_stops_as_lull_render():
         assert d.run().outcome == "done"
         stops = [(b["spp"], b["reason"], b["checks"]) for b in wanted["blocks"]]
         mine = [(b.spp, b.reason, b.checks) for b in f.blocks]
-        if criterion == "observer":  # the recording rounds its halves, and the next check lies where the error says
-            assert all(abs(a[0] - b[0]) <= .01 * b[0] and a[1:] == b[1:] for a, b in zip(mine, stops, strict=True)), (mine, stops)
-        else:
-            assert mine == stops, (criterion, stops)
+        assert mine == stops, (criterion, stops)
         for b, w in zip(f.blocks, wanted["blocks"]):
             near = 2e-3 if b.spp == w["spp"] else 2e-2
             assert criterion == "null" or abs(b.error - w["error"]) <= near * w["error"], (b.error, w["error"])
@@ -826,15 +823,15 @@ def test_quote():
     while not quote.pilot_done(d):
         d.step()
     rows = quote.rows(d)
-    assert [r.value for r in rows] == [.9, .5, .35, .05] and [r.chosen for r in rows] == [False, False, True, False]
+    assert [r.value for r in rows] == [.9, .5, .05] and [r.chosen for r in rows] == [False, True, False]
     assert all(a.spp[1] < b.spp[1] and a.time_s < b.time_s for a, b in zip(rows, rows[1:])), rows
     assert d.run().outcome == "done" and [b.spp for b in f.blocks] == [b.spp for b in plain.blocks]
     taken = d.totals.samples / f.view.pixels
-    assert .7 < rows[2].spp[1] / taken < 1.4, (rows[2], taken)
+    assert .7 < rows[1].spp[1] / taken < 1.4, (rows[1], taken)
     assert quote.line(d).startswith("visible 0.5 takes about ") and "; visible 0.9 would take about " in quote.line(d)
     f.close()
     f.criterion.close()
-    assert len(quote.rows(d)) == 4  # of a render that is over, too
+    assert len(quote.rows(d)) == 3  # of a render that is over, too
     own = quote.chosen(d)
     twice = own._replace(spp=tuple(2 * n for n in own.spp), time_s=own.time_s + 100)
     assert quote.pilots(24) == [0, 8, 16, 23] and quote.pilots(1) == [0] and quote.pilots(9) == [0, 8]
@@ -927,7 +924,7 @@ def test_denoised_stops():
         assert d.run().outcome == "done" and "criterion" in {b.reason for b in f.blocks}, [b.reason for b in f.blocks]
         assert (lull.denoise(f).error == [b.error for b in f.blocks]).all()
         rows = quote.rows(d)
-        assert [(r.name, r.value, r.chosen) for r in rows] == [("denoised", .35, True), ("noisy", .35, False)], rows
+        assert [(r.name, r.value, r.chosen) for r in rows] == [("denoised", .35, True), ("noisy", .5, False)], rows
         assert rows[0].spp[1] < rows[1].spp[1] and quote.line(d) == ""
         f.close()
         assert lull.denoise(f).weight.shape == (32, 32)  # of a frame that is over, too
