@@ -58,7 +58,8 @@ static int32_t requirements(const struct lull_instance *in, struct lull_requirem
 static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *opened, struct lull_error *err)
 {
     heard.frame = *opened;
-    memcpy(heard.rects, opened->blocks, opened->block_count * sizeof *opened->blocks);
+    const uint32_t kept = opened->block_count < MOST ? opened->block_count : MOST;
+    memcpy(heard.rects, opened->blocks, kept * sizeof *opened->blocks);
     note("begin %g; ", in->quality);
     return said(heard.begin, err);
 }
