@@ -393,7 +393,7 @@ static void every_pointer(void **state)
     NO("rgb", lull_host_page("{}", NULL, &layer, 1, 1, 1, "page.html", &err));
     NO("layers", lull_host_page("{}", NULL, NULL, 1, 1, 1, "page.html", &err));
     NO("path", lull_host_page("{}", NULL, NULL, 0, 1, 1, NULL, &err));
-    NO("no report",
+    NO("no picture has this size",
        lull_host_page("{\"width\": -1, \"height\": 4, \"blocks\": []}", NULL, NULL, 0, 1, 1, "page.html", &err));
     NO("blocks", lull_host_stop_map(NULL, "m.png", "s", &err));
     NO("path", lull_host_stop_map(b, NULL, "s", &err));
