@@ -7,6 +7,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -172,10 +173,13 @@ static void pairs_and_services(void **state)
     static const struct lull_pair no_key[2] = {{"threshold", "1"}, {NULL, "1"}}, no_value[1] = {{"visible", NULL}};
     struct lull_host_services s = {.struct_size = sizeof s, .threads = UINT32_MAX};
     struct lull_host_criterion *made = NULL;
+    const char *build = getenv("BUILD"); /* as tests/run sets it */
+    char null[256];
+    snprintf(null, sizeof null, "%s/lib/lull/null.so", build ? build : "build");
     err = (struct lull_error){.struct_size = sizeof err};
     for (int open = 0; open < 2; open++) {
 #define MAKE(services, pairs, count, out) \
-    (open ? lull_host_open(services, "build/lib/lull/null.so", pairs, count, out, &err) \
+    (open ? lull_host_open(services, null, pairs, count, out, &err) \
           : lull_host_create(services, &table, pairs, count, out, &err))
         assert_refused("key", MAKE(NULL, no_key, 2, &made), LULL_E_KEY, "pairs[1]: key is NULL");
         assert_refused("value", MAKE(NULL, no_value, 1, &made), LULL_E_VALUE, "pairs[0]: the value of 'visible' is NULL");

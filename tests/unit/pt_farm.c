@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include <pthread.h>
+#include <signal.h>
 #include <stdatomic.h>
 
 #include "base/clock.h"
@@ -26,14 +27,22 @@ enum behaviour { WORKS, SILENT, BABBLES, FAILS, DEAF, LIES, OTHER_SETTINGS, ABSE
 enum { LIE_ROW, LIE_LEFT, LIE_RIGHT, LIE_FIRST, LIE_SERIAL, LIE_COUNT, LIE_SIZE, LIE_KINDS };
 static int lie;
 
-/* Set by the main thread, in which rank 0 serves its workers, after so many calls of a kernel or a criterion; 0: never. */
+/* A signal comes to the main thread, which serves the workers, after so many calls of kernel or criterion; 0: never. Calls of
+ * every thread count, because how the work is shared depends on the clock. */
 static volatile sig_atomic_t interrupted;
-static _Thread_local int calls_left;
+static atomic_int calls_left;
+static pthread_t main_thread;
+
+static void interrupt(int sign)
+{
+    (void)sign;
+    interrupted = 1;
+}
 
 static void count_call(void)
 {
-    if (calls_left > 0 && --calls_left == 0)
-        interrupted = 1;
+    if (atomic_load(&calls_left) > 0 && atomic_fetch_sub(&calls_left, 1) == 1)
+        pthread_kill(main_thread, SIGUSR1);
 }
 
 static void counted_noise(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
@@ -164,7 +173,7 @@ static void *worker_main(void *arg)
     config.planes = PT_FILM_ALL;
     pt_criterion_create(&pure, &pair, 1, threads, NULL, &criterion, &err);
     pt_render_create(&config, NULL, pt_fake_noise, threads, criterion, &render, &err);
-    const struct pt_farm_tools tools = {{NULL, pt_fake_noise, NULL}, criterion, render->frame, &render->film};
+    const struct pt_farm_tools tools = {{NULL, counted_noise, NULL}, criterion, render->frame, &render->film};
     job_create(w->transport, &job, &err);
     job_handshake(job, w->behaviour == OTHER_SETTINGS ? "a=1\nb=3\n" : "a=1\nb=2\n", w->threads, 1, &err);
     if (w->behaviour == WORKS || w->behaviour == OTHER_SETTINGS) {
@@ -357,7 +366,8 @@ static int save(void *data, struct pt_render *r, struct base_err *err)
     return pt_checkpoint_save(w->checkpoint, r, "settings\n", err);
 }
 
-/* Renders with workers until one is lost or it is interrupted after so many calls of the main thread; the checkpoint then goes on alone to the bytes of one process. */
+/* Renders with workers until one is lost or it is interrupted after so many calls; the checkpoint then goes on alone to the
+ * bytes of one process. */
 static void ends_well(const struct lull_criterion *table, enum behaviour last, int interrupt_after, const char *words)
 {
     struct pt_render_config config = pt_fake_config();
@@ -377,7 +387,7 @@ static void ends_well(const struct lull_criterion *table, enum behaviour last, i
     assert_int_equal(job_handshake(stage.job, "a=1\nb=2\n", 1, 1, &err), 0);
     config.job = stage.job;
     interrupted = 0;
-    calls_left = interrupt_after;
+    atomic_store(&calls_left, interrupt_after);
     create(&lost, &config, table, 2);
     assert_int_equal(pt_render_run(lost.render, &hooks, &outcome, &err), 0);
     assert_int_equal(outcome, words ? PT_RENDER_LOST : PT_RENDER_INTERRUPTED);
@@ -458,6 +468,8 @@ static void who_never_says_hello_is_named(void **state)
 
 int main(void)
 {
+    main_thread = pthread_self();
+    sigaction(SIGUSR1, &(struct sigaction){.sa_handler = interrupt}, NULL);
     pure = *pt_fake_criterion();
     pure.evaluate = pure_evaluate;
     pure.get_extension = no_extension;
