@@ -540,11 +540,13 @@ static void pictures_of_others(void **state)
     struct base_err err = {0};
     struct pic_image image;
     (void)state;
+    /* rgba.png is 17/255, 34/255, 51/255 at 85/255: eight bits hold it with the alpha multiplied in and without, as versions of
+     * OpenImageIO multiply before they round or after. */
     snprintf(command, sizeof command,
              "cd %s && mkdir folder.png && oiiotool --pattern constant:color=0.3 2x1 1 -d uint8 -o grey.png --pattern "
              "constant:color=0.3,0.5 2x1 2 --chnames Y,A -d uint8 -o grey-alpha.png "
-             "--pattern constant:color=0.1,0.2,0.3,0.5 2x1 4 -d uint8 -o rgba.png --pattern constant:color=9,0.2,0.3,0.4,8 "
-             "2x1 5 --chnames AA,G,B,R,Z -d float -o mixed.exr "
+             "--pattern constant:color=0.0666667,0.1333333,0.2,0.3333333 2x1 4 -d uint8 -o rgba.png "
+             "--pattern constant:color=9,0.2,0.3,0.4,8 2x1 5 --chnames AA,G,B,R,Z -d float -o mixed.exr "
              "--pattern constant:color=0.1,0.2,-0.3,0.4 2x1 4 --chnames x1,x2,x3,x4 -d float -o xyz.exr --pattern "
              "constant:color=0.7,0.2 2x1 2 --chnames a1,lull.spp -d float -o two.exr "
              "--pattern constant:color=0.25,2,1 3x2 3 -d half -o half.exr --pattern constant:color=7,5 3x2 2 --chnames "
