@@ -265,7 +265,7 @@ static int label(const struct options *o, struct base_threads *threads, struct b
     if (!rc && o->human)
         rc = ggn_thresholds_read(o->human, 200, &human, err);
     if (!rc && !o->check)
-        rc = job_handshake(ggn_cmd_job, "version=" BASE_VERSION "\n", base_threads_count(threads), 1, err);
+        rc = job_handshake(ggn_cmd_job, "version=" BASE_VERSION "\n", base_threads_count(threads), err);
     for (int i = 0; i < 2 * o->n_inputs && !rc && !base_interrupted; i++) { /* a look at all, then the work */
         struct ggn_dataset d;
         rc = ggn_dataset_open(o->inputs[i % o->n_inputs], &d, err);

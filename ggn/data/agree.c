@@ -55,5 +55,5 @@ int ggn_agree(struct job *job, const struct ggn_series_set *set, const char *con
         return rc;
     snprintf(text, sizeof text, "version=%s\ninstructions=%s (LULL_ISA)\ndata-crc=%08x\nfiles-crc=%08x\n", BASE_VERSION,
              base_isa_name(base_isa_best()), data_crc(set), (unsigned)files_are);
-    return job_handshake(job, text, threads, 1, err);
+    return job_handshake(job, text, threads, err);
 }

@@ -40,5 +40,5 @@ int pt_agree_handshake(const struct pt_open *o, struct job *job, struct base_err
 {
     char text[PT_AGREE_JOB];
     int rc = job ? pt_agree_job(o, text, sizeof text, err) : 0;
-    return rc ? rc : job_handshake(job, text, base_threads_count(o->threads), o->render && o->criterion, err);
+    return rc ? rc : job_handshake(job, text, base_threads_count(o->threads), err);
 }

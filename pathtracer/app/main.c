@@ -27,18 +27,6 @@ static int act(const struct pt_cli *cli, struct pt_open *o, struct base_log *log
     }
 }
 
-/* Any process but rank 0, until the end of the job. */
-static int serve(const struct pt_open *o, struct job *job, struct base_err *err)
-{
-    struct pt_farm_tools tools = {.maker = {o->scene, o->kernel, NULL}};
-    if (o->render) {
-        tools.criterion = o->criterion;
-        tools.frame = o->render->frame;
-        tools.film = &o->render->film;
-    }
-    return pt_farm_serve(job, o->threads, &tools, err);
-}
-
 /* Workers open what rank 0 opens, where they can help. Who interrupts or ends the job does it through rank 0. */
 static int run(struct pt_cli *cli, struct job *job, struct base_log *log, int *status, struct base_err *err)
 {
@@ -58,7 +46,8 @@ static int run(struct pt_cli *cli, struct job *job, struct base_log *log, int *s
     if (!rc && samples)
         rc = pt_agree_handshake(&open, job, err);
     if (!rc)
-        rc = works ? serve(&open, job, err) : act(cli, &open, log, status, err);
+        rc = works ? pt_farm_serve(job, open.threads, &(struct pt_row_maker){open.scene, open.kernel, NULL}, err)
+                   : act(cli, &open, log, status, err);
     pt_open_release(&open);
     return rc;
 }

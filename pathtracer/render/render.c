@@ -14,8 +14,6 @@ static const double SLICE_S = 0.25;
 /* Workers make it longer by so much for each of their threads, up to a limit: what rank 0 sends in a slice grows with the
  * threads, and should take a small part of it. */
 static const double SLICE_PER_WORKER_S = 0.004, LONGEST_SLICE_S = 5.0;
-/* What a byte costs rank 0 that it sends to a worker (measured: docs/scale.md). */
-static const double SEND_BYTE_S = 4e-10;
 
 /* Rows that each thread has to choose from in a slice: few enough that a block is sampled in one go, enough that threads and
  * processes end together. */
@@ -370,18 +368,8 @@ static void warn_once(const struct pt_render *r, const struct pt_render_hooks *h
         base_log_say(hooks->log, "%s", line);
 }
 
-/* Whether a block is better sent to a worker than asked about here: if its checks so far took longer than that. */
-static int worth_sending(const struct pt_render *r, uint32_t count)
-{
-    int threads = base_threads_count(r->threads);
-    double pixels = (double)r->blocks->block_width * (double)r->blocks->block_height;
-    double send_s = pixels * (double)pt_film_pixel_bytes(r->film.planes) * SEND_BYTE_S;
-    return pt_farm_can_ask(r->config.job, r->criterion) && count > (uint32_t)threads && r->totals->asked > 0 &&
-           r->totals->criterion_thread_s / (double)r->totals->asked > send_s * threads;
-}
-
-/* Asks here about the `count` blocks of work->due. A criterion that fails leaves every decision undecided. */
-static void ask_here(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks)
+/* Asks about the `count` blocks of work->due. A criterion that fails leaves every decision undecided. */
+static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks)
 {
     const struct pt_render_work *w = r->work;
     struct lull_error e = {.struct_size = sizeof e};
@@ -391,42 +379,17 @@ static void ask_here(struct pt_render *r, uint32_t count, const struct pt_render
         warn_once(r, hooks, e.message);
 }
 
-/* The same by all processes. Not 0: nothing has come of it, as pt_farm_ask. */
-static int ask_all(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks, struct base_err *err)
+/* All active blocks are at their next check. */
+static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
 {
     struct pt_render_work *w = r->work;
-    const struct pt_farm_question question = {r->criterion, r->frame, &r->film, w->due, w->final, count, w->decisions};
-    struct base_err said = {0};
-    double others_s = 0.0, start_s = base_clock_wall_s(), start_cpu_s = base_clock_process_s();
-    int rc = pt_farm_ask(r->config.job, r->threads, &question, &others_s, &said, err);
-    r->totals->criterion_s += base_clock_wall_s() - start_s;
-    r->totals->criterion_thread_s += base_clock_process_s() - start_cpu_s + others_s;
-    if (rc)
-        return rc;
-    r->totals->checks += count;
-    r->totals->asked += count;
-    r->totals->failed_checks += said.code != 0;
-    if (said.code)
-        warn_once(r, hooks, said.text);
-    return 0;
-}
-
-/* All active blocks are at their next check. Not 0: it was given up on the way, and nothing has changed. */
-static int check(struct pt_render *r, const struct pt_render_hooks *hooks, struct base_err *err)
-{
-    struct pt_render_work *w = r->work;
-    uint32_t n = lull_host_due(r->frame, w->due, w->final);
-    int rc = 0;
-    if (n > 0 && worth_sending(r, n))
-        rc = ask_all(r, n, hooks, err);
-    else if (n > 0)
-        ask_here(r, n, hooks);
-    if (rc || n == 0)
-        return rc;
+    const uint32_t n = lull_host_due(r->frame, w->due, w->final);
+    if (n == 0)
+        return;
+    ask(r, n, hooks);
     if (hooks->judged)
         hooks->judged(hooks->data, r, w->due, n);
     lull_host_apply(r->frame, w->due, n, w->decisions);
-    return 0;
 }
 
 static int suspend(struct pt_render *r, const struct pt_render_hooks *hooks, int reason, struct base_err *err)
@@ -478,17 +441,15 @@ static void keep(struct pt_render *r, const struct pt_render_hooks *hooks, enum 
 }
 
 /* The wave is sampled: asks about its blocks. */
-static int end_wave(struct pt_render *r, const struct pt_render_hooks *hooks, enum kept *kept, struct base_err *why,
-                    struct base_err *err)
+static void end_wave(struct pt_render *r, const struct pt_render_hooks *hooks, enum kept *kept, struct base_err *err)
 {
     if (is_whole(r))
         keep(r, hooks, kept, err);
-    int rc = check(r, hooks, why);
-    if (!rc && r->config.max_seam >= 1.0)
+    check(r, hooks);
+    if (r->config.max_seam >= 1.0)
         lull_host_reopen(r->blocks, r->config.max_seam);
     if (lull_host_active(r->blocks) > 0 && *kept == KEPT)
         *kept = NOT_KEPT;
-    return rc;
 }
 
 int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
@@ -505,9 +466,8 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
                 *outcome = PT_RENDER_PILOT;
                 break;
             }
-            given_up = end_wave(r, hooks, &kept, &why, err);
-            if (!given_up)
-                continue;
+            end_wave(r, hooks, &kept, err);
+            continue;
         }
         if (given_up < 0) {
             *outcome = PT_RENDER_LOST;
@@ -563,6 +523,6 @@ void pt_render_judge(struct pt_render *r, const struct pt_render_hooks *hooks)
         r->work->due[i] = i;
         r->work->final[i] = 0;
     }
-    ask_here(r, r->blocks->count, hooks);
+    ask(r, r->blocks->count, hooks);
     lull_host_note(r->frame, r->work->due, r->blocks->count, r->work->decisions);
 }

@@ -61,7 +61,6 @@ static int send_task(struct farming *f, int rank, size_t first, size_t n)
         return base_fail_nomem(&f->job->failed, "messages");
     *task = (struct job_task){.kind = JOB_TASK,
                               .serial = f->job->serial,
-                              .work = farm->work,
                               .whole = farm->whole != 0,
                               .first = (uint32_t)first,
                               .count = (uint32_t)n,

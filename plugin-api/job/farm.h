@@ -11,7 +11,7 @@
 /* A task as a worker sees it. */
 struct job_task {
     uint32_t kind, serial;
-    uint32_t work, whole, count, first; /* of the farm; items */
+    uint32_t whole, count, first; /* of the farm; items */
     uint64_t common_bytes, item_bytes, answer_bytes;
     unsigned char bytes[]; /* what is common, then the items [count] */
 };
@@ -23,7 +23,6 @@ static inline void *job_task_item(struct job_task *task, uint32_t k)
 
 /* Rank 0's side. Sizes in bytes are multiples of 8 and the same for every item. */
 struct job_farm {
-    uint32_t work;  /* what the items are, for the workers */
     int whole;      /* what is done to an item uses all threads of a process; else threads take one item each */
     uint32_t count; /* items */
     size_t common_bytes, item_bytes, answer_bytes;

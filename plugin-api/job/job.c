@@ -94,13 +94,7 @@ int job_count(const struct job *job) { return job ? job->transport->count : 1; }
 
 int job_worker_threads(const struct job *job) { return job ? job->threads : 0; }
 
-int job_workers_able(const struct job *job) { return job ? job->able : 0; }
-
 struct job_traffic job_traffic(const struct job *job) { return job ? job->traffic : (struct job_traffic){0}; }
-
-long job_first(const struct job *job, long n, int rank) { return n * rank / job_count(job); }
-
-long job_most(const struct job *job, long n) { return (n + job_count(job) - 1) / job_count(job); }
 
 static const char *name_of(const struct job *job, int rank) { return job->transport->list[rank].name; }
 
@@ -273,13 +267,13 @@ static int keep_new(struct job *job, double wait_s)
 
 /* --- the handshake --------------------------------------------------------------------------------------------------- */
 
-static int say_hello(struct job *job, const char *settings, int threads, int able)
+static int say_hello(struct job *job, const char *settings, int threads)
 {
     size_t size = sizeof(struct job_hello) + strlen(settings) + 1;
     struct job_hello *hello = malloc(size);
     if (!hello)
         return base_fail_nomem(&job->failed, "messages");
-    *hello = (struct job_hello){.head.kind = JOB_HELLO, .threads = threads, .able = able};
+    *hello = (struct job_hello){.head.kind = JOB_HELLO, .threads = threads};
     memcpy(hello->settings, settings, size - sizeof *hello);
     return job_send(job, 0, hello, size);
 }
@@ -294,7 +288,6 @@ static int hear_hello(struct job *job, int rank, const struct job_message *messa
         return refuse(job, rank, hello->settings, ours);
     job->workers[rank].threads = hello->threads;
     job->threads += hello->threads;
-    job->able &= hello->able;
     return 0;
 }
 
@@ -307,13 +300,12 @@ static int unheard(const struct job *job)
     return rank;
 }
 
-int job_handshake(struct job *job, const char *settings, int threads, int able, struct base_err *err)
+int job_handshake(struct job *job, const char *settings, int threads, struct base_err *err)
 {
     if (job && job->transport->rank > 0) {
-        say_hello(job, settings, threads, able);
+        say_hello(job, settings, threads);
     } else if (job) {
         const double start_s = base_clock_wall_s();
-        job->able = 1;
         while (unheard(job) < job->transport->count && !job->failed.code) {
             int rank;
             struct job_message *message;
@@ -392,14 +384,6 @@ static int finish(struct job *job, size_t bytes)
     job->traffic.bytes += bytes;
     job->traffic.waiting_s += base_clock_wall_s() - start_s;
     return job->failed.code;
-}
-
-int job_sum(struct job *job, void *data, size_t n, size_t size)
-{
-    if (!job || job->failed.code)
-        return job ? job->failed.code : 0;
-    job->transport->calls->all_reduce(job->transport, data, n, size, &job->failed);
-    return finish(job, n * size);
 }
 
 int job_broadcast(struct job *job, void *data, size_t size)

@@ -44,18 +44,13 @@ struct job_traffic {
 };
 struct job_traffic job_traffic(const struct job *job);
 
-/* Every process says that it is ready with so many threads, and whether it is `able` to do what not all may be. Rank 0 waits
- * for all and refuses (BASE_EINVAL) the first whose lines of key=value are not its own; the others go on. */
-int job_handshake(struct job *job, const char *settings, int threads, int able, struct base_err *err);
+/* Every process says that it is ready with so many threads. Rank 0 waits for all and refuses (BASE_EINVAL) the first whose
+ * lines of key=value are not its own; the others go on. */
+int job_handshake(struct job *job, const char *settings, int threads, struct base_err *err);
 int job_worker_threads(const struct job *job); /* of all but rank 0, after the handshake */
-int job_workers_able(const struct job *job);   /* all of them; 0 without a job */
 
-/* Collectives, called by all in the same order. Sums are the same bytes in all processes, and again for as many. */
-int job_sum(struct job *job, void *data, size_t n, size_t size); /* n elements: float (size 4) or double (8) */
-int job_broadcast(struct job *job, void *data, size_t size);     /* the bytes of rank 0 */
-/* Of n items in order, those of `rank` are [first(rank), first(rank + 1)); the largest share. */
-long job_first(const struct job *job, long n, int rank);
-long job_most(const struct job *job, long n);
+/* A collective, called by all in the same order: everybody gets the bytes of rank 0. */
+int job_broadcast(struct job *job, void *data, size_t size);
 
 /* Whether a process of this host has died (of others nothing is known): a failure that names it. */
 int job_find_dead(struct job *job, struct base_err *err);

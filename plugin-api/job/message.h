@@ -22,7 +22,7 @@ struct job_message {
 
 struct job_hello {
     struct job_message head;
-    int32_t threads, able;
+    int32_t threads;
     char settings[]; /* with its terminator */
 };
 
@@ -61,7 +61,7 @@ struct job {
     double timeout_s;
     const volatile sig_atomic_t *interrupted;
     struct job_worker *workers; /* owns; [count] at rank 0, 0 unused */
-    int threads, able;          /* of all workers */
+    int threads;                /* of all workers */
     uint32_t serial;            /* farms so far */
     struct job_kept *kept;      /* owns, in the order of arrival */
     int lost;                   /* somebody is gone for good or stays in a collective: there is no orderly end */

@@ -132,25 +132,12 @@ static int receive_message(struct job_transport *face, double wait_s, int *rank,
     }
 }
 
-static int begun(int code, size_t n, struct base_err *err)
-{
-    return code == MPI_SUCCESS ? 0 : base_fail(err, BASE_EIO, "MPI cannot share %zu numbers", n);
-}
-
-static int begin_all_reduce(struct job_transport *face, void *data, size_t n, size_t size, struct base_err *err)
-{
-    struct mpi *m = (struct mpi *)face;
-    MPI_Datatype type = size == sizeof(float) ? MPI_FLOAT : MPI_DOUBLE;
-    return begun(n > INT_MAX ? MPI_ERR_COUNT
-                             : MPI_Iallreduce(MPI_IN_PLACE, data, (int)n, type, MPI_SUM, m->world, &m->collective),
-                 n, err);
-}
-
 static int begin_broadcast(struct job_transport *face, void *data, size_t size, struct base_err *err)
 {
     struct mpi *m = (struct mpi *)face;
-    return begun(size > INT_MAX ? MPI_ERR_COUNT : MPI_Ibcast(data, (int)size, MPI_BYTE, 0, m->world, &m->collective), size,
-                 err);
+    if (size > INT_MAX || MPI_Ibcast(data, (int)size, MPI_BYTE, 0, m->world, &m->collective) != MPI_SUCCESS)
+        return base_fail(err, BASE_EIO, "MPI cannot share %zu bytes", size);
+    return 0;
 }
 
 static int test_collective(struct job_transport *face, struct base_err *err)
@@ -202,7 +189,6 @@ static int introduce(struct mpi *m, struct base_err *err)
 {
     static const struct job_transport_calls calls = {.send = send_message,
                                                      .receive = receive_message,
-                                                     .all_reduce = begin_all_reduce,
                                                      .broadcast = begin_broadcast,
                                                      .test = test_collective,
                                                      .close = close_all,

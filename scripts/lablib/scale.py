@@ -54,12 +54,11 @@ def read_blocks(folders):
 class Machine:
     """Processes of `threads` each; rank 0 is the one that serves. Times in seconds."""
 
-    def __init__(self, cores, most_threads, measured, everywhere):
+    def __init__(self, cores, most_threads, measured):
         self.processes = math.ceil(cores / most_threads)
         self.threads = math.ceil(cores / self.processes)
         self.cores = self.processes * self.threads  # a few more than asked for, if that is no multiple
         self.m = measured
-        self.everywhere = everywhere
         self.served_s = self.bytes = 0.0
 
     def serve_s(self, rows):
@@ -128,16 +127,8 @@ class Machine:
         return wall * slices / part
 
     def checks_s(self, count):
-        """Blocks that are asked about elsewhere travel; rank 0 sends them one after the other."""
-        size = BLOCK * BLOCK * self.m["bytes_per_pixel"]
-        cheap = self.m["check_s"] <= self.threads * size * self.m["byte_s"]
-        if cheap or not self.everywhere or count <= self.threads or self.processes == 1:
-            return math.ceil(count / self.threads) * self.m["check_s"]
-        away = count * (1.0 - self.threads / self.cores)
-        sending = away * (2 * self.m["message_s"] + size * self.m["byte_s"])
-        self.served_s += sending
-        self.bytes += away * size
-        return max(math.ceil(count / self.cores) * self.m["check_s"], sending) + self.m["latency_s"]
+        """By the threads of rank 0."""
+        return math.ceil(count / self.threads) * self.m["check_s"]
 
 
 def render(blocks, machine, ratio):
@@ -159,10 +150,10 @@ def predict(o, recorded, measured):
         blocks = [(c * o.work, n) for c, n in (recorded[i * 7919 % len(recorded)] for i in range(count))]
         work = None
         for cores in (int(n) for n in o.cores.split(",")):
-            machine = Machine(cores, o.threads, measured, not o.at_rank_0)
+            machine = Machine(cores, o.threads, measured)
             wall, checks = render(blocks, machine, measured["check_ratio"])
             if work is None:
-                alone, one_checks = render(blocks, Machine(1, 1, measured, False), measured["check_ratio"])
+                alone, one_checks = render(blocks, Machine(1, 1, measured), measured["check_ratio"])
                 work = alone
             rows.append({"frame": frame, "blocks": count, "cores": cores, "seconds": wall, "efficiency": work / wall / machine.cores,
                          "criterion": checks / wall, "rank0": machine.served_s / wall, "bytes": machine.bytes})
@@ -175,7 +166,7 @@ class Shared(Machine):
     def __init__(self, processes, cores, measured):
         self.slower = max(1.0, processes / cores)
         own = {k: v * (self.slower if k in ("message_s", "byte_s", "check_s") else 1.0) for k, v in measured.items()}
-        super().__init__(processes, 1, own, True)
+        super().__init__(processes, 1, own)
 
     def slice_s(self, rows, row_s):
         return super().slice_s(rows, row_s * self.slower)
@@ -245,7 +236,6 @@ def options(parser):
     parser.add_argument("--cores", default="1,2,4,8,16,64,256,1024,4096,10000", help="(%(default)s)")
     parser.add_argument("--threads", type=int, default=64, help="of each process, at most (64)")
     parser.add_argument("--work", type=float, default=1.0, metavar="FACTOR", help="how many times dearer a sample is than in the recordings")
-    parser.add_argument("--at-rank-0", action="store_true", help="the criterion keeps a history and is asked at rank 0 only")
     parser.add_argument("--png", type=tool.path, metavar="FILE", help="a picture of the efficiency too (gnuplot)")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.add_argument("--here", metavar="SCENE", help="no recordings: render SCENE with 1, 2, 4 and 8 processes of this machine and compare "

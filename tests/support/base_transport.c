@@ -14,10 +14,10 @@ struct message {
     size_t size;
 };
 
-/* A collective that a process has begun; size 0: of bytes. */
+/* A collective that a process has begun. */
 struct collective {
     void *data;
-    size_t n, size;
+    size_t size;
     int done;
 };
 
@@ -33,7 +33,9 @@ struct base_transport {
     pthread_cond_t arrival;
     struct job_process list[BASE_TRANSPORT_MAX];
     struct end ends[BASE_TRANSPORT_MAX];
-    int count, aborted, in_vain, begun; /* begun: processes in the collective under way */
+    int count, aborted, begun;        /* begun: processes in the collective under way */
+    void (*nothing_came)(void *data); /* of rank 0, with data; NULL: nobody listens */
+    void *data;
 };
 
 static int send_message(struct job_transport *face, int rank, void *data, size_t size, struct base_err *err)
@@ -74,9 +76,9 @@ static int receive_message(struct job_transport *face, double wait_s, int *rank,
     struct message *message = end->first;
     if (message)
         end->first = message->next;
-    else
-        all->in_vain += wait_s > 0.0;
     pthread_mutex_unlock(&all->lock);
+    if (!message && face->rank == 0 && all->nothing_came)
+        all->nothing_came(all->data);
     if (!message)
         return 0;
     *rank = message->from;
@@ -86,47 +88,31 @@ static int receive_message(struct job_transport *face, double wait_s, int *rank,
     return 1;
 }
 
-/* All have begun it: sums in the order of the ranks, or the bytes of rank 0. */
+/* All have begun it: everybody gets the bytes of rank 0. */
 static void perform(struct base_transport *all)
 {
     const struct collective *c = &all->ends[0].collective;
-    for (size_t k = 0; k < c->n && c->size > 0; k++) {
-        double sum = 0;
-        for (int r = 0; r < all->count; r++) {
-            const void *data = all->ends[r].collective.data;
-            sum = c->size == sizeof(float) ? (float)sum + ((const float *)data)[k] : sum + ((const double *)data)[k];
-        }
-        if (c->size == sizeof(float))
-            ((float *)c->data)[k] = (float)sum;
-        else
-            ((double *)c->data)[k] = sum;
-    }
     for (int r = 0; r < all->count; r++) {
         struct collective *to = &all->ends[r].collective;
-        if (to->n != c->n || to->size != c->size)
+        if (to->size != c->size)
             abort(); /* the test's processes are out of step */
-        if (r > 0 && c->n > 0)
-            memcpy(to->data, c->data, c->n * (c->size > 0 ? c->size : 1));
+        if (r > 0 && c->size > 0)
+            memcpy(to->data, c->data, c->size);
         to->done = 1;
     }
     all->begun = 0;
 }
 
-static int begin_all_reduce(struct job_transport *face, void *data, size_t n, size_t size, struct base_err *err)
+static int begin_broadcast(struct job_transport *face, void *data, size_t size, struct base_err *err)
 {
     struct end *end = (struct end *)face;
     (void)err;
     pthread_mutex_lock(&end->all->lock);
-    end->collective = (struct collective){data, n, size, 0};
+    end->collective = (struct collective){data, size, 0};
     if (++end->all->begun == end->all->count)
         perform(end->all);
     pthread_mutex_unlock(&end->all->lock);
     return 0;
-}
-
-static int begin_broadcast(struct job_transport *face, void *data, size_t size, struct base_err *err)
-{
-    return begin_all_reduce(face, data, size, 0, err);
 }
 
 static int test_collective(struct job_transport *face, struct base_err *err)
@@ -154,7 +140,6 @@ struct base_transport *base_transport_create(int count)
 {
     static const struct job_transport_calls calls = {.send = send_message,
                                                      .receive = receive_message,
-                                                     .all_reduce = begin_all_reduce,
                                                      .broadcast = begin_broadcast,
                                                      .test = test_collective,
                                                      .close = leave,
@@ -185,12 +170,10 @@ int base_transport_aborted(struct base_transport *all)
     return n;
 }
 
-int base_transport_in_vain(struct base_transport *all)
+void base_transport_listen(struct base_transport *all, void (*nothing_came)(void *data), void *data)
 {
-    pthread_mutex_lock(&all->lock);
-    int n = all->in_vain;
-    pthread_mutex_unlock(&all->lock);
-    return n;
+    all->nothing_came = nothing_came;
+    all->data = data;
 }
 
 void base_transport_destroy(struct base_transport *all)

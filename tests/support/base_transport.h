@@ -16,8 +16,8 @@ struct job_transport *base_transport_of(struct base_transport *transport, int ra
 struct job_process *base_transport_process(struct base_transport *transport, int rank);
 /* How often abort was called, by anybody. */
 int base_transport_aborted(struct base_transport *transport);
-/* How often anybody has waited for a message, for the whole time it wished, and none came. */
-int base_transport_in_vain(struct base_transport *transport);
+/* From now on rank 0 calls nothing_came(data) whenever it looks for a message and there is none. */
+void base_transport_listen(struct base_transport *transport, void (*nothing_came)(void *data), void *data);
 void base_transport_destroy(struct base_transport *transport);
 
 #endif
