@@ -16,6 +16,8 @@ static const double blur[RADIUS + 1] = {0.569912492, 0.205423697, 0.009620057};
 static const double blur_of_variance[RADIUS + 1] = {0.569912492 * 0.569912492, 0.205423697 * 0.205423697,
                                                     0.009620057 * 0.009620057};
 
+static const double MOMENTS = 0.2; /* their share of a mean square beside halves; chosen on recordings (docs/results.md) */
+
 static const double GAUSSIAN_SIXTH = 15.0; /* sixth moment of a normal distribution over the cube of its second */
 
 /* y in [0.008, 1], relative error below 1e-6: a first guess from the exponent, then two steps of Halley's method. */
@@ -183,7 +185,10 @@ double ggn_visible_expected(const float *variance, int width, int height, const 
     return visible(variance, 1, width, height, texture, scratch, NULL);
 }
 
-double ggn_visible_together(double halves, double moments) { return sqrt(0.5 * (halves * halves + moments * moments)); }
+double ggn_visible_together(double halves, double moments)
+{
+    return sqrt((1 - MOMENTS) * halves * halves + MOMENTS * moments * moments);
+}
 
 /* Sums over five rows of a, b, a b and ((a - b) / 2)^2, each [RADIUS + width + RADIUS]. */
 static void sum_rows(const float *a, const float *b, int width, int height, int y, double *const columns[SUMS])

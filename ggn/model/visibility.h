@@ -44,7 +44,8 @@ void ggn_visible_texture(const float *a, const float *b, int width, int height, 
 double ggn_visible_noise(const float *noise, int width, int height, const double *texture, double *scratch, float *blurred);
 /* Returns the r that is expected of independent Gaussian noise in each pixel. variance: d^2 [height][width]. */
 double ggn_visible_expected(const float *variance, int width, int height, const double *texture, double *scratch);
-/* What both witnesses say together: r by the halves and r by the moments. */
+/* What both witnesses say together, r by the halves and r by the moments: the root of a mean square in which moments count a
+ * fifth, since of stratified samples they say too much. */
 double ggn_visible_together(double halves, double moments);
 
 #endif

@@ -18,8 +18,7 @@
 #include "base/err.h"
 #include "sequence/simulate.h"
 
-/* The share of viewers who may still see noise where one pair of halves is all that tells of it: the smallest at which views
- * that people judged take no more than 1.15 of the samples (ggn/observer/README.md). */
+/* The criterion's default share of viewers who may still see noise (ggn/observer/README.md says how it was chosen). */
 #define GGN_OBSERVER_VISIBLE 0.35
 
 struct ggn_observer {

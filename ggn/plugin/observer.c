@@ -1,15 +1,12 @@
 /*
  * The criterion "observer": the model observer (observer/observer.h) in the renderer. Two witnesses tell how visible a
- * block's noise is, and the root mean square of what they say decides (model/visibility.h):
+ * block's noise is, and their weighted root mean square decides (model/visibility.h):
  *
  * - A pair of pictures, as a display shows them: their difference is noise, their common part the texture that hides noise.
  *   With the plane HALF they are the means of the two halves of the samples. Without it they are the mean plus and minus the
  *   noise that an earlier value of the same mean shows (plugin/means.h).
  * - The second moments of the samples, where the host has MOMENT2. They know how strong the noise of each pixel is, not only
  *   one draw of it, so that two halves which agree by luck stop nothing.
- *
- * Where there is no MOMENT2 the one witness errs by the luck of a draw: its noise counts as so much more that half of the
- * viewers are what GGN_OBSERVER_VISIBLE is for it alone.
  *
  * A block smaller than 200x200 pixels is little evidence that rare light was met. It stops only where the 200x200 pixels
  * about it show at most three times the limit.
@@ -37,7 +34,7 @@ static const double AROUND = 3.0; /* a smaller one stops only where its surround
 
 static const struct lull_param params[P_COUNT] = {
     [P_VISIBLE] =
-        LULL_KIT_FLOAT("visible", "0.5", 1e-4, 0.9999, "stop when at most this share of viewers would still see noise"),
+        LULL_KIT_FLOAT("visible", "0.35", 1e-4, 0.9999, "stop when at most this share of viewers would still see noise"),
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", "16", 2, 1e15, "samples per pixel before the first judgement"),
     [P_GROWTH] = LULL_KIT_FLOAT("growth", "1.5", 1.01, 100, "largest ratio of samples between two checks of a block"),
     [P_FPS] = GP_PARAM_FPS,
@@ -58,11 +55,11 @@ struct lull_instance {
     struct lull_kit kit;
     struct ggn_observer observer;
     struct ggn_temporal temporal;
-    double stop_error, alone; /* alone: how much more one witness is asked for than two are */
-    atomic_flag warned;       /* of planes that say nothing about noise: once per frame */
-    struct gp_means means;    /* of a frame without HALF */
-    uint32_t workers;         /* of the open frame */
-    struct lull_rect frame;   /* around all blocks */
+    double stop_error;
+    atomic_flag warned;     /* of planes that say nothing about noise: once per frame */
+    struct gp_means means;  /* of a frame without HALF */
+    uint32_t workers;       /* of the open frame */
+    struct lull_rect frame; /* around all blocks */
     struct largest largest;
     struct worker *worker;
     float *pixels;   /* owns what the workers point into */
@@ -156,8 +153,6 @@ static double error_of(struct lull_instance *in, const struct lull_view *view, c
         return (double)NAN;
     if (moments)
         noise = differ ? ggn_visible_together(noise, expected) : expected;
-    else
-        noise *= in->alone; /* the luck of one draw */
     return ggn_observer_error(&in->observer, gain * noise, (size_t)width * (size_t)height);
 }
 
@@ -328,7 +323,6 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     atomic_flag_clear(&in->warned);
     in->observer = ggn_observer_default;
     in->stop_error = ggn_observer_error_at(&in->observer, in->kit.value[P_VISIBLE]);
-    in->alone = 1 / ggn_observer_error_at(&in->observer, GGN_OBSERVER_VISIBLE);
     gp_temporal_init(&in->temporal, &in->kit, P_FPS, P_PPD);
     in->kit.need.halo = WINDOW / 2;
     *instance = in;

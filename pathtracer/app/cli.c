@@ -224,7 +224,7 @@ static const struct base_option options[] = {
      .help = "Stopping criterion: a name (see --list-criteria) or a shared object; default observer"},
     {"visible", 0, "SHARE", .set = set_visible,
      .help = "Stop a block when at most this share of viewers would still see noise, of criteria that can tell (observer: "
-             "default 0.5, denoised: 0.35, ggn: the model's own)"},
+             "and denoised: default 0.35, ggn: the model's own)"},
     {"mask", 0, "FILE.png", TO(mask), .input = BASE_FILE, .words = png,
      .help = "A grey picture of the image's size: lighter regions are rendered better. White takes a quarter of the quality "
              "parameter (visible, else threshold), black leaves it; the lightest pixel of a block counts"},

@@ -27,11 +27,11 @@ static int add_row(struct pt_quote *q, double visible, const char *name, int ask
  * criterion has no such parameter or no value for it. */
 static int add_rows(struct pt_quote *q, const struct lull_param *parameter, double asked, struct base_err *err)
 {
-    struct pt_quote_setting shares[] = {{0.9, "draft"}, {0.5, "default"}, {0.05, "final"}};
+    struct pt_quote_setting shares[] = {{0.5, "draft"}, {0.25, "default"}, {0.05, "final"}};
     int met = isnan(asked), rc = met ? add_row(q, asked, "as asked", 1, err) : 0;
     if (!parameter || rc)
         return rc;
-    if (!base_parse_real(parameter->default_value, 0.05, 0.9, &shares[1].visible)) /* a model's own */
+    if (!base_parse_real(parameter->default_value, 0.05, 0.5, &shares[1].visible)) /* a model's own */
         shares[1].name = "normal";
     for (size_t i = 0; i < sizeof shares / sizeof shares[0] && !rc; i++) {
         const double share = shares[i].visible;

@@ -140,7 +140,7 @@ def main(o):
         result |= {"test": {k: r for k, r in rows["test"].items() if not k.endswith(".csv")}, **half_of_the_viewers(o, work)}
     if os.path.isdir(o.rendered) and os.listdir(o.rendered):
         result |= rendered_views(o)
-    told = tool.measured(level=tool.load(o.observer)["level"], visible=tool.HALVES_ALONE)
+    told = tool.measured(level=tool.load(o.observer)["level"], visible=tool.default("observer", "visible"))
     result = {name: {"measured": told, "rows": rows} for name, rows in result.items()}
     tool.save(result, o.out, "agreement.json")
     for name, kept in result.items():

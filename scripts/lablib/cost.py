@@ -52,8 +52,8 @@ KEYS = ("blocks", "samples", "sampling_s", "checks_cheap", "checks_full", "noisy
 
 
 def defaults():
-    """{criterion: [parameter, value]}: what a user gets who says nothing else, as the renderer tells it; observer, by halves alone."""
-    return {name: [parameter, tool.HALVES_ALONE if name == "observer" else tool.default(name, parameter)] for name, parameter in
+    """{criterion: [parameter, value]}: what a user gets who says nothing else, as the renderer tells it."""
+    return {name: [parameter, tool.default(name, parameter)] for name, parameter in
             (("observer", "visible"), ("variance", "threshold"), ("halfbuf", "threshold"))}
 
 

@@ -78,10 +78,6 @@ def commit(*of):
     return done.stdout.strip()
 
 
-# GGN_OBSERVER_VISIBLE of observer/observer.h: what `observer` asks of halves alone, and recordings hold no second moments.
-HALVES_ALONE = 0.35
-
-
 def default(criterion, parameter):
     """The default of a criterion's parameter, as the program tells it."""
     found = re.search(r"^%s .*?^    -p %s=(\S+)" % (criterion, parameter), run(RENDER, "--list-criteria"), re.M | re.S)

@@ -105,6 +105,7 @@ def replay(lull, name, looks, size, block, errors):
     import numpy as np
     criterion, _, parameter = name.partition(":")
     pairs = dict([parameter.split("=")]) if parameter else {}
+    size -= size % block  # no narrow blocks at the edges
     frame = lull.HostFrame(lull.load(criterion, threads=1, log=lambda *_: None, **pairs), size, size, [p for p, _ in PLANES], block=block,
                            spp_max=1 << 30)
     shown = {p: np.zeros((size, size, c), np.float32) for p, c in PLANES}

@@ -37,7 +37,7 @@ END
 
 truth="scripts/lab truth --work $tmp/work --scenes cornell-box --size 40 --spp 48 --reference-spp 128 --seeds 1 --sizes 40 16 --threads 2"
 t "a run from recording to table" sh -c "$truth --criteria fixed:spp=20 observer null >$tmp/table"
-t "  …asks the criteria as a renderer does" sh -c "grep -q '^| fixed:spp=20 | 16 px | other scenes | 9 of 9 | ' $tmp/table &&
+t "  …asks the criteria about whole blocks, as a renderer does" sh -c "grep -q '^| fixed:spp=20 | 16 px | other scenes | 4 of 4 | ' $tmp/table &&
     grep -q '^| null | 40 px | other scenes | 0 of 1 | ' $tmp/table && grep -q '^| observer | 40 px ' $tmp/table"
 t "  …at the samples that they have named" sh -c "mkdir $tmp/docs && $truth --recorded --criteria fixed:spp=33 --write $tmp/docs >/dev/null &&
     python3 -c 'import json; f = json.load(open(\"$tmp/docs/results/truth.json\")); assert {b[0] for s in f[\"scenes\"].values() for k in s.values() for b in k} == {36}'"

@@ -7,7 +7,7 @@ quote="$scene -q --size 64x48 --block 16 --spp-max 2000 -t 2"
 
 # --- text ---
 "$P" $quote --quote >text 2>notes
-t "the table has its three rows, 50 % by default" sh -c "grep -q '^ 90 %  draft .* x$' text && grep -q '^ 50 %  default' text && grep -q '^  5 %  final' text"
+t "the table has its three rows, 35 % by default" sh -c "grep -q '^ 50 %  draft .* x$' text && grep -q '^ 35 %  default' text && grep -q '^  5 %  final' text"
 t "  …samples rise as fewer viewers may see noise" \
     awk '/ %  (draft|default|final)/ { gsub(",", ""); mean = $6 + 0; if (mean < last) exit 1; last = mean; rows++ } END { exit rows != 3 }' text
 t "  …has a heading for the blocks" grep -qx "blocks that take most of the time, as asked:" text
@@ -24,7 +24,7 @@ t "a uniform render has a quote" sh -c "$P $quote --quote --spp-max 2000 --spp-m
 # --- JSON: the same, block by block ---
 t "--json" "$P" $quote --quote --json
 "$P" $quote --quote --json >q.json
-t "  …has rows of shares" json q.json "[r['visible'] for r in rows] == [0.9, 0.5, 0.05] and [r['as_asked'] for r in rows] == [False, True, False]"
+t "  …has rows of shares" json q.json "[r['visible'] for r in rows] == [0.5, 0.35, 0.05] and [r['as_asked'] for r in rows] == [False, True, False]"
 t "  …every row has every block, inside its interval" \
     json q.json "all(len(r['blocks']) == 12 and all(b['spp']['low'] <= b['spp']['expected'] <= b['spp']['high'] for b in r['blocks']) for r in rows)"
 t "  …the row's time is that of its blocks" \

@@ -72,7 +72,7 @@ for (const [name, options] of [
     await page.keyboard.press('Enter');
     check((await card(page)).includes(`Block ${dear.id}\n`), `${name}: which can be gone to`, await card(page));
     const body = await page.locator('main').innerText();
-    const missing = ['--spp-max 96', r.software, r.processor ?? '', '--visible 0.5', 'Seed'].filter((w) => !body.includes(w));
+    const missing = ['--spp-max 96', r.software, r.processor ?? '', '--visible 0.35', 'Seed'].filter((w) => !body.includes(w));
     check(missing.length === 0, `${name}: where it was made and how good`, missing);
 }
 

@@ -171,7 +171,7 @@ static void gaussian_noise(void **state)
         variance[i] = 4;
     assert_true(fabs(ggn_visible_expected(variance, SIZE, SIZE, texture, scratch) / (pow(15, 1.0 / 6) * 2 * taps / sqrt(2)) -
                      1) < 1e-6);
-    assert_true(fabs(ggn_visible_together(3, 4) - sqrt(12.5)) < 1e-12);
+    assert_true(fabs(ggn_visible_together(3, 4) - sqrt(0.8 * 9 + 0.2 * 16)) < 1e-12);
 }
 
 /* Hits of a pixel in n samples that each hit with probability p: none of the symmetry that halves assume. */
@@ -184,13 +184,15 @@ static int hits_of(uint32_t pixel, uint32_t stream, int n, double p)
 }
 
 /* Rare bright hits, one in sixteen pixels: the error of the mean is skewed, the difference of its halves is not, and is too
- * kind by an eighth. Both witnesses together are not. */
+ * kind by an eighth. At the default share half of what they stop is off by more than 1.05, and nothing that both witnesses stop. */
 static void skewed_noise(void **state)
 {
     enum { SIZE = 100, N = 64, DRAWS = 4 };
     static float noise[SIZE * SIZE], error[SIZE * SIZE], variance[SIZE * SIZE];
     static double scratch[5 * 300], texture[1];
-    const double base = 0.2, bright = 8, p = 1e-3;
+    const double base = 0.2, bright = 8, p = 1e-3,
+                 limit = ggn_observer_error_at(&ggn_observer_default, GGN_OBSERVER_VISIBLE);
+    int off = 0;
     (void)state;
     for (uint32_t draw = 0; draw < DRAWS; draw++) {
         for (uint32_t i = 0; i < SIZE * SIZE; i++) {
@@ -205,9 +207,10 @@ static void skewed_noise(void **state)
         const double halves = ggn_visible_noise(noise, SIZE, SIZE, texture, scratch, NULL);
         const double truth = ggn_visible_noise(error, SIZE, SIZE, texture, scratch, NULL);
         const double expected = ggn_visible_expected(variance, SIZE, SIZE, texture, scratch);
-        assert_true(truth > 1.05 * halves);
-        assert_true(truth < 1.05 * ggn_visible_together(halves, expected));
+        off += limit * truth > 1.05 * halves;
+        assert_true(limit * truth < 1.05 * ggn_visible_together(halves, expected));
     }
+    assert_true(2 * off >= DRAWS);
 }
 
 /* A calm block amid noise that a hundred times as many samples would show in it, too, stops only when its surroundings are

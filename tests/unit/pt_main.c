@@ -420,7 +420,7 @@ static int set_up_quote(void **state)
     render.totals->render_s = 50.5;
     render.totals->criterion_s = 60.75;
     quote = (struct pt_quote){
-        .row_count = 3, .rows = rows, .threads = 2, .settings = {{0.9, "draft"}, {0.125, "as asked"}, {0.05, "final"}}};
+        .row_count = 3, .rows = rows, .threads = 2, .settings = {{0.5, "draft"}, {0.125, "as asked"}, {0.05, "final"}}};
     for (int k = 0; k < 3; k++)
         fill_row(&rows[k], k);
     return pool ? 0 : -1;

@@ -12,7 +12,7 @@ from .library import LullError, Parameter
 
 # The quality parameter `visible` by name, with the criterion's own default; others are asked at twice and at four times
 # their value.
-NAMED = {0.9: "draft", 0.05: "final"}
+NAMED = {0.9: "coarse", 0.5: "draft", 0.05: "final"}
 
 
 class Row(NamedTuple):
