@@ -156,9 +156,8 @@ keys = $(if $(filter tests/%,$(1)),tests_$(subst $() ,_,$(call prefix,2,$(1))) t
 inc = $(INC_$(firstword $(foreach k,$(call keys,$(1)),$(if $(INC_$(k)),$(k)))))
 # Kernels for one instruction set carry it in their name (x_avx2.c, x_avx512.c); they are reached by run-time dispatch only.
 ifneq ($(filter x86_64%,$(shell $(CC) -dumpmachine)),)
-ISA_avx2       := -mavx2 -mfma
-ISA_avx512     := -mavx512f -mavx512vl -mavx512bw -mavx512dq -mfma -mprefer-vector-width=512
-ISA_avx512bf16 := -mavx512f -mavx512vl -mavx512bw -mavx512dq -mavx512bf16 -mfma
+ISA_avx2   := -mavx2 -mfma
+ISA_avx512 := -mavx512f -mavx512vl -mavx512bw -mavx512dq -mfma -mprefer-vector-width=512
 isa = $(ISA_$(lastword $(subst _, ,$(basename $(1)))))
 endif
 

@@ -19,7 +19,7 @@ enum { MAX_ROUNDS = 101, SGEMM_N = 768, BLOCKS = 16 };
 
 struct options {
     const char *model;
-    int json, threads, rounds, batch, precision;
+    int json, threads, rounds, batch;
 };
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
@@ -27,8 +27,6 @@ static const struct base_option list[] = {
      .help = "networks of the sizes of this model instead of the published ones"},
     {"json", 0, NULL, TO(json), .help = "one JSON object of medians instead of tables"},
     {"threads", 0, "N", TO(threads), 1, 1024, .help = "threads (all processors); with 1 the figures are processor time"},
-    {"precision", 0, NULL, TO(precision), .words = ggn_precision_names,
-     .help = "of inference (f32); bf16 is slow where the processor has no bfloat16"},
     {"rounds", 0, "N", TO(rounds), 1, MAX_ROUNDS, .help = "measurements per figure (9)"},
     {"batch", 0, "N", TO(batch), 1, 64, .help = "batch of the training figures, which are per image or sample (4)"},
     {0}};
@@ -81,14 +79,14 @@ static void fill_input(const struct bench *b, struct ggn_exec *e, int width)
         ggn_plane_copy(&e->graph->value[0], ggn_exec_plane(e, 0, 0, c), b->noisy[c], width);
 }
 
-static int create_alone(struct bench *b, int flags, int width, struct base_err *err)
+static int create_alone(struct bench *b, int width, struct base_err *err)
 {
     b->alone = calloc((size_t)b->o.threads, sizeof *b->alone);
     if (!b->alone)
         return base_fail_nomem(err, "bench");
     for (int i = 0; i < b->o.threads; i++)
         for (int net = 0; net < GGN_NETS; net++) {
-            b->alone[i][net] = ggn_exec_create(&b->trainer->graph[net], NULL, 1, flags, NULL, err);
+            b->alone[i][net] = ggn_exec_create(&b->trainer->graph[net], NULL, 1, 0, NULL, err);
             if (!b->alone[i][net])
                 return err->code;
             fill_input(b, b->alone[i][net], width);
@@ -100,21 +98,19 @@ static int setup(struct bench *b, struct base_err *err)
 {
     struct ggn_hyper hyper;
     struct ggn_train_options options = ggn_train_options_default(GGN_PRESET_LULL);
-    const int flags = b->o.precision ? GGN_EXEC_BF16 : 0;
     int rc = sizes(b, &hyper, err);
 
     if (rc)
         return rc;
     const int area = hyper.width * hyper.height, window = 3 * hyper.window, planes = window + 3;
     options.batch = b->o.batch;
-    options.bf16 = b->o.precision;
     b->threads = base_threads_create(b->o.threads, err);
     b->trainer = b->threads ? ggn_trainer_create(&hyper, &options, b->threads, err) : NULL;
     if (!b->trainer)
         return BASE_ENOMEM;
-    b->r = ggn_exec_create(&b->trainer->graph[GGN_NET_R], NULL, 1, flags, b->threads, err);
-    b->m = ggn_exec_create(&b->trainer->graph[GGN_NET_M], NULL, 1, flags, b->threads, err);
-    b->d = ggn_exec_create(&b->trainer->graph[GGN_NET_D], NULL, 1, flags, b->threads, err);
+    b->r = ggn_exec_create(&b->trainer->graph[GGN_NET_R], NULL, 1, 0, b->threads, err);
+    b->m = ggn_exec_create(&b->trainer->graph[GGN_NET_M], NULL, 1, 0, b->threads, err);
+    b->d = ggn_exec_create(&b->trainer->graph[GGN_NET_D], NULL, 1, 0, b->threads, err);
     b->planes = malloc((size_t)b->o.batch * (size_t)(planes * area) * sizeof *b->planes);
     if (!b->r || !b->m || !b->d || !b->planes)
         return base_fail_nomem(err, "bench");
@@ -130,7 +126,7 @@ static int setup(struct bench *b, struct base_err *err)
     struct ggn_exec *const all[] = {b->r, b->m, b->d};
     for (int net = 0; net < GGN_NETS; net++)
         fill_input(b, all[net], hyper.width);
-    return create_alone(b, flags, hyper.width, err);
+    return create_alone(b, hyper.width, err);
 }
 
 static void release(struct bench *b)
@@ -316,10 +312,7 @@ static void print_figures(const struct bench *b, const double figure[N_FIGURES])
             printf("%-26s %9.3f\n", figure_name[f], figure[f]);
         return;
     }
-    printf("{\"threads\": %d, \"isa\": \"%s\", \"precision\": \"%s\", \"batch\": %d", b->o.threads,
-           base_isa_name(b->r->kernels->isa), ggn_precision_names[b->o.precision], b->o.batch);
-    if (b->o.precision == GGN_PRECISION_BF16)
-        printf(", \"bf16\": \"%s\"", ggn_precision_bf16_by());
+    printf("{\"threads\": %d, \"isa\": \"%s\", \"batch\": %d", b->o.threads, base_isa_name(b->r->kernels->isa), b->o.batch);
     for (int f = 0; f < N_FIGURES; f++)
         printf(", \"%s\": %.3f", figure_name[f], figure[f]);
     printf("}\n");
@@ -336,10 +329,7 @@ int ggn_cmd_bench(int argc, char **argv)
     if (!rc)
         rc = setup(&b, &err);
     if (!rc && !b.o.json) {
-        printf("instruction set %s, %d threads\n", base_isa_name(b.r->kernels->isa), b.o.threads);
-        if (b.o.precision == GGN_PRECISION_BF16)
-            printf("bfloat16 products by %s\n", ggn_precision_bf16_by());
-        putchar('\n');
+        printf("instruction set %s, %d threads\n\n", base_isa_name(b.r->kernels->isa), b.o.threads);
         print_layers(&b, b.r, GGN_NET_R);
         print_layers(&b, b.m, GGN_NET_M);
         print_layers(&b, b.d, GGN_NET_D);

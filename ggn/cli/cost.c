@@ -24,7 +24,7 @@ struct options {
     double ratio, cadence;
 };
 
-static const char *const precisions[] = {"f32", "bf16", "f64", NULL}; /* enum ggn_precision */
+static const char *const precisions[] = {"f32", "f64", NULL}; /* enum ggn_precision */
 static const char *const split_words[] = {"train", "validation", "test", "people", "none", NULL};
 
 #define TO(member) BASE_TO(struct options, member)
@@ -547,8 +547,6 @@ int ggn_cmd_cost(int argc, char **argv)
 
     int rc = base_options_parse(&options, argc, argv, &o, &err);
     j.split = (enum ggn_split)o.split;
-    if (!rc && o.precision == GGN_PRECISION_BF16)
-        fprintf(stderr, "%s: bfloat16 products by %s\n", argv[0], ggn_precision_bf16_by());
     if (!rc && !(threads = base_threads_create(o.threads, &err)))
         rc = err.code;
     eo.dir = o.data;

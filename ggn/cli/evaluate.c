@@ -21,11 +21,11 @@
 #include "model/setting.h"
 #include "observer/observer.h"
 
-enum { MAX_MODELS = 8, MAX_FILES = 8, MAX_METHODS = 10 + 2 * MAX_FILES + 2 * MAX_MODELS, MAX_ADJUSTED = 8 };
+enum { MAX_MODELS = 8, MAX_FILES = 8, MAX_METHODS = 10 + 2 * MAX_FILES + MAX_MODELS, MAX_ADJUSTED = 8 };
 
 struct options {
     const char *data, *validation, *test, *out, *observer, *models[MAX_MODELS], *thresholds[MAX_FILES], *trained[MAX_FILES];
-    int n_models, n_thresholds, n_trained, json, no_quality, threads, window, retune, recorded, baselines, epochs, bf16,
+    int n_models, n_thresholds, n_trained, json, no_quality, threads, window, retune, recorded, baselines, epochs,
         no_noise_maps;
     double early, ratio, visible;
     int n_adjusted;
@@ -83,8 +83,6 @@ static const struct base_option list[] = {
     {"early", 0, "RATE", TO(early), 0, 1, .help = "early-stop rate that cuts are tuned for on the training scenes (0.05)"},
     {"retune", 0, NULL, TO(retune),
      .help = "tune the models' thresholds too, on the validation scenes, instead of taking the stored ones"},
-    {"bf16", 0, NULL, TO(bf16),
-     .help = "judge with bfloat16 products too: one more method per model, whose changed decisions are counted"},
     {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP and SSIM at the stop"},
     {"no-pictures", 0, NULL, TO(no_noise_maps),
      .help = "judge as in a host without half buffers: models get no noise pictures and no tail guard"},
@@ -105,7 +103,7 @@ struct evaluation {
     struct ggn_model *models[MAX_MODELS];
     struct ggn_method methods[MAX_METHODS];
     int n;
-    /* whose decisions a method's are compared with: the same model in float, for a model the first; else -1 */
+    /* whose decisions a model's are compared with: the first model's; else -1 */
     int likened[MAX_METHODS];
     enum ggn_split tuning, tuning_models;
 };
@@ -200,20 +198,18 @@ static int policy_of(const struct options *o, const struct ggn_model *model, str
 
 static int add_models(struct evaluation *j, struct base_threads *threads, struct base_err *err)
 {
-    int rc = 0, precisions = j->o->bf16 ? 2 : 1;
-    for (int i = 0; i < precisions * j->o->n_models && !rc; i++) {
-        const char *path = j->o->models[i / precisions];
-        enum ggn_precision precision = i % precisions ? GGN_PRECISION_BF16 : GGN_PRECISION_F32;
+    int rc = 0;
+    for (int i = 0; i < j->o->n_models && !rc; i++) {
         char name[GGN_METHOD_NAME];
-        snprintf(name, sizeof name, "%.40s%s", base_file_name(path), precision == GGN_PRECISION_BF16 ? " bf16" : "");
+        snprintf(name, sizeof name, "%.40s", base_file_name(j->o->models[i]));
         struct ggn_policy policy;
-        rc = policy_of(j->o, j->models[i / precisions], &policy, err);
+        rc = policy_of(j->o, j->models[i], &policy, err);
         if (!rc)
-            rc = ggn_eval_trained(&j->methods[j->n], &j->set, j->models[i / precisions], &policy, name, precision,
-                                  j->o->observer, threads, err);
+            rc = ggn_eval_trained(&j->methods[j->n], &j->set, j->models[i], &policy, name, GGN_PRECISION_F32, j->o->observer,
+                                  threads, err);
         if (rc)
             return rc;
-        j->likened[j->n] = precision == GGN_PRECISION_BF16 ? j->n - 1 : i > 0 ? j->n - i : -1;
+        j->likened[j->n] = i > 0 ? j->n - i : -1;
         struct ggn_method *m = &j->methods[j->n++];
         if (j->o->retune)
             rc = ggn_method_tune(m, &j->set, j->tuning_models, j->o->early, err);
@@ -261,7 +257,7 @@ static int add_observed(struct evaluation *j, struct base_err *err)
     return rc;
 }
 
-/* What other precisions and models change on a split: verdicts on windows that both judged, and where blocks stop. */
+/* What other models change on a split: verdicts on windows that both judged, and where blocks stop. */
 static void report_changes(const struct evaluation *j, enum ggn_split split, cJSON *to, int *failed)
 {
     for (int i = 0; i < j->n; i++) {
@@ -486,8 +482,6 @@ int ggn_cmd_evaluate(int argc, char **argv)
 
     if (base_options_parse(&options, argc, argv, &o, &err))
         return ggn_cmd_fail(argv[0], &err);
-    if (speaks && o.bf16)
-        fprintf(stderr, "%s: bfloat16 products by %s\n", argv[0], ggn_precision_bf16_by());
     if (ggn_cmd_job)
         base_interrupt_catch(); /* that is how MPI says that a process has died */
     ggn_cmd_follow_rank_0();

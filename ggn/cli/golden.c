@@ -8,11 +8,10 @@
 #include "base/options.h"
 #include "cli/commands.h"
 #include "model/golden.h"
-#include "model/inference.h"
 
 struct options {
     struct ggn_golden_seeds seeds;
-    int train_step, single, bf16, threads;
+    int train_step, single, threads;
 };
 
 #define TO(member) BASE_TO(struct options, member)
@@ -23,7 +22,6 @@ static const struct base_option list[] = {
     {"train-step", 0, NULL, TO(train_step), .help = "also make one published training iteration and report it"},
     {"float", 0, NULL, TO(single),
      .help = "the single-precision networks that inference and training use, not the double ones"},
-    {"bf16", 0, NULL, TO(bf16), .help = "as --float, with bfloat16 products; in software where the processor has none"},
     {"threads", 0, "N", TO(threads), 1, 1024, .help = "threads (all processors); the figures do not depend on it"},
     {0}};
 
@@ -64,13 +62,11 @@ static void add_train(cJSON *j, const struct ggn_golden_train *t, int *failed)
     add_nets(j, "sum_running_var", t->sum_running_var, failed);
 }
 
-static cJSON *to_json(const struct ggn_golden *g, int train_step, int bf16, int *failed)
+static cJSON *to_json(const struct ggn_golden *g, int train_step, int *failed)
 {
     static const char *const ssim_name[4] = {"x0", "x2", "x5", "denoised0"};
     cJSON *j = cJSON_CreateObject();
 
-    if (bf16)
-        base_json_item(j, "bf16", cJSON_CreateString(ggn_precision_bf16_by()), failed);
     add_number(j, "x_first", g->x_first, failed);
     add_number(j, "x_last", g->x_last, failed);
     add_number(j, "x_mean", g->x_mean, failed);
@@ -108,14 +104,13 @@ int ggn_cmd_golden(int argc, char **argv)
         base_options_parse(&options, argc, argv, &o, &err) ? NULL : base_threads_create(o.threads, &err);
     if (!threads)
         return ggn_cmd_fail(argv[0], &err);
-    int rc =
-        (o.single || o.bf16 ? ggn_golden_run : ggn_golden_run_f64)(&o.seeds, o.train_step, o.bf16, threads, &golden, &err);
+    int rc = (o.single ? ggn_golden_run : ggn_golden_run_f64)(&o.seeds, o.train_step, threads, &golden, &err);
     base_threads_destroy(threads);
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
 
     int failed = 0;
-    cJSON *json = to_json(&golden, o.train_step, o.bf16, &failed);
+    cJSON *json = to_json(&golden, o.train_step, &failed);
     rc = base_json_write(NULL, json, failed, &err);
     cJSON_Delete(json);
     return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;

@@ -49,7 +49,7 @@ static int print_model(const struct ggn_model *m, const struct ggn_container *c,
            1e-9 * (ggn_graph_mac(&m->graph[0]) + 2 * ggn_graph_mac(&m->graph[1]) + ggn_graph_mac(&m->graph[2])),
            1e-6 * 9.0 * (h->window + 1) * h->width *
                h->height, /* of 3 channels 8 bits noisy and 16 denoised, and a spare slot */
-           1e-6 * (double)ggn_inference_bytes(m, GGN_PRECISION_F32, 1));
+           1e-6 * (double)ggn_inference_bytes(m, 1));
     printf("calibration  p = sigmoid(%g * %s + %g), stops below %g in %d checks in a row, spacing %g\n",
            m->calibration.scale, h->reach > 0 ? "octaves" : "logit", m->calibration.shift, m->calibration.threshold,
            m->calibration.consecutive, m->calibration.spacing);

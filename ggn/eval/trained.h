@@ -3,6 +3,7 @@
 #define GGN_EVAL_TRAINED_H
 
 #include "eval/method.h"
+#include "model/exact.h"
 #include "model/inference.h"
 #include "model/policy.h"
 

@@ -18,7 +18,7 @@ static int make_networks(struct ggn_viewer *v, const struct ggn_model *model, en
     const float *learned[GGN_NETS];
 
     if (precision != GGN_PRECISION_F64) {
-        v->inference = ggn_inference_create(model, precision, NULL, err);
+        v->inference = ggn_inference_create(model, NULL, err);
         return v->inference ? 0 : err->code;
     }
     if (v->set->width != model->hyper.width || v->set->height != model->hyper.height)

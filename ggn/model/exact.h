@@ -12,6 +12,9 @@
 
 #include "model/networks.h"
 
+/* Of the networks' arithmetic: an inference's, or that of this file. */
+enum ggn_precision { GGN_PRECISION_F32, GGN_PRECISION_F64 };
+
 struct ggn_exact;
 
 /* graph, learned: [GGN_NETS]; learned: parameters and running statistics as struct ggn_weights of floats holds them

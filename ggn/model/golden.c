@@ -52,8 +52,8 @@ static void fill_windows(struct state *s)
         }
 }
 
-static int setup(struct state *s, const struct ggn_golden_seeds *seeds, int train_step, int bf16,
-                 struct base_threads *threads, struct base_err *err)
+static int setup(struct state *s, const struct ggn_golden_seeds *seeds, int train_step, struct base_threads *threads,
+                 struct base_err *err)
 {
     struct ggn_hyper hyper = ggn_hyper_default(GGN_PRESET_PAPER);
     struct ggn_train_options options = ggn_train_options_default(GGN_PRESET_PAPER);
@@ -61,7 +61,6 @@ static int setup(struct state *s, const struct ggn_golden_seeds *seeds, int trai
     options.parts = train_step ? GGN_TRAIN_ALL : 0;
     options.batch = W_COUNT;
     options.dropout = 0;
-    options.bf16 = bf16;
     s->noisy = malloc((size_t)W_COUNT * PLANES * AREA * sizeof *s->noisy);
     s->reference = malloc((size_t)W_COUNT * 3 * AREA * sizeof *s->reference);
     if (!s->noisy || !s->reference)
@@ -73,10 +72,9 @@ static int setup(struct state *s, const struct ggn_golden_seeds *seeds, int trai
         ggn_weights_init(s->t->weights[net], GGN_INIT_HASH, seeds->base[net]);
         ggn_weights_pack(s->t->weights[net], NULL);
     }
-    s->r =
-        ggn_exec_create(&s->t->graph[GGN_NET_R], NULL, IMAGES, GGN_EXEC_NO_FUSE | (bf16 ? GGN_EXEC_BF16 : 0), threads, err);
-    s->m = ggn_exec_create(&s->t->graph[GGN_NET_M], NULL, 2, GGN_EXEC_NO_FUSE | (bf16 ? GGN_EXEC_BF16 : 0), threads, err);
-    s->d = ggn_exec_create(&s->t->graph[GGN_NET_D], NULL, 1, GGN_EXEC_NO_FUSE | (bf16 ? GGN_EXEC_BF16 : 0), threads, err);
+    s->r = ggn_exec_create(&s->t->graph[GGN_NET_R], NULL, IMAGES, GGN_EXEC_NO_FUSE, threads, err);
+    s->m = ggn_exec_create(&s->t->graph[GGN_NET_M], NULL, 2, GGN_EXEC_NO_FUSE, threads, err);
+    s->d = ggn_exec_create(&s->t->graph[GGN_NET_D], NULL, 1, GGN_EXEC_NO_FUSE, threads, err);
     return s->r && s->m && s->d ? 0 : BASE_ENOMEM;
 }
 
@@ -222,11 +220,11 @@ static int train(struct state *s, struct ggn_golden_train *out, struct base_err 
     return 0;
 }
 
-int ggn_golden_run(const struct ggn_golden_seeds *seeds, int train_step, int bf16, struct base_threads *threads,
+int ggn_golden_run(const struct ggn_golden_seeds *seeds, int train_step, struct base_threads *threads,
                    struct ggn_golden *out, struct base_err *err)
 {
     struct state s = {0};
-    int rc = setup(&s, seeds, train_step, bf16, threads, err);
+    int rc = setup(&s, seeds, train_step, threads, err);
 
     memset(out, 0, sizeof *out);
     if (!rc)

@@ -41,12 +41,11 @@ struct ggn_golden_seeds {
 /* Pixel value of window w, image i (−1: the reference), channel c. */
 double ggn_golden_pixel(int w, int i, int c, int y, int x);
 
-/* `train_step` != 0 also makes one published iteration. `bf16` != 0: convolutions with bfloat16 products (float only, where
- * the processor has them). */
-int ggn_golden_run(const struct ggn_golden_seeds *seeds, int train_step, int bf16, struct base_threads *threads,
+/* `train_step` != 0 also makes one published iteration. */
+int ggn_golden_run(const struct ggn_golden_seeds *seeds, int train_step, struct base_threads *threads,
                    struct ggn_golden *out, struct base_err *err);
 /* In double. */
-int ggn_golden_run_f64(const struct ggn_golden_seeds *seeds, int train_step, int bf16, struct base_threads *threads,
+int ggn_golden_run_f64(const struct ggn_golden_seeds *seeds, int train_step, struct base_threads *threads,
                        struct ggn_golden *out, struct base_err *err);
 
 #endif

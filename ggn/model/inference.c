@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "model/window.h"
-#include "nn/bf16.h"
 #include "nn/exec.h"
 
 struct ggn_inference {
@@ -13,28 +12,16 @@ struct ggn_inference {
     struct ggn_exec *exec[GGN_NETS];
 };
 
-const char *const ggn_precision_names[] = {"f32", "bf16", NULL};
-
-const char *ggn_precision_bf16_by(void) { return ggn_bf16_name(); }
-
-int ggn_precision_is_slow(enum ggn_precision precision)
-{
-    return precision == GGN_PRECISION_BF16 && strcmp(ggn_bf16_name(), "software") == 0;
-}
-
-static int exec_flags(enum ggn_precision precision) { return precision == GGN_PRECISION_BF16 ? GGN_EXEC_BF16 : 0; }
-
-size_t ggn_inference_bytes(const struct ggn_model *model, enum ggn_precision precision, int threads)
+size_t ggn_inference_bytes(const struct ggn_model *model, int threads)
 {
     size_t bytes = sizeof(struct ggn_inference);
 
     for (int net = 0; net < GGN_NETS; net++)
-        bytes += ggn_exec_bytes(&model->graph[net], 1, exec_flags(precision), threads);
+        bytes += ggn_exec_bytes(&model->graph[net], 1, 0, threads);
     return bytes;
 }
 
-struct ggn_inference *ggn_inference_create(const struct ggn_model *model, enum ggn_precision precision,
-                                           struct base_threads *threads, struct base_err *err)
+struct ggn_inference *ggn_inference_create(const struct ggn_model *model, struct base_threads *threads, struct base_err *err)
 {
     struct ggn_inference *j = calloc(1, sizeof *j);
 
@@ -44,7 +31,7 @@ struct ggn_inference *ggn_inference_create(const struct ggn_model *model, enum g
     }
     j->model = model;
     for (int net = 0; net < GGN_NETS; net++) {
-        j->exec[net] = ggn_exec_create(&model->graph[net], NULL, 1, exec_flags(precision), threads, err);
+        j->exec[net] = ggn_exec_create(&model->graph[net], NULL, 1, 0, threads, err);
         if (!j->exec[net]) {
             ggn_inference_destroy(j);
             return NULL;

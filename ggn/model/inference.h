@@ -14,23 +14,12 @@
 #include "base/threads.h"
 #include "model/model.h"
 
-/* Of the products inside convolutions; sums are float either way. */
-enum ggn_precision {
-    GGN_PRECISION_F32,
-    GGN_PRECISION_BF16,
-    GGN_PRECISION_F64 /* model/exact.h only */
-};
-extern const char *const ggn_precision_names[]; /* "f32", "bf16", NULL */
-/* How this processor makes bfloat16 products: "AVX512-BF16", or "software" (the same numbers, slowly). */
-const char *ggn_precision_bf16_by(void);
-int ggn_precision_is_slow(enum ggn_precision precision);
-
 struct ggn_inference;
 
-size_t ggn_inference_bytes(const struct ggn_model *model, enum ggn_precision precision, int threads);
+size_t ggn_inference_bytes(const struct ggn_model *model, int threads);
 /* `threads` may be NULL: the calling thread alone. NULL on failure. */
-struct ggn_inference *ggn_inference_create(const struct ggn_model *model, enum ggn_precision precision,
-                                           struct base_threads *threads, struct base_err *err);
+struct ggn_inference *ggn_inference_create(const struct ggn_model *model, struct base_threads *threads,
+                                           struct base_err *err);
 void ggn_inference_destroy(struct ggn_inference *inference);
 
 /* noisy [3][height][width] display codes → denoised, 16-bit fixed point. */

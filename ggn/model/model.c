@@ -19,7 +19,7 @@ struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct base_er
     int rc = m->provenance ? 0 : base_fail_nomem(err, "model");
     for (int net = 0; net < GGN_NETS && !rc; net++) {
         rc = ggn_network_build(&m->graph[net], net, hyper, err);
-        if (!rc && !(m->weights[net] = ggn_weights_create(&m->graph[net], NULL, GGN_WEIGHTS_BF16, err)))
+        if (!rc && !(m->weights[net] = ggn_weights_create(&m->graph[net], NULL, 0, err)))
             rc = BASE_ENOMEM;
     }
     if (!rc)

@@ -62,8 +62,7 @@ static int create_net(struct ggn_trainer *t, int net, struct base_err *err)
 
     if (rc)
         return rc;
-    t->weights[net] = ggn_weights_create(
-        &t->graph[net], NULL, (trained ? GGN_WEIGHTS_BACKWARD : 0) | (t->options.bf16 ? GGN_WEIGHTS_BF16 : 0), err);
+    t->weights[net] = ggn_weights_create(&t->graph[net], NULL, trained ? GGN_WEIGHTS_BACKWARD : 0, err);
     if (!t->weights[net])
         return BASE_ENOMEM;
     ggn_weights_init(t->weights[net], t->options.init[net], t->options.seed + 1000u * (uint32_t)net);

@@ -28,7 +28,6 @@ struct ggn_train_options {
     double explode; /* a loss or gradient norm above it counts as divergence */
     int dropout;
     double scale; /* with hyper.reach: logit = scale · octaves */
-    int bf16;     /* weights also packed for GGN_EXEC_BF16 */
     enum ggn_init init[GGN_NETS];
     uint32_t seed;
 };

@@ -4,14 +4,13 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "nn/bf16.h"
 #include "nn/layers.h"
 #include "nn/real.h"
 #include "nn/winograd.h"
 
-enum { ALIGN_BYTES = 64, MAX_TILE_PX = 48 };
+enum { ALIGN_BYTES = 64 };
 
-/* Elements per worker: the lane sums of one weight gradient task, or one task of a faster form. Vectors have ≤ 64 bytes. */
+/* Of a worker: the lane sums of one weight gradient task, or one task of Winograd's form. Vectors have ≤ 64 bytes. */
 static size_t scratch_size(const struct ggn_graph *g, const struct ggn_kernels *k, int flags)
 {
     size_t need = (size_t)GGN_TILE_MAX * GGN_GRAD_IC * 9 * (64 / sizeof(real)) + 256;
@@ -20,12 +19,9 @@ static size_t scratch_size(const struct ggn_graph *g, const struct ggn_kernels *
         const struct ggn_layer *l = &g->layer[i];
         const struct ggn_value *v = &g->value[l->out];
         const int c_in = ggn_layer_c_in(g, l);
-        const size_t bf16 = ggn_bf16_scratch(c_in, v->row, 16 * MAX_TILE_PX);
         const size_t wino = ggn_wino_scratch(flags & GGN_EXEC_GRADS && v->c > c_in ? v->c : c_in);
         if (l->op != GGN_OP_CONV || l->kernel != 3)
             continue;
-        if (k->bf16 && flags & GGN_EXEC_BF16 && bf16 > need)
-            need = bf16;
         if (k->wino && ggn_wino_suits(c_in, v->c, v->h, v->w, k->lanes))
             need = wino > need ? wino : need;
         if (k->wino && flags & GGN_EXEC_GRADS && need < GGN_WINO_GRAD_SCRATCH)

@@ -22,8 +22,7 @@ enum {
     GGN_EXEC_GRADS = 1,      /* room for the backward pass */
     GGN_EXEC_INPUT_GRAD = 2, /* backward also computes the gradient of the input */
     GGN_EXEC_NO_DROPOUT = 4,
-    GGN_EXEC_NO_FUSE = 8, /* keep every intermediate value in GGN_EVAL too */
-    GGN_EXEC_BF16 = 16    /* bfloat16 products in GGN_EVAL, if the weights hold them; float otherwise */
+    GGN_EXEC_NO_FUSE = 8 /* keep every intermediate value in GGN_EVAL too */
 };
 
 struct ggn_exec {

@@ -1,4 +1,4 @@
-/* Convolutions, direct, by Winograd or in bfloat16, and their gradients. */
+/* Convolutions, direct or by Winograd, and their gradients. */
 #include <string.h>
 
 #include "nn/layers.h"
@@ -36,7 +36,7 @@ static long cut_conv(struct ggn_task *t, int c_in, int c_out, const real *wino)
 {
     const struct ggn_value *v = &t->e->graph->value[t->l->out];
 
-    t->wino = t->bf16 ? NULL : wino_weights(t, c_in, c_out, wino);
+    t->wino = wino_weights(t, c_in, c_out, wino);
     if (t->wino) {
         ggn_wino_cut(ggn_wino_tiles(v->h, v->w), c_out, &t->px_blocks, &t->oc_group);
         t->oc_groups = (c_out + t->oc_group - 1) / t->oc_group;
@@ -65,10 +65,7 @@ static void run_conv_piece(const struct ggn_task *t, const struct ggn_conv *conv
                 scratch);
         return;
     }
-    if (t->bf16)
-        k->bf16(conv, t->bf16, p0, p1, oc0, oc1, (uint32_t *)(void *)scratch);
-    else
-        k->conv(conv, p0, p1, oc0, oc1);
+    k->conv(conv, p0, p1, oc0, oc1);
 }
 
 static void conv_piece(void *data, long i, int worker)
@@ -103,8 +100,6 @@ static void conv_forward(struct ggn_task *t)
 {
     const struct ggn_graph *g = t->e->graph;
 
-    if (t->e->flags & GGN_EXEC_BF16 && t->e->mode == GGN_EVAL && t->w->bf16 && t->l->kernel == 3)
-        t->bf16 = t->w->bf16 + t->l->pack;
     ggn_task_run(t, cut_conv(t, ggn_layer_c_in(g, t->l), g->value[t->l->out].c, t->w->wino), conv_piece);
 }
 

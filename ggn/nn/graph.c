@@ -104,8 +104,7 @@ int ggn_graph_conv(struct ggn_graph *g, int in, int in2, int c_out, int kernel, 
         add_tensor(g, "weight", 0, 0, (int[4]){transposed ? c_in : c_out, transposed ? c_out : c_in, kernel, kernel}, 4);
     l->bias = add_tensor(g, "bias", 1, 0, (int[4]){c_out}, 1);
     g->n_stage_layers++;
-    /* even, so that pairs of input channels fit as well (nn/bf16.h) */
-    g->n_pack += round_up(round_up((size_t)c_in, 2) * (size_t)c_out * (size_t)(kernel * kernel), 16);
+    g->n_pack += round_up((size_t)c_in * (size_t)c_out * (size_t)(kernel * kernel), 16);
     return l->out = add_value(g, c_out, a->h, a->w, 0);
 }
 

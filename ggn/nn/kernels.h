@@ -53,12 +53,10 @@ struct ggn_kernels {
 
     /* Elements [p0, p1) of the flat planes, output channels [oc0, oc1); p0 is a multiple of tile_px, oc0 of tile_oc. */
     void (*conv)(const struct ggn_conv *conv, long p0, long p1, int oc0, int oc1);
-    /* Faster forms of a 3×3 convolution, NULL where there are none; see nn/winograd.h and nn/bf16.h. */
+    /* A faster form of a 3×3 convolution, NULL where there is none; see nn/winograd.h. */
     void (*wino)(const struct ggn_conv *conv, const real *u, int t0, int t1, int oc0, int oc1, real *scratch);
     void (*wino_grad)(const struct ggn_conv_grad *grad, real *scratch);
     void (*wino_pack)(real *u, const real *packed, int n_in, int n_out, int tile_oc);
-    void (*bf16)(const struct ggn_conv *conv, const uint32_t *w, long p0, long p1, int oc0, int oc1, uint32_t *scratch);
-    void (*bf16_pack)(uint32_t *out, const real *packed, int n_in, int n_out, int tile_oc);
 
     /* acc[i][tap][o] (vectors of lanes) += Σ_p dy[o][p]·x[i][p + tap], p in [p0, p1), for n_in ≤ GGN_GRAD_IC and
      * ot ≤ tile_oc; p1 is rounded up to whole vectors. */

@@ -1,6 +1,5 @@
 /* The kernels for AVX2 with FMA. */
 #if defined(__x86_64__)
-#include "nn/bf16.h"
 #include "nn/real.h"
 #include "nn/vector_avx2.h"
 #include "nn/winograd.h"
@@ -8,9 +7,7 @@
 #define TABLE ggn_kernels_avx2
 #define ISA BASE_ISA_AVX2
 #ifndef GGN_DOUBLE
-#define FASTER_FORMS \
-    .wino = ggn_wino_conv_avx2, .wino_grad = ggn_wino_grad_avx2, .wino_pack = ggn_wino_pack, .bf16 = ggn_bf16_conv, \
-    .bf16_pack = ggn_bf16_pack,
+#define FASTER_FORMS .wino = ggn_wino_conv_avx2, .wino_grad = ggn_wino_grad_avx2, .wino_pack = ggn_wino_pack,
 #endif
 
 #include "nn/kernels_body.h"

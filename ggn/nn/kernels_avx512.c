@@ -1,6 +1,5 @@
-/* The kernels for AVX-512, with the two faster forms of a float convolution. */
+/* The kernels for AVX-512, with the faster form of a float convolution. */
 #if defined(__x86_64__)
-#include "nn/bf16.h"
 #include "nn/real.h"
 #include "nn/vector_avx512.h"
 #include "nn/winograd.h"
@@ -8,9 +7,7 @@
 #define TABLE ggn_kernels_avx512
 #define ISA BASE_ISA_AVX512
 #ifndef GGN_DOUBLE
-#define FASTER_FORMS \
-    .wino = ggn_wino_conv_avx512, .wino_grad = ggn_wino_grad_avx512, .wino_pack = ggn_wino_pack, \
-    .bf16 = ggn_bf16_conv_avx512, .bf16_pack = ggn_bf16_pack,
+#define FASTER_FORMS .wino = ggn_wino_conv_avx512, .wino_grad = ggn_wino_grad_avx512, .wino_pack = ggn_wino_pack,
 #endif
 
 #include "nn/kernels_body.h"

@@ -16,9 +16,8 @@ struct ggn_task {
     int px_blocks, oc_groups, oc_group; /* how a convolution is cut */
     int ic_groups, ic_group;            /* of its weights' gradient */
     long px_block;
-    int weights_by_wino;  /* CONV: the gradient of its weights */
-    const real *wino;     /* CONV: transformed weights when Winograd's algorithm is used */
-    const uint32_t *bf16; /* CONV: pairs of weights when bfloat16 is used */
+    int weights_by_wino; /* CONV: the gradient of its weights */
+    const real *wino;    /* CONV: transformed weights when Winograd's algorithm is used */
 };
 
 struct ggn_layer_passes {

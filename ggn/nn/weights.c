@@ -24,8 +24,7 @@ struct ggn_weights *ggn_weights_create(const struct ggn_graph *graph, const stru
     const struct ggn_kernels *k = kernels ? kernels : ggn_kernels_best();
     size_t wino = k->wino ? 4 * pack : 0;
     size_t bytes = (learned + 2 * stats + (flags & GGN_WEIGHTS_BACKWARD ? 2 : 1) * (pack + wino)) * sizeof(real);
-    size_t bf16 = flags & GGN_WEIGHTS_BF16 && k->bf16 ? pack * sizeof(uint32_t) : 0;
-    char *memory = w ? calloc(1, bytes + bf16 + ALIGN) : NULL;
+    char *memory = w ? calloc(1, bytes + ALIGN) : NULL;
 
     if (!memory) {
         free(w);
@@ -44,7 +43,6 @@ struct ggn_weights *ggn_weights_create(const struct ggn_graph *graph, const stru
     w->wino = wino ? w->pack + pack : NULL;
     w->pack_back = flags & GGN_WEIGHTS_BACKWARD ? w->pack + pack + wino : NULL;
     w->wino_back = w->pack_back && wino ? w->pack_back + pack : NULL;
-    w->bf16 = bf16 ? (uint32_t *)(void *)((char *)w->params + bytes) : NULL;
     for (size_t i = 0; i < graph->n_stats; i++)
         w->var[i] = 1;
     return w;
@@ -119,7 +117,7 @@ static void pack_conv(real *out, const struct ggn_weights *w, const struct ggn_l
     }
 }
 
-/* The faster forms, from the packed one. */
+/* The faster form, from the packed one. */
 static void pack_forms(struct ggn_weights *w, const struct ggn_layer *l)
 {
     const struct ggn_kernels *k = w->kernels;
@@ -128,8 +126,6 @@ static void pack_forms(struct ggn_weights *w, const struct ggn_layer *l)
 
     if (l->kernel != 3)
         return;
-    if (w->bf16)
-        k->bf16_pack(w->bf16 + l->pack, w->pack + l->pack, c_in, v->c, k->tile_oc);
     if (!w->wino || !ggn_wino_suits(c_in, v->c, v->h, v->w, k->lanes))
         return;
     k->wino_pack(w->wino + 4 * l->pack, w->pack + l->pack, c_in, v->c, k->tile_oc);

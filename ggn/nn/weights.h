@@ -13,8 +13,7 @@
 #define GGN_BN_EPS 1e-5
 
 enum {
-    GGN_WEIGHTS_BACKWARD = 1, /* also packed for the backward pass */
-    GGN_WEIGHTS_BF16 = 2      /* also packed in bfloat16; float only */
+    GGN_WEIGHTS_BACKWARD = 1 /* also packed for the backward pass */
 };
 
 enum ggn_init {
@@ -32,7 +31,6 @@ struct ggn_weights {
     real *mean, *var;                  /* [n_stats] running statistics; inside params */
     real *pack, *pack_back;            /* [n_pack] for the forward and the backward pass; pack_back may be NULL */
     real *wino, *wino_back;            /* [4·n_pack] transformed for nn/winograd.h; NULL where it is not used */
-    uint32_t *bf16;                    /* [n_pack] pairs for nn/bf16.h; NULL where it is not used */
     real *scale, *shift;               /* [n_stats] batch norm with running statistics as y = x·scale + shift */
 };
 

@@ -24,7 +24,7 @@
 #include "sequence/simulate.h"
 #include "sequence/tail.h"
 
-enum { P_MODEL, P_VISIBLE, P_PASSES, P_GATE, P_TAIL, P_GINI, P_FIRST_SPP, P_PRECISION, P_COUNT };
+enum { P_MODEL, P_VISIBLE, P_PASSES, P_GATE, P_TAIL, P_GINI, P_FIRST_SPP, P_COUNT };
 
 static const struct lull_param params[P_COUNT] = {
     [P_MODEL] = LULL_KIT_FILE("model", NULL,
@@ -44,8 +44,6 @@ static const struct lull_param params[P_COUNT] = {
                               "tail 0.2, 0 = no such guard; without it the model's own"),
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", NULL, 1, 1e9,
                                  "samples per pixel of the first image of a window; without it the model's own"),
-    [P_PRECISION] = LULL_KIT_CHOICE("precision", "f32", "f32|bf16",
-                                    "of the products in the networks; bf16 is slow on processors without the instructions"),
 };
 
 /* --- what it sees ------------------------------------------------------------------------------------------------------ */
@@ -91,7 +89,7 @@ static void *worker_create(const struct lull_instance *in, size_t pixels, struct
     w->noise = malloc(pixels * sizeof *w->noise);
     w->noise_map = malloc(pixels);
     if (w->noise && w->noise_map && (in->rule.reach <= 0 || !ggn_meter_init(&w->meter, pixels, err)))
-        w->inference = ggn_inference_create(in->model, (enum ggn_precision)in->kit.value[P_PRECISION], NULL, err);
+        w->inference = ggn_inference_create(in->model, NULL, err);
     if (w->inference)
         return w;
     worker_destroy(w);
@@ -307,10 +305,6 @@ static int32_t load(struct lull_instance *in, int kind, const char *path, struct
         return lull_kit_fail(err, LULL_E_IO, "model: %.200s: windows of %d images", path, in->rule.window);
     if (model->hyper.noise_map)
         in->kit.need.planes_used |= LULL_PLANE_BIT(LULL_PLANE_HALF);
-    if (ggn_precision_is_slow((enum ggn_precision)in->kit.value[P_PRECISION]))
-        in->slow = "precision bf16: this processor has no instruction for such products, and software makes them slowly; "
-                   "f32 is faster";
-    gp_windowed_hash(in, &in->kit.value[P_PRECISION], sizeof in->kit.value[P_PRECISION]);
     for (int net = 0; net < GGN_NETS; net++)
         gp_windowed_hash(in, model->weights[net]->params, model->graph[net].n_params * sizeof(float));
     gp_windowed_ready(in, params, P_COUNT, model->hyper.width, model->hyper.height);

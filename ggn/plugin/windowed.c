@@ -174,8 +174,6 @@ int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_fram
     lull_kit_frame_open(in, frame);
     if (in->means.count)
         gp_log(&in->kit, LULL_LOG_INFO, "ggn: no plane HALF: noise is told from how the mean changes between checks");
-    if (in->slow)
-        gp_log(&in->kit, LULL_LOG_WARNING, in->slow);
     in->display = gp_display_of(&in->kit);
     tell_setting(in, frame);
     return LULL_OK;

@@ -49,7 +49,6 @@ struct lull_instance {
     struct lull_kit kit;
     const struct gp_block_view_ops *ops;
     void *model;               /* owns, by ops->model_destroy */
-    const char *slow;          /* logged with each frame; static text, NULL: nothing is */
     struct ggn_stop_rule rule; /* the model's policy, with the parameters over it */
     uint32_t key;              /* of saved state: a hash of model and policy */
     struct ggn_display display;

@@ -125,7 +125,6 @@ def judge(o, out):
     """The networks on the blocks of `replay` and `recorded`."""
     introduce(o, out)
     judged(o, out, "test", "-m", o.model[0])
-    judged(o, out, "test", "-m", o.model[0], "--precision", "bf16", "--no-quality")
     judged(o, out, "recorded", "--recorded", "--no-quality", *shipped(o))
     judged(o, out, "recorded", "--recorded", "--no-quality", "--no-pictures", *shipped(o))
 
@@ -273,18 +272,6 @@ def check_price(criterion, params, side, most, long):
     return ((b["criterion_thread_s"] - a["criterion_thread_s"]) / checks if checks > 0 else 0.0), checks
 
 
-def bench(o):
-    """Milliseconds of a decision on one thread, processor time: float and bfloat16 in turns, the least of two medians of three."""
-    rows = []
-    for name, options in [(os.path.basename(m), ("--model", m)) for m in o.model[:2]] + [("published widths", ())]:
-        found = {"f32": [], "bf16": []}
-        for precision in ("f32", "bf16") * 2:
-            text = ggn("bench", "--json", "--threads", 1, "--rounds", 3, "--precision", precision, *options)
-            found[precision].append(json.loads(text)["decision_ms"])
-        rows.append({"name": name, "f32_ms": min(found["f32"]), "bf16_ms": min(found["bf16"])})
-    return rows
-
-
 def price(o, out):
     """Of blocks of 200x200 pixels, every criterion in turn, the least of the rounds; of the default and the network by block size."""
     found = {name: [] for name in criteria_of(o)}
@@ -295,11 +282,6 @@ def price(o, out):
                      for name, f in found.items()}
     once = report_of("scenes/cornell-box.pbrt", "--size", "200x200", "--block", 200, "--threads", 1, "-c", "fixed", "-p", "spp=8", "--max-depth", 1)
     out["prices"]["fixed"] = {"check_s": once["criterion_thread_s"] / max(1, once["checks"]), "checks": once["checks"], "rounds": 1}
-    out["bench"] = bench(o)
-    for b in out["bench"]:  # rounding changes a decision's share of a check that no render is long enough to tell apart
-        if b["name"] in out["prices"]:
-            own = out["prices"][b["name"]]
-            out["prices"][b["name"] + " bf16"] = {**own, **{k: own[k] * b["bf16_ms"] / b["f32_ms"] for k in ("check_s", "most_s")}}
     out["sides"] = []
     for name in ("variance", "halfbuf", "observer", os.path.basename(o.model[0])):
         criterion, params = criteria_of(o)[name]
@@ -429,7 +411,6 @@ def decisions(o, builds):
     rows = [changes(name, own, scores(o, "data", *a, **k)) for name, a, k in (
         ("double instead of float", (model, "--precision", "f64"), {}),
         ("AVX2: Winograd's algorithm in more layers", (model,), {"env": {"LULL_ISA": "avx2"}}),
-        ("bfloat16 products", (model, "--precision", "bf16"), {}),
         ("weights stored as half floats", (half,), {}),
         ("flush-to-zero, denormals-are-zero", (model,), {"env": {"LD_PRELOAD": flushing()}}),
         ("-O2", (model,), {"program": os.path.join(builds["-O2"], "bin", "ggn")}))]
@@ -445,7 +426,7 @@ def precision(o, out):
     exact = (.786932669062, .773263945936, .773324065289, .783187939314)  # in double, as tests/golden has them
     out["golden"] = []
     for name, options, isa in (("float, AVX-512: Winograd", ("--float",), "avx512"), ("float, AVX2: Winograd", ("--float",), "avx2"),
-                               ("float, baseline x86-64", ("--float",), "base"), ("bfloat16 products", ("--bf16",), "avx512")):
+                               ("float, baseline x86-64", ("--float",), "base")):
         p = golden(isa, *options)
         out["golden"].append({"name": name, "p_moved": max(abs(a - b) for a, b in zip(p, exact)), "windows": len(p)})
     builds = other_builds()

@@ -55,7 +55,7 @@ def points_in(out, data):
     for p in data["points"]:
         full = price_of(out, p["criterion"])
         cheap = price_of(out, "variance")
-        network = out.get("networks", {}).get(bare(p["criterion"]).replace(" bf16", ""))
+        network = out.get("networks", {}).get(bare(p["criterion"]))
         scenes = {}
         for scene, f in named(p["scenes"]).items():
             f["checks"] = f["checks_full"] + f["checks_cheap"]

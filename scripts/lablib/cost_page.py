@@ -56,9 +56,9 @@ def frontier(out, name):
     """The limit, and of every criterion its default and some other settings."""
     mine, others = default_network(out), networks(out)
     criteria = ("uniform", "fixed", "variance", "halfbuf", "variance, no guard", "halfbuf, no guard", "observer", "observer, no halves",
-                mine, mine + ", no halves", mine + " bf16", *others[1:], *BASELINES)
+                mine, mine + ", no halves", *others[1:], *BASELINES)
     points = points_of(out, name)
-    named = lambda p: p[1] in ("visible", "threshold", "own", "spp") and p[2] in NAMED and not p[0].endswith(" bf16") and (p[0] != "fixed" or p[2] == 1024)
+    named = lambda p: p[1] in ("visible", "threshold", "own", "spp") and p[2] in NAMED and (p[0] != "fixed" or p[2] == 1024)
     chosen = [p for p in points if p[0] == "limit"] + [p for c in criteria for p in points if p[0] == c and p[3] and (is_default(p) or named(p))]
     label = lambda p: p[0] + ("" if is_default(p) or p[0] == "limit" else ", %s %g" % (p[1], p[2]))
     return settings(["setting"], [([label(p)], p) for p in chosen], ["samples", "time / limit", "time / uniform", "noisy", "early", "worst", "FLIP",
@@ -166,12 +166,6 @@ def prices_table(out):
                           "as µs per pixel: a path that takes this long costs as much": "%(us).3f"})
 
 
-def bf16_table(out):
-    macs = lambda name: figure(out["networks"].get(name, {}).get("macs", math.nan) / 1e9)
-    return records([dict(b, gmac=macs(b["name"]), ratio=b["bf16_ms"] / b["f32_ms"]) for b in out["bench"]],
-                   {"networks": "%(name)s", "GMAC": "%(gmac)s", "float, ms": "%(f32_ms).1f", "bfloat16, ms": "%(bf16_ms).1f", "ratio": "%(ratio).2f"})
-
-
 PARAMETERS = ["samples", "time / limit", "noisy", "early", "worst", "asked", "spared by the gate"]
 
 
@@ -270,7 +264,7 @@ def pays_table(out):
     """The cheapest setting of each kind that is good enough for a final frame, if every path took so long."""
     points, networks = points_of(out, "recorded"), set(out.get("networks", {}))
     kinds = (("`observer`", lambda p: p[0] == "observer"), ("`variance`, `halfbuf`", lambda p: p[0].startswith(("variance", "halfbuf"))),
-             ("a network", lambda p: p[0].replace(" bf16", "") in networks), ("a baseline", lambda p: p[0] in BASELINES),
+             ("a network", lambda p: p[0] in networks), ("a baseline", lambda p: p[0] in BASELINES),
              ("uniform", lambda p: p[0] in ("uniform", "fixed")))
     rows = []
     for us in (0.02, 0.1, 0.5, 1, 5, 20, 100):
@@ -286,7 +280,7 @@ def final(p):
 def without_halves(out):
     """Settings for hosts without half buffers: `observer` looks twice there, a network judges without noise picture and guard."""
     takes_halves = {"observer", *out.get("networks", {})}
-    return lambda p: not p[0].startswith("halfbuf") and p[0].replace(" bf16", "") not in takes_halves
+    return lambda p: not p[0].startswith("halfbuf") and p[0] not in takes_halves
 
 
 def with_halves(p):
@@ -343,7 +337,7 @@ def worst_table(out):
     """Where each default fails: the scene on which it leaves most noise, and the one on which it wastes most."""
     rows = []
     for p in points_of(out, "test"):
-        if not is_default(p) or p[0] in ("uniform", "limit") or p[0].startswith("window") or p[0].endswith((" bf16", ", no halves")):
+        if not is_default(p) or p[0] in ("uniform", "limit") or p[0].startswith("window") or p[0].endswith(", no halves"):
             continue
         early = max(p[3].items(), key=lambda s: s[1]["worst"])
         late = max(p[3].items(), key=lambda s: s[1]["to_limit"])

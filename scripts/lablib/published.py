@@ -70,9 +70,8 @@ def judge(o, scenes, models):
 
 
 def step_ms():
-    """Milliseconds of a processor in float and with bfloat16 products, of the networks at the published widths."""
-    return {how: {k: v for k, v in json.loads(ggn("bench", "--threads", 1, "--rounds", 9, "--batch", 8, "--precision", how, "--json")).items() if k.endswith("_ms")}
-            for how in ("f32", "bf16")}
+    """Milliseconds of a processor, of the networks at the published widths."""
+    return {k: v for k, v in json.loads(ggn("bench", "--threads", 1, "--rounds", 9, "--batch", 8, "--json")).items() if k.endswith("_ms")}
 
 
 def row(name, options, r, run=None):
@@ -101,11 +100,10 @@ def page(r):
 
 def parts(r):
     """What a step's milliseconds go into, from ggn bench."""
-    f, b = r["step_ms"]["f32"], r["step_ms"]["bf16"]
+    f = r["step_ms"]
     six, generator = 6 * f["denoiser_train_ms"], 2 * f["generator_train_ms"]
     return ("One window is %.0f ms of the denoiser (six images, forward and back) and %.0f ms of the generator (two windows);\na denoiser that only "
-            "answers takes %.0f ms. With bfloat16 products a decision takes %.2f of its time in float.\n" % (
-                six, generator, 6 * f["denoiser_forward_ms"], b["decision_ms"] / f["decision_ms"]))
+            "answers takes %.0f ms.\n" % (six, generator, 6 * f["denoiser_forward_ms"]))
 
 
 def draw(folder, r):

@@ -40,7 +40,7 @@ done
 while read -r command options; do
     for option in $options; do says bounds "$command" "--$option=x"; done
 done <<'END'
-bench threads rounds batch precision
+bench threads rounds batch
 golden base-r base-m base-d threads
 convert type
 flip ppd

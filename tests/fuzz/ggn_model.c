@@ -38,7 +38,7 @@ static void mend(uint8_t *p, size_t size)
 
 static void decide(const struct ggn_model *m)
 {
-    struct ggn_inference *j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(m, NULL, NULL);
     size_t values = 3 * (size_t)m->hyper.height * (size_t)m->hyper.width, images = (size_t)m->hyper.window;
     uint8_t *noisy = calloc(values, 1);
     uint16_t *denoised = calloc(values, sizeof *denoised);

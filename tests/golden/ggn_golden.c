@@ -65,7 +65,7 @@ static void run(int single, int train_step, struct ggn_golden *g)
     struct base_err err = {0};
     struct base_threads *threads = base_threads_create(2, &err);
 
-    if ((single ? ggn_golden_run : ggn_golden_run_f64)(&seeds, train_step, 0, threads, g, &err))
+    if ((single ? ggn_golden_run : ggn_golden_run_f64)(&seeds, train_step, threads, g, &err))
         fail_msg("%s", err.text);
     base_threads_destroy(threads);
 }

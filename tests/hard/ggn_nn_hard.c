@@ -39,7 +39,7 @@ static struct ggn_model *make(void)
 static double decide(const struct ggn_model *m, float (*block)(int image, int k), struct ggn_pixel_counts *counts)
 {
     const struct ggn_policy policy = ggn_policy_default();
-    struct ggn_inference *j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(m, NULL, NULL);
     static uint8_t noisy[3][BYTES];
     static uint16_t denoised[3][BYTES];
     const uint8_t *const n[3] = {noisy[0], noisy[1], noisy[2]};

@@ -44,7 +44,7 @@ static int save_and_load(struct base_err *err)
 static int judge(struct base_err *err)
 {
     struct ggn_model *m = ggn_model_create(&hyper, err);
-    struct ggn_inference *j = m ? ggn_inference_create(m, GGN_PRECISION_F32, NULL, err) : NULL;
+    struct ggn_inference *j = m ? ggn_inference_create(m, NULL, err) : NULL;
     int rc = j ? 0 : BASE_ENOMEM;
 
     ggn_inference_destroy(j);

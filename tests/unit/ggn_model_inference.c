@@ -57,8 +57,7 @@ static double window_logit(struct ggn_inference *j, uint32_t first) { return pic
 static void test_no_memory(void **state)
 {
     struct ggn_model *m = make();
-    struct ggn_inference *a = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL),
-                         *b = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *a = ggn_inference_create(m, NULL, NULL), *b = ggn_inference_create(m, NULL, NULL);
 
     assert_true(a && b);
     double before = window_logit(a, 1), used = window_logit(a, 5), fresh = window_logit(b, 5);
@@ -74,7 +73,7 @@ static void test_no_memory(void **state)
 static void compare_with_networks(const uint8_t *picture)
 {
     struct ggn_model *m = make();
-    struct ggn_inference *j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(m, NULL, NULL);
     struct ggn_exec *den = ggn_exec_create(&m->graph[GGN_NET_R], NULL, 1, GGN_EXEC_NO_FUSE, NULL, NULL);
     struct ggn_exec *gen = ggn_exec_create(&m->graph[GGN_NET_M], NULL, 2, GGN_EXEC_NO_FUSE, NULL, NULL);
     struct ggn_exec *dis = ggn_exec_create(&m->graph[GGN_NET_D], NULL, 1, GGN_EXEC_NO_FUSE, NULL, NULL);
@@ -135,7 +134,7 @@ static void test_picture(void **state)
 
     for (uint32_t k = 0; k < AREA; k++)
         picture[k] = (uint8_t)(ggn_hash(k, 77) >> 30);
-    assert_non_null(j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL));
+    assert_non_null(j = ggn_inference_create(m, NULL, NULL));
     assert_true(picture_logit(j, 1, picture) == window_logit(j, 1));
     ggn_inference_destroy(j);
     ggn_model_destroy(m);
@@ -143,7 +142,7 @@ static void test_picture(void **state)
     compare_with_networks(picture);
     compare_with_networks(NULL);
     m = make();
-    assert_non_null(j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL));
+    assert_non_null(j = ggn_inference_create(m, NULL, NULL));
     double with = picture_logit(j, 1, picture), without = window_logit(j, 1), calm = picture_logit(j, 1, still);
     assert_true(with != without && with != calm && calm != without);
     assert_true(window_logit(j, 1) == without);
@@ -153,32 +152,13 @@ static void test_picture(void **state)
     (void)state;
 }
 
-/* bfloat16 has 8 bits: close to float, not the same, deterministic. */
-static void test_bf16(void **state)
-{
-    struct ggn_model *m = make();
-    struct ggn_inference *f = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL),
-                         *b = ggn_inference_create(m, GGN_PRECISION_BF16, NULL, NULL);
-
-    assert_true(f && b);
-    double exact = window_logit(f, 1), rounded = window_logit(b, 1), again = window_logit(b, 1);
-    assert_memory_equal(&rounded, &again, sizeof again);
-    assert_true(fabs(rounded - exact) < 0.1);
-    assert_true(rounded != exact);
-    ggn_inference_destroy(f);
-    ggn_inference_destroy(b);
-    ggn_model_destroy(m);
-    (void)state;
-}
-
 static void test_memory_bounds(void **state)
 {
     struct ggn_hyper full = ggn_hyper_default(GGN_PRESET_LULL);
     struct ggn_model *m = ggn_model_create(&full, NULL);
 
     assert_non_null(m);
-    assert_true(ggn_inference_bytes(m, GGN_PRECISION_F32, 1) <= 64000000);
-    assert_true(ggn_inference_bytes(m, GGN_PRECISION_BF16, 1) <= 64000000);
+    assert_true(ggn_inference_bytes(m, 1) <= 64000000);
     ggn_model_destroy(m);
     (void)state;
 }
@@ -217,7 +197,7 @@ static void test_exact(void **state)
     struct ggn_model *m = make();
     for (int net = 0; net < GGN_NETS; net++)
         learned[net] = m->weights[net]->params;
-    struct ggn_inference *j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(m, NULL, NULL);
     struct ggn_exact *e = ggn_exact_create(&m->hyper, m->graph, learned, NULL);
     assert_true(j && e);
     int differ = 0;
@@ -329,7 +309,7 @@ static void test_tiles(void **state)
 
     hyper.noise_map = 1;
     struct ggn_model *m = make();
-    struct ggn_inference *j = ggn_inference_create(m, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(m, NULL, NULL);
     assert_non_null(j);
     for (uint32_t k = 0; k < MOST; k++) {
         picture[k] = (uint8_t)(ggn_hash(k, 7) >> 29);
@@ -389,10 +369,14 @@ static void test_exact_without_numbers(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_no_memory), cmocka_unit_test(test_against_networks),
-                                       cmocka_unit_test(test_picture),   cmocka_unit_test(test_memory_bounds),
-                                       cmocka_unit_test(test_bf16),      cmocka_unit_test(test_exact),
-                                       cmocka_unit_test(test_srgb),      cmocka_unit_test(test_cleaning),
-                                       cmocka_unit_test(test_tiles),     cmocka_unit_test(test_exact_without_numbers)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_no_memory),
+                                       cmocka_unit_test(test_against_networks),
+                                       cmocka_unit_test(test_picture),
+                                       cmocka_unit_test(test_memory_bounds),
+                                       cmocka_unit_test(test_exact),
+                                       cmocka_unit_test(test_srgb),
+                                       cmocka_unit_test(test_cleaning),
+                                       cmocka_unit_test(test_tiles),
+                                       cmocka_unit_test(test_exact_without_numbers)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

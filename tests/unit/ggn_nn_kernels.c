@@ -134,127 +134,6 @@ static void test_large_convolutions(void **state)
     (void)state;
 }
 
-/* A convolution with bfloat16 products, and if `bn` a batch norm: [c_out][h][w], on one instruction set. Owned by the caller. */
-static float *bf16_forward(const struct ggn_naive_conv *c, const float *weight, const float *bias, const float *x,
-                           double slope, int bn, enum base_isa isa)
-{
-    static struct ggn_graph g;
-    const int area = c->h * c->w, row = c->w + 1;
-
-    ggn_graph_begin(&g, "conv", c->c_in, c->h, c->w);
-    ggn_graph_stage(&g, "a");
-    int last = ggn_graph_conv(&g, 0, -1, c->c_out, 3, c->transposed, slope);
-    if (bn)
-        last = ggn_graph_bn(&g, last);
-    assert_int_equal(ggn_graph_end(&g, NULL), 0);
-    const struct ggn_kernels *k = ggn_kernels_for(isa);
-    struct ggn_weights *w = ggn_weights_create(&g, k, GGN_WEIGHTS_BF16, NULL);
-    struct ggn_exec *e = ggn_exec_create(&g, k, 1, GGN_EXEC_BF16, NULL, NULL);
-    float *y = malloc((size_t)(c->c_out * area) * sizeof *y);
-    const size_t n_w = g.tensor[0].count;
-    assert_true(w && e && y);
-    memcpy(w->params, weight, n_w * sizeof *weight);
-    memcpy(w->params + n_w, bias, (size_t)c->c_out * sizeof *bias);
-    for (size_t i = n_w + (size_t)c->c_out; i < g.n_params; i++)
-        w->params[i] = (float)ggn_hash_unit((uint32_t)i, 7) + 0.5f;
-    ggn_weights_pack(w, NULL);
-    for (int i = 0; i < c->c_in * area; i++)
-        ggn_exec_plane(e, 0, 0, i / area)[i % area / c->w * row + i % area % c->w] = x[i];
-    ggn_exec_forward(e, w, 1, GGN_EVAL);
-    for (int i = 0; i < c->c_out * area; i++)
-        y[i] = ggn_exec_plane(e, last, 0, i / area)[i % area / c->w * row + i % area % c->w];
-    ggn_weights_destroy(w);
-    ggn_exec_destroy(e);
-    return y;
-}
-
-static float *floats(const double *from, int n)
-{
-    float *to = malloc((size_t)n * sizeof *to);
-    assert_non_null(to);
-    for (int i = 0; i < n; i++)
-        to[i] = (float)from[i];
-    return to;
-}
-
-static void round_to_bf16(double *v, int n)
-{
-    for (int i = 0; i < n; i++)
-        v[i] = (double)base_bf16_to_f32(base_f32_to_bf16((float)v[i]));
-}
-
-/* The oracle on weights and pixels that were rounded beforehand. */
-static void check_bf16(struct oracle *o, uint32_t seed)
-{
-    const int area = o->c.h * o->c.w, n_x = o->c.c_in * area, n_w = 9 * o->c.c_in * o->c.c_out;
-    float *weight = floats(o->weight, n_w), *bias = floats(o->bias, o->c.c_out), *x = floats(o->x, n_x);
-
-    round_to_bf16(o->weight, n_w);
-    round_to_bf16(o->x, n_x);
-    ggn_naive_forward(&o->c, o->x, o->weight, o->bias, o->slope, o->y);
-    for (int isa = 0; isa < BASE_ISA_COUNT; isa++) {
-        if (!base_isa_available((enum base_isa)isa))
-            continue;
-        float *y = bf16_forward(&o->c, weight, bias, x, o->slope, 0, (enum base_isa)isa);
-        for (int i = 0; i < o->c.c_out * area; i++)
-            near("bfloat16 forward", (enum base_isa)isa, seed, (double)y[i], o->y[i], o->c.c_in, F32_TOLERANCE);
-        free(y);
-    }
-    free(weight);
-    free(bias);
-    free(x);
-}
-
-static void test_bf16(void **state)
-{
-    for (uint32_t seed = 10; seed < 28; seed++) {
-        struct oracle o = make_oracle(seed);
-        if (o.c.kernel == 3)
-            check_bf16(&o, seed);
-        free_oracle(&o);
-    }
-    (void)state;
-}
-
-/* Numbers of every size, from below the smallest normal one up to 2^60. */
-static void fill_wild(float *v, int n, uint32_t seed)
-{
-    for (int i = 0; i < n; i++)
-        v[i] = (float)ldexp(ggn_hash_unit((uint32_t)i, seed) - 0.5, (int)(ggn_hash((uint32_t)i, seed + 1) % 200) - 140);
-}
-
-/* With and without the instruction, and whatever the kernels around it: the same bits, zeros for denormal numbers included. */
-static void test_bf16_bits(void **state)
-{
-    enum { AREA = 13 * 61 };
-    float weight[9 * 21 * 19], bias[19], x[21 * AREA];
-    int denormal = 0, large = 0;
-
-    for (uint32_t seed = 0; seed < 8; seed++) {
-        const struct ggn_naive_conv c = {.c_in = 21 - (int)seed, .c_out = 19 - (int)seed, .h = 13, .w = 61, .kernel = 3};
-        fill_wild(weight, 9 * c.c_in * c.c_out, 30 + seed);
-        fill_wild(bias, c.c_out, 40 + seed);
-        fill_wild(x, c.c_in * AREA, 50 + seed);
-        if (seed % 2) /* sums at the edge of what is zero */
-            for (int i = 0; i < c.c_in * AREA; i++)
-                x[i] = (float)ldexp((double)x[i] / 0x1p60, -100);
-        float *base = bf16_forward(&c, weight, bias, x, seed % 4 < 2 ? 0.25 : 1, seed % 3 == 0, BASE_ISA_BASE);
-        for (int isa = 1; isa < BASE_ISA_COUNT; isa++)
-            if (base_isa_available((enum base_isa)isa)) {
-                float *y = bf16_forward(&c, weight, bias, x, seed % 4 < 2 ? 0.25 : 1, seed % 3 == 0, (enum base_isa)isa);
-                assert_memory_equal(y, base, sizeof *y * (size_t)(c.c_out * AREA));
-                free(y);
-            }
-        for (int i = 0; i < c.c_out * AREA; i++)
-            large += fabsf(base[i]) > 1e9f;
-        for (int i = 0; i < c.c_in * AREA; i++)
-            denormal += fpclassify(x[i]) == FP_SUBNORMAL;
-        free(base);
-    }
-    assert_true(denormal > 100 && large > 100);
-    (void)state;
-}
-
 /* What lies beyond the right border in memory is the next row's left end: it must not touch the outputs there, not even by
  * its rounding. Same bytes with and without enormous values in the two leftmost columns. */
 static void test_row_ends(void **state)
@@ -461,8 +340,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_convolutions),
         cmocka_unit_test(test_large_convolutions),
-        cmocka_unit_test(test_bf16),
-        cmocka_unit_test(test_bf16_bits),
         cmocka_unit_test(test_row_ends),
         cmocka_unit_test(test_instruction_sets),
         cmocka_unit_test(test_threads_same_bytes),

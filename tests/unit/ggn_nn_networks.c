@@ -11,7 +11,6 @@
 
 #include "model/inference.h"
 #include "model/networks.h"
-#include "nn/bf16.h"
 #include "nn/exec.h"
 #include "nn/hash.h"
 #include "nn/winograd.h"
@@ -73,8 +72,7 @@ static void structure(void **state)
                         ggn_exec_bytes(&graph, 5, flags[k], 2) - sizeof(struct ggn_exec));
         }
     struct ggn_model *model = ggn_model_create(&odd, NULL);
-    fprintf(f, "a judge: %zu bytes, with two threads %zu\n", ggn_inference_bytes(model, GGN_PRECISION_F32, 1),
-            ggn_inference_bytes(model, GGN_PRECISION_F32, 2));
+    fprintf(f, "a judge: %zu bytes, with two threads %zu\n", ggn_inference_bytes(model, 1), ggn_inference_bytes(model, 2));
     ggn_model_destroy(model);
     unsetenv("LULL_ISA");
     fclose(f);
@@ -89,8 +87,8 @@ static void scratch(void **state)
         for (int k = 0; k < 6; k++) {
             const struct ggn_kernels *kernels = ggn_kernels_for((enum base_isa)isa);
             const int in = k < 3 ? 9 : 60, out = k % 3 == 0 ? 9 : 70, wide = k % 3 == 1;
-            static const int flags[] = {0, GGN_EXEC_GRADS, GGN_EXEC_BF16};
-            for (int m = 0; m < 3 && kernels; m++) {
+            static const int flags[] = {0, GGN_EXEC_GRADS};
+            for (int m = 0; m < 2 && kernels; m++) {
                 ggn_graph_begin(&graph, "scratch", in, 30, wide ? 900 : 30);
                 ggn_graph_stage(&graph, "a");
                 ggn_graph_conv(&graph, 0, -1, out, 3, 0, 1);
@@ -105,9 +103,6 @@ static void scratch(void **state)
                 }
                 if (kernels->wino_grad && grads && need < GGN_WINO_GRAD_SCRATCH)
                     need = GGN_WINO_GRAD_SCRATCH;
-                if (kernels->bf16 && flags[m] == GGN_EXEC_BF16 &&
-                    need < ggn_bf16_scratch(in, graph.value[1].row, 16L * kernels->tile_px))
-                    need = ggn_bf16_scratch(in, graph.value[1].row, 16L * kernels->tile_px);
                 assert_true(e && e->scratch_size >= need && e->scratch_size % 16 == 0);
                 /* one worker's does not reach into the other's, nor the last one's into the statistics */
                 assert_true(e->bn_mean - e->scratch == (ptrdiff_t)e->scratch_size);
@@ -221,7 +216,7 @@ static void packed(void **state)
     for (int back = 0; back < 2; back++) {
         struct ggn_weights *w = ggn_weights_create(&graph, NULL, back ? GGN_WEIGHTS_BACKWARD : 0, NULL);
         assert_non_null(w);
-        assert_true((w->pack_back != NULL) == back && w->bf16 == NULL && (size_t)w->params % 64 == 0);
+        assert_true((w->pack_back != NULL) == back && (size_t)w->params % 64 == 0);
         const float *const starts[] = {w->params + graph.n_params + 2 * graph.n_stats,
                                        w->scale,
                                        w->scale + graph.n_stats,
@@ -270,7 +265,6 @@ static void instruction_sets(void **state)
         assert_true(i <= (int)best || !base_isa_available((enum base_isa)i));
         setenv("LULL_ISA", names[i], 1);
         assert_int_equal(base_isa_best(), i < (int)best ? i : (int)best);
-        assert_true(i == BASE_ISA_AVX512 || strcmp(ggn_bf16_name(), "software") == 0);
         assert_ptr_equal(ggn_kernels_best(), ggn_kernels_for(base_isa_best()));
         if (base_isa_available((enum base_isa)i))
             assert_int_equal(ggn_kernels_for((enum base_isa)i)->isa, i);

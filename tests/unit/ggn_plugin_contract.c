@@ -78,7 +78,7 @@ static double other_logit(void *data)
     static uint16_t denoised[WINDOW][VALUES];
     const uint8_t *n[WINDOW];
     const uint16_t *d[WINDOW];
-    struct ggn_inference *j = ggn_inference_create(model, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(model, NULL, NULL);
     for (int i = 0; i < WINDOW; i++) {
         n[i] = o->codes[i];
         d[i] = denoised[i];
@@ -274,8 +274,8 @@ static void answers_of_a_baseline(void **state)
 /* What is saved: a header, then of each block its place, its head and the kept bytes; no other criterion's, model's or setting's. */
 static void states(void **state)
 {
-    static const char *const settings[][2] = {{"visible", "0.4"}, {"passes", "2"},    {"gate", "0"},         {"tail", "3"},
-                                              {"gini", "0.7"},    {"first-spp", "9"}, {"precision", "bf16"}, {NULL, NULL}};
+    static const char *const settings[][2] = {{"visible", "0.4"}, {"passes", "2"},    {"gate", "0"}, {"tail", "3"},
+                                              {"gini", "0.7"},    {"first-spp", "9"}, {NULL, NULL}};
     static const char foreign[] = "state: saved by another criterion, model, parameter set or frame";
     const struct lull_criterion *c = &ggn_plugin_ggn;
     const struct lull_frame frame = gp_host_frame(0xff, &gp_host_usual, 0);

@@ -70,7 +70,7 @@ static double expected(double h)
     static uint16_t denoised[WINDOW][3 * PIXELS];
     const uint8_t *const n[] = {noisy[0], noisy[1]};
     const uint16_t *const d[] = {denoised[0], denoised[1]};
-    struct ggn_inference *j = ggn_inference_create(model, GGN_PRECISION_F32, NULL, NULL);
+    struct ggn_inference *j = ggn_inference_create(model, NULL, NULL);
 
     assert_non_null(j);
     for (int k = 0; k < WINDOW; k++) {
