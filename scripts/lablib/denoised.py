@@ -32,7 +32,6 @@ def options(parser):
     parser.add_argument("--work", type=tool.path, default=os.path.join(tool.BUILD, "denoised"), metavar="DIR",
                         help="references, films, pictures; what is there is not made again (build/denoised)")
     parser.add_argument("--quality", choices=("fast", "balanced", "high"), default="high", help="of the denoiser in the looks (high)")
-    parser.add_argument("--windows", action="store_true", help="keep what a network would be shown, too (scripts/lab explained)")
     parser.add_argument("--judges", nargs="+", default=[], metavar="SCENE.pbrt", help="ask ColorVideoVDP and FLIP about these, too")
     tool.writes(parser)
 
@@ -60,7 +59,7 @@ def measure(o, scene):
     paths, mean = references(o, scene)
     folder = os.path.join(o.work, name_of(scene))
     told = tool.run(os.path.join(tool.BUILD, "bench", "pt_looks"), scene, SIZE, BLOCK, SEED, folder, ",".join(map(str, LEVELS)),
-                    *(["windows"] if o.windows else []), "quality=" + o.quality, "first-spp=%d" % LEVELS[0])
+                    "quality=" + o.quality, "first-spp=%d" % LEVELS[0])
     looks = [json.loads(line) for line in told.splitlines()]
     report = os.path.join(o.work, name_of(scene) + ".price.json")
     tool.run(tool.RENDER, scene, "--size", "%dx%d" % (SIZE, SIZE), "--block", BLOCK, "--spp", PRICE_SPP, "-q", "--report", report)

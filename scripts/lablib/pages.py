@@ -8,8 +8,8 @@ import os
 import re
 import sys
 
-from lablib import (agreement, ablation, bench, cost_page, denoised, explained, folds, peers, profile, published, quote_accuracy, references,
-                    sampler, scale, shots, tool, truth)
+from lablib import (agreement, ablation, bench, cost_page, denoised, peers, profile, published, quote_accuracy, references, scale,
+                    shots, tool, truth)
 
 TEMPLATES = os.path.join(tool.ROOT, "scripts", "lablib", "templates")
 OTHERS = ("ggn/README.md", "ggn/models/README.md", "ggn/observer/README.md")  # pages outside docs/ that show figures
@@ -42,8 +42,8 @@ def made(docs):
                              undefined=jinja2.StrictUndefined)
     jobs = {name: Job(module, tool.results(docs, name)) for name, module in (
         ("agreement", agreement), ("ablation", ablation), ("bench", bench), ("cost", cost_page), ("quote", quote_accuracy),
-        ("references", references), ("sampler", sampler), ("profile", profile), ("scale", scale), ("denoised", denoised),
-        ("peers", peers), ("shots", shots), ("explained", explained), ("folds", folds), ("published", published), ("truth", truth))}
+        ("references", references), ("profile", profile), ("scale", scale), ("denoised", denoised),
+        ("peers", peers), ("shots", shots), ("published", published), ("truth", truth))}
 
     def of_figures(name, make):
         try:

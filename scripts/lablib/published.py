@@ -8,9 +8,10 @@ model. Levels beyond the recorded ones are simulated, by the noise that made the
 import csv
 import json
 import os
+import shutil
 import subprocess
 
-from lablib import ablation, folds, plots, tables, tool
+from lablib import ablation, plots, recordings, tables, tool
 from lablib.tool import GGN, Refused, ggn
 
 SHIPPED = os.path.join(tool.ROOT, "ggn", "models", "lull-3.ggn")
@@ -59,10 +60,17 @@ def run_of(name, words, model):
             "window_s": 3600 * hours / seen, "best_step": card["training"]["best_step"]}
 
 
+def views_of(data, scenes, target):
+    """A data set of the views of these scenes alone, as links with their labels."""
+    names = [v for v in os.listdir(data) if os.path.exists(os.path.join(data, v, "labels.json")) and recordings.manifest_of(os.path.join(data, v))["scene"] in scenes]
+    for view in recordings.link_views(data, os.path.join(target, "test"), names):
+        shutil.copy(os.path.join(data, os.path.basename(view), "labels.json"), view)
+
+
 def judge(o, scenes, models):
     """What ggn evaluate says of them and of what is trivial, on the blocks of these scenes."""
     folder, alone = os.path.join(o.data, "validation"), os.path.join(o.out, "judged")
-    folds.left_out(folder if os.path.isdir(folder) else o.data, scenes, alone)
+    views_of(folder if os.path.isdir(folder) else o.data, scenes, alone)
     told = json.loads(ggn("evaluate", "-d", alone, "--no-quality", "--json", "-t", 1, *[w for m in models for w in ("-m", m)]))
     keys = ("blocks", "windows", "auc", "early_stop_rate", "samples_ratio", "median_abs_log2")
     return {name: {k: r.get(k) for k in keys} for name, r in told["splits"]["test"].items()

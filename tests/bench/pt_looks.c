@@ -1,14 +1,12 @@
 /*
  * What the criterion `denoised` believes at rising numbers of samples, and the pictures that it believes it of.
  *
- *   build/bench/pt_looks SCENE.pbrt SIZE BLOCK SEED FOLDER SPP,SPP,... [windows] [KEY=VALUE...]
+ *   build/bench/pt_looks SCENE.pbrt SIZE BLOCK SEED FOLDER SPP,SPP,... [KEY=VALUE...]
  *
  * The scene is rendered once, SIZE x SIZE pixels without stopping any of its blocks of BLOCK pixels; FOLDER keeps the film of
  * each number of samples (SPP.film), from which the next run goes on without rendering. Each is shown to the criterion, with
  * these parameters, if any are given: one line of JSON a block. The pictures are written beside the films: SPP-noisy.png,
- * SPP-denoised.png, SPP-blend.png. `windows` keeps besides what a network would be shown, SPP.windows: native floats
- * [SIZE][SIZE][3] of half A, half B, both denoised, the denoised picture that is kept and the blend, then [SIZE][SIZE], the
- * share of the noisy picture in the blend. All times are processor seconds, those of the denoiser's process among them.
+ * SPP-denoised.png, SPP-blend.png. All times are processor seconds, those of the denoiser's process among them.
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,7 +25,7 @@ enum { LEVELS_MAX = 32, BLOCKS_MAX = 1024, PAIRS_MAX = 8 };
 
 static struct {
     const char *scene, *folder;
-    int size, block, seed, levels, windows;
+    int size, block, seed, levels;
     uint64_t spp[LEVELS_MAX];
     struct lull_pair pairs[PAIRS_MAX];
     uint32_t pair_count;
@@ -105,67 +103,18 @@ static void name_picture(char path[1024], uint64_t spp, const char *kind)
     snprintf(path, 1024, "%s/%llu-%s.png", o.folder, (unsigned long long)spp, kind);
 }
 
-/* Half A or B of the samples into noisy [pixels][3], that half denoised into *clean; no sample of the film was dropped. */
-static void denoise_half(const struct pt_render *r, uint64_t spp, int which, float *noisy, struct pt_denoised *clean)
-{
-    const double n = (double)spp, in_a = (double)pt_film_half_spp(spp), in_half = which ? n - in_a : in_a;
-    const size_t count = 3 * r->film.pixels;
-    struct pt_render half = *r;
-    struct base_err err = {0};
-    half.film.color = malloc(count * sizeof(double));
-    for (size_t i = 0; half.film.color && i < count; i++) {
-        const double sum = which ? r->film.color[i] - r->film.half[i] : r->film.half[i];
-        half.film.color[i] = n / in_half * sum;
-        noisy[i] = (float)(sum / in_half);
-    }
-    if (!half.film.color)
-        base_fail_nomem(&err, "half of a film");
-    if (!half.film.color || pt_denoised_make(&half, PT_PICTURE_DENOISED, NULL, NULL, clean, &err))
-        die(&err);
-    free(half.film.color);
-}
-
-static void write_windows(const char *path, const struct pt_render *r, uint64_t spp, const struct pt_denoised *kept)
-{
-    const size_t n = r->film.pixels;
-    struct base_err err = {0};
-    struct pt_denoised clean[2];
-    float *noisy = malloc(6 * n * sizeof *noisy);
-    FILE *file = noisy ? fopen(path, "wb") : NULL;
-    if (!file) {
-        base_fail(&err, BASE_EIO, "%s: cannot be written", path);
-        die(&err);
-    }
-    for (int k = 0; k < 2; k++)
-        denoise_half(r, spp, k, noisy + 3 * n * (size_t)k, &clean[k]);
-    size_t out = fwrite(noisy, sizeof *noisy, 6 * n, file);
-    out += fwrite(clean[0].rgb, sizeof(float), 3 * n, file) + fwrite(clean[1].rgb, sizeof(float), 3 * n, file);
-    out += fwrite(kept->denoised, sizeof(float), 3 * n, file) + fwrite(kept->rgb, sizeof(float), 3 * n, file);
-    out += fwrite(kept->weight, sizeof(float), n, file);
-    if (fclose(file) || out != 19 * n) {
-        base_fail(&err, BASE_EIO, "%s: not whole", path);
-        die(&err);
-    }
-    pt_denoised_release(&clean[0]);
-    pt_denoised_release(&clean[1]);
-    free(noisy);
-}
-
-/* Three pictures of one number of samples, sRGB; the last is there when all are, and what a network would be shown. */
+/* Three pictures of one number of samples, sRGB; the last is there when all are. */
 static void write_pictures(const struct pt_render *r, uint64_t spp)
 {
     static const char *const kinds[] = {"noisy", "denoised", "blend"};
-    char path[1024], windows[1024];
+    char path[1024];
     struct pt_denoised d;
     struct base_err err = {0};
-    snprintf(windows, sizeof windows, "%s/%llu.windows", o.folder, (unsigned long long)spp);
     name_picture(path, spp, kinds[2]);
-    if (access(path, F_OK) == 0 && (!o.windows || access(windows, F_OK) == 0))
+    if (access(path, F_OK) == 0)
         return;
     if (pt_denoised_make(r, PT_PICTURE_BLEND, NULL, NULL, &d, &err))
         die(&err);
-    if (o.windows)
-        write_windows(windows, r, spp, &d);
     for (int k = 0; k < 3; k++) {
         struct pt_denoised shown = d;
         const struct pt_output_info info = {.denoised = &shown};
@@ -223,15 +172,14 @@ static void run(const struct pt_render_config *config, struct pt_scene *scene, s
 static void read_words(int argc, char **argv)
 {
     if (argc < 7) {
-        fprintf(stderr, "usage: pt_looks SCENE.pbrt SIZE BLOCK SEED FOLDER SPP,SPP,... [windows] [KEY=VALUE...]\n");
+        fprintf(stderr, "usage: pt_looks SCENE.pbrt SIZE BLOCK SEED FOLDER SPP,SPP,... [KEY=VALUE...]\n");
         exit(2);
     }
     o.scene = argv[1], o.folder = argv[5];
     o.size = atoi(argv[2]), o.block = atoi(argv[3]), o.seed = atoi(argv[4]);
     for (char *at = strtok(argv[6], ","); at && o.levels < LEVELS_MAX; at = strtok(NULL, ","))
         o.spp[o.levels++] = strtoull(at, NULL, 10);
-    o.windows = argc > 7 && !strcmp(argv[7], "windows");
-    for (int i = 7 + o.windows; i < argc && o.pair_count < PAIRS_MAX; i++, o.pair_count++) {
+    for (int i = 7; i < argc && o.pair_count < PAIRS_MAX; i++, o.pair_count++) {
         o.pairs[o.pair_count].key = strtok(argv[i], "=");
         o.pairs[o.pair_count].value = strtok(NULL, "");
     }
