@@ -36,7 +36,6 @@ int ggn_baseline_init(struct ggn_baseline *b, enum ggn_baseline_kind kind, int w
                   : kind == GGN_ATTRIBUTES_SVM ? GGN_ATTRIBUTES
                                                : GGN_MASK_FEATURES;
     b->window = kind == GGN_SVD_ENTROPY ? window : 1;
-    b->policy.passes = 1;
     return 0;
 }
 

@@ -217,7 +217,7 @@ static int judge_block(void *data, int index, int worker, struct base_err *err)
     int rc = !one.reader ? err->code : !seen ? base_fail_nomem(err, j->method->name) : 0;
     (void)worker;
     if (!rc)
-        ggn_replay(&j->set->images, c, &rule, window_logit, &one, NULL, seen);
+        ggn_replay(c, &rule, window_logit, &one, NULL, seen);
     for (size_t i = b->first; i < b->end && !rc; i++)
         j->method->score[i] = seen[i - b->first + (size_t)j->set->window - 1].p;
     free(seen);

@@ -46,8 +46,7 @@ static const struct base_option list[] = {
     {"precision", 0, NULL, TO(precision), .words = precisions, .help = "of the networks' arithmetic (f32)"},
     {"scores", 0, NULL, TO(scores), .help = "of the networks' own settings only: p of every window, and the stops"},
     {"recorded", 0, NULL, TO(recorded), .help = "recorded levels only; blocks that show noise in the last one are left out"},
-    {"no-pictures", 0, NULL, TO(no_noise_maps),
-     .help = "networks as in a host without half buffers: no noise pictures, no tail guard"},
+    {"no-pictures", 0, NULL, TO(no_noise_maps), .help = "networks as in a host without half buffers"},
     {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP"},
     {"sizes", 0, NULL, TO(sizes), .help = "also thresholds of the blocks' parts, as of smaller blocks"},
     {"threads", 't', "N", TO(threads), 1, 1024, .help = "worker threads (all processors)"},
@@ -58,8 +57,7 @@ struct job {
     struct ggn_eval_set set;
     cJSON *learned[MAX_FILES]; /* own; the data that each model was made with */
     enum ggn_split split;
-    struct ggn_checks_made *checks; /* [blocks] */
-    double *stop;                   /* [blocks] */
+    double *checks, *stop; /* [blocks] */
     cJSON *points;
     int failed;
 };
@@ -73,8 +71,7 @@ static void put_cost(cJSON *to, const struct ggn_cost *c, int *failed)
         double value;
     } fields[] = {{"samples", c->samples},
                   {"sampling_s", c->sampling_s},
-                  {"checks_cheap", c->cheap},
-                  {"checks_full", c->full},
+                  {"checks_full", c->checks},
                   {"noisy", c->noisy},
                   {"early", c->early},
                   {"worst", c->worst},
@@ -91,7 +88,7 @@ static void put_cost(cJSON *to, const struct ggn_cost *c, int *failed)
 
 /* One setting of one criterion: a point for each scene and one for all together (scene null). */
 static void put_setting(struct job *j, const char *criterion, const char *parameter, double value, const double *stop,
-                        const struct ggn_checks_made *checks)
+                        const double *checks)
 {
     const struct ggn_dataset *d = &j->set.images.data;
     cJSON *o = base_json_object(j->points, NULL, &j->failed);
@@ -276,7 +273,7 @@ static void cost_uniform(struct job *j)
     for (double spp = 16; spp <= 16384; spp *= 2) {
         for (int b = 0; b < j->set.n_blocks; b++) {
             j->stop[b] = spp;
-            j->checks[b] = (struct ggn_checks_made){.full = 1};
+            j->checks[b] = 1;
         }
         put_setting(j, "uniform", "spp", spp, j->stop, NULL);
         put_setting(j, "fixed", "spp", spp, j->stop, j->checks);
@@ -350,24 +347,13 @@ static void turn_passes(struct job *j, struct ggn_method *m)
 
 static void cost_network(struct job *j, struct ggn_method *m)
 {
-    double *gated = m->verdict;
     put_method(j, "own", m->cut, m);
     if (j->o->cadence > 0 || j->o->scores)
         return;
     vary(j, m, "visible", shares, COUNT(shares));
-    turn_passes(j, m);
-    m->verdict = NULL; /* scores of every window, as without the gate */
-    ggn_method_run(m, &j->set);
-    put_method(j, "gate", 0, m);
-    m->verdict = gated;
-    const double *guard = m->guard;
-    m->guard = NULL;
-    ggn_method_run(m, &j->set);
-    put_method(j, "guard", 0, m);
-    m->guard = guard;
 }
 
-/* Where the law knows the noise between levels a residual model stops there, too; it has no gate and no guard. */
+/* Where the law knows the noise between levels a residual model stops there, too. */
 static int cost_residual(struct job *j, struct ggn_method *m, const struct ggn_policy *policy, struct base_err *err)
 {
     int rc = 0;
@@ -409,8 +395,6 @@ static int cost_models(struct job *j, struct base_threads *threads, struct base_
             rc = ggn_policy_of(model, &policy, err);
         if (j->o->cadence > 0)
             policy.ratio = j->o->cadence, policy.n_levels = 0;
-        if (j->o->no_noise_maps)
-            ggn_policy_without_halves(&policy);
         if (!rc)
             rc = ggn_eval_trained(&m, &j->set, model, &policy, name, (enum ggn_precision)j->o->precision, j->o->observer,
                                   threads, err);

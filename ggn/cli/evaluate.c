@@ -47,8 +47,7 @@ static int add_adjusted(void *into, const char *arg, struct base_err *err)
     snprintf(o->adjusted[i].name, sizeof o->adjusted[i].name, "%.*s", (int)(equals - arg), arg);
     if (!base_parse_real(equals + 1, -1e300, 1e300, &o->adjusted[i].value) ||
         !ggn_policy_adjust(&any, o->adjusted[i].name, o->adjusted[i].value) || ggn_policy_check(&any, NULL))
-        return base_fail(err, BASE_EINVAL,
-                         "expected visible, passes, gate, tail, gini or first-spp and a number in its range");
+        return base_fail(err, BASE_EINVAL, "expected visible, passes or first-spp and a number in its range");
     return 0;
 }
 
@@ -74,7 +73,7 @@ static const struct base_option list[] = {
     {"thresholds", 0, "CSV", BASE_TO_LIST(struct options, thresholds, n_thresholds, "files of thresholds"),
      .input = BASE_FILE, .help = "a published model's thresholds of people's views; may be repeated"},
     {"param", 'p', "KEY=NUMBER", .set = add_adjusted,
-     .help = "judge as the criterion does with this parameter: visible, passes, gate, tail, gini, first-spp"},
+     .help = "judge as the criterion does with this parameter: visible, passes, first-spp"},
     {.help = "What comes out:"},
     {"json", 'j', NULL, TO(json), .help = "print the figures as JSON"},
     {"output", 'o', "DIR", TO(out), .output = BASE_FOLDER, .files = written,
@@ -85,7 +84,7 @@ static const struct base_option list[] = {
      .help = "tune the models' thresholds too, on the validation scenes, instead of taking the stored ones"},
     {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP and SSIM at the stop"},
     {"no-pictures", 0, NULL, TO(no_noise_maps),
-     .help = "judge as in a host without half buffers: models get no noise pictures and no tail guard"},
+     .help = "judge as in a host without half buffers: models get no noise pictures"},
     {"baselines", 0, NULL, TO(baselines),
      .help = "train the published baselines on the training scenes and measure them too (minutes)"},
     {"epochs", 0, "N", TO(epochs), 1, 1024, .help = "epochs of the LSTM baseline (15)"},
@@ -147,8 +146,6 @@ static void adjust(const struct options *o, struct ggn_policy *policy)
         policy->threshold = o->visible;
     for (int i = 0; i < o->n_adjusted; i++)
         ggn_policy_adjust(policy, o->adjusted[i].name, o->adjusted[i].value);
-    if (o->no_noise_maps)
-        ggn_policy_without_halves(policy);
 }
 
 static int add_baseline_file(struct evaluation *j, const char *path, struct base_threads *threads, struct base_err *err)
@@ -394,7 +391,7 @@ static int warn_of_setting(const struct evaluation *j, int index, struct base_er
     for (int b = 0; b < j->set.n_blocks && !j->o->no_noise_maps && !rc; b++)
         halves &= !isnan(j->set.visible[j->set.blocks[b].end - 1]);
     const struct ggn_setting learned = {model->hyper.width, model->hyper.height, GGN_TRANSFER_SRGB,
-                                        !j->o->no_noise_maps && (model->hyper.noise_map || policy.tail999 > 0)};
+                                        !j->o->no_noise_maps && model->hyper.noise_map};
     const struct ggn_setting here = {s->width, s->height, GGN_TRANSFER_SRGB, halves};
     if (!rc && ggn_setting_difference(&learned, &here, text, sizeof text))
         fprintf(stderr, "ggn evaluate: %s: the model is asked about what it has not learned: %s\n", path, text);

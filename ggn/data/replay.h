@@ -9,20 +9,18 @@
 #include "model/stopper.h"
 
 struct ggn_seen {
-    /* NaN: no check fell on this level, or one too early for the network; INFINITY: the gate spared the network */
+    /* NaN: no check fell on this level, or one too early for the network */
     double p;
-    /* by the tail guard, should it pass; from the last recorded level (scaled) where the statistics are missing */
-    int is_held;
     double correction; /* of a residual model, octaves of noise */
 };
 
 /* Fills seen [c->n_levels], as if nothing stopped the block: where it stops depends on the threshold, what is seen does not.
  * logit: of the window of these levels (indices, noisiest first). law: [c->n_levels], what the rule's evidence says of each;
  * without `reach` NULL. */
-void ggn_replay(const struct ggn_series_set *set, const struct ggn_level_series *c, const struct ggn_stop_rule *rule,
+void ggn_replay(const struct ggn_level_series *c, const struct ggn_stop_rule *rule,
                 double (*logit)(void *data, const int *levels), void *data, const double *law, struct ggn_seen *seen);
 
-/* The level at which these checks stop the block, -1 if none does. */
-int ggn_replay_stop(const struct ggn_seen *seen, int n_levels, const struct ggn_policy *policy, double threshold);
+/* The level at which so many of these checks in a row below the threshold stop the block, -1 if none do. */
+int ggn_replay_stop(const struct ggn_seen *seen, int n_levels, int passes, double threshold);
 
 #endif

@@ -22,8 +22,6 @@ void ggn_series_set_release(struct ggn_series_set *set)
             free(c->reference);
         free(c->noise_map);
         free(c->has_noise_map);
-        free(c->tail999);
-        free(c->gini);
         free(c->measure);
     }
     free(set->series);
@@ -65,16 +63,13 @@ struct ggn_level_series *ggn_series_set_append(struct ggn_series_set *set, struc
 int ggn_series_grow(const struct ggn_series_set *set, struct ggn_level_series *c, int levels, struct base_err *err)
 {
     const size_t n = (size_t)levels, values = ggn_series_set_values(set);
-    double **const numbers[] = {&c->spp, &c->tail999, &c->gini};
     uint8_t **const images[] = {&c->noisy, &c->has_noise_map, &c->noise_map};
     const size_t bytes[] = {values, 1, values / 3};
 
-    for (size_t i = 0; i < 3; i++) {
-        double *grown = realloc(*numbers[i], n * sizeof *grown);
-        if (!grown)
-            return base_fail_nomem(err, "images of the data set");
-        *numbers[i] = grown;
-    }
+    double *spp = realloc(c->spp, n * sizeof *spp);
+    if (!spp)
+        return base_fail_nomem(err, "images of the data set");
+    c->spp = spp;
     struct ggn_measure *measure = set->meter.memory ? realloc(c->measure, n * sizeof *measure) : NULL;
     if (set->meter.memory && !measure)
         return base_fail_nomem(err, "images of the data set");
@@ -163,8 +158,6 @@ static int fill_levels(const struct ggn_series_set *set, struct ggn_level_series
             continue;
         wanted = 0.999 * ratio * r->spp; /* recorded levels are rounded to whole samples */
         c->spp[c->n_levels] = r->spp;
-        c->tail999[c->n_levels] = seq_stat(r, "tail999");
-        c->gini[c->n_levels] = seq_stat(r, "gini");
         rc = seq_display_planar(b, r, c->noisy + (size_t)c->n_levels * ggn_series_set_values(set), err);
         if (!rc)
             rc = recorded_noise_map(set, c, c->n_levels, b, r, h, err);

@@ -28,7 +28,6 @@ struct ggn_level_series {
     /* with set->noise_maps: the noise maps (model/window.h; with set->meter of the visible noise, model/measure.h),
      * [n_levels][H][W], and whether a level has one */
     uint8_t *noise_map, *has_noise_map;
-    double *tail999, *gini;      /* [n_levels], NaN where not recorded */
     struct ggn_measure *measure; /* [n_levels], with set->meter; visible is NaN where there are no halves */
     int has_label;
     struct ggn_label label;

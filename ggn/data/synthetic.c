@@ -98,19 +98,13 @@ static void fill_levels(const struct ggn_series_set *set, struct ggn_level_serie
     }
 }
 
-static void no_statistics(struct ggn_level_series *c, int from)
-{
-    for (int k = from; k < c->n_levels; k++)
-        c->tail999[k] = c->gini[k] = (double)NAN;
-}
-
 /* An empty series of the same block. */
 static void begin_copy(struct ggn_level_series *c, const struct ggn_level_series *recorded)
 {
     *c = *recorded;
     c->synthetic = 1;
     c->n_levels = 0;
-    c->spp = c->tail999 = c->gini = NULL;
+    c->spp = NULL;
     c->noisy = c->noise_map = c->has_noise_map = NULL;
     c->denoised = NULL;
     c->measure = NULL;
@@ -129,7 +123,6 @@ static int make_series(struct ggn_series_set *set, const struct ggn_level_series
     int rc = noise ? ggn_series_grow(set, c, n ? n : 1, err) : base_fail_nomem(err, "synthetic images");
     if (!rc) {
         memcpy(c->spp, spp, (size_t)n * sizeof *spp);
-        no_statistics(c, 0);
         fill_levels(set, c, s, noise, seed);
     }
     free(noise);
@@ -224,10 +217,8 @@ static int extend_series(const struct ggn_series_set *set, struct ggn_level_seri
         fill_level(set, c, first + k, s, noise, m, n0);
     }
     free(noise);
-    if (!rc) {
+    if (!rc)
         c->n_levels += n;
-        no_statistics(c, first);
-    }
     return rc;
 }
 
@@ -246,7 +237,6 @@ static int simulate_series(const struct ggn_series_set *set, struct ggn_level_se
         c->n_levels = n;
         c->simulated = 1;
         memcpy(c->spp, spp, (size_t)n * sizeof *spp);
-        no_statistics(c, 0);
         fill_levels(set, c, s, noise, seed);
     }
     free(noise);

@@ -2,18 +2,13 @@
 
 #include <math.h>
 
-void ggn_cost_checks(const struct ggn_method *m, const struct ggn_eval_set *s, struct ggn_checks_made *out)
+void ggn_cost_checks(const struct ggn_method *m, const struct ggn_eval_set *s, double *out)
 {
     for (int b = 0; b < s->n_blocks; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
-        out[b] = (struct ggn_checks_made){.full = m->asked ? m->asked[b] : 0.0};
-        if (m->asked)
-            continue;
-        for (size_t i = block->first; i < block->end && s->spp[i] <= m->stop[b]; i++) {
-            double v = ggn_method_verdict(m, i);
-            out[b].full += isfinite(v);
-            out[b].cheap += isinf(v);
-        }
+        out[b] = m->asked ? m->asked[b] : 0.0;
+        for (size_t i = block->first; !m->asked && i < block->end && s->spp[i] <= m->stop[b]; i++)
+            out[b] += !isnan(ggn_method_verdict(m, i));
     }
 }
 
@@ -36,8 +31,8 @@ static double at_stop(const struct ggn_eval_set *s, const struct ggn_eval_block 
     return column[i] * pow(s->spp[i] / stop, power);
 }
 
-void ggn_cost_of(const struct ggn_eval_set *s, enum ggn_split split, int scene, const double *stop,
-                 const struct ggn_checks_made *checks, struct ggn_cost *out)
+void ggn_cost_of(const struct ggn_eval_set *s, enum ggn_split split, int scene, const double *stop, const double *checks,
+                 struct ggn_cost *out)
 {
     struct ggn_cost c = {0};
     double worst = 0.0, most = 0.0, uniform_s = 0.0;
@@ -51,8 +46,7 @@ void ggn_cost_of(const struct ggn_eval_set *s, enum ggn_split split, int scene, 
         c.samples += stop[b];
         c.sampling_s += stop[b] * rate;
         uniform_s += rate;
-        c.cheap += checks ? checks[b].cheap : 0.0;
-        c.full += checks ? checks[b].full : 0.0;
+        c.checks += checks ? checks[b] : 0.0;
         c.noisy += stop[b] < t;
         c.early += stop[b] < 0.8 * t;
         worst = fmax(worst, t / stop[b]);
@@ -66,7 +60,7 @@ void ggn_cost_of(const struct ggn_eval_set *s, enum ggn_split split, int scene, 
     c.uniform_spp = most / worst;
     c.time_ratio = c.sampling_s / (uniform_s * c.uniform_spp);
     c.samples_ratio = c.samples / (n * c.uniform_spp);
-    double *const means[] = {&c.samples, &c.sampling_s, &c.cheap, &c.full, &c.noisy, &c.early, &c.flip, &c.relmse};
+    double *const means[] = {&c.samples, &c.sampling_s, &c.checks, &c.noisy, &c.early, &c.flip, &c.relmse};
     for (size_t i = 0; i < sizeof means / sizeof means[0]; i++)
         *means[i] /= n;
     *out = c;

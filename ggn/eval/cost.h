@@ -11,21 +11,16 @@
 
 #include "eval/method.h"
 
-/* Checks that a method makes on a block until it stops. */
-struct ggn_checks_made {
-    double cheap; /* answered without the network: by the gate, or too early for a window */
-    double full;
-};
-
-/* Of a method that has scores: what ggn_method_run goes through. out: [blocks]. */
-void ggn_cost_checks(const struct ggn_method *m, const struct ggn_eval_set *s, struct ggn_checks_made *out);
+/* The checks that a method makes on each block until it stops: of one that has scores, what ggn_method_run goes through.
+ * out: [blocks]. */
+void ggn_cost_checks(const struct ggn_method *m, const struct ggn_eval_set *s, double *out);
 
 /* One setting on one scene; sums over its blocks where not said otherwise. */
 struct ggn_cost {
     int blocks;
     double samples;                   /* per pixel, mean over the blocks */
     double sampling_s;                /* thread seconds of sampling, mean over the blocks */
-    double cheap, full;               /* checks, mean over the blocks */
+    double checks;                    /* mean over the blocks */
     double noisy;                     /* share of blocks that stop below T */
     double early;                     /* share that stops below 0.8 T */
     double worst;                     /* visible difference of the worst block, 1: just visible */
@@ -34,8 +29,8 @@ struct ggn_cost {
     double flip, flip_worst, relmse;  /* NaN: not known */
 };
 /* stop: [blocks of the set]; checks: [blocks] or NULL. scene: ggn_eval_block.scene; -1: all. NaN costs without blocks. */
-void ggn_cost_of(const struct ggn_eval_set *s, enum ggn_split split, int scene, const double *stop,
-                 const struct ggn_checks_made *checks, struct ggn_cost *out);
+void ggn_cost_of(const struct ggn_eval_set *s, enum ggn_split split, int scene, const double *stop, const double *checks,
+                 struct ggn_cost *out);
 
 /* Thread seconds per sample and pixel of a block, from its last recorded level; NaN if not known. */
 double ggn_cost_path_s(const struct ggn_eval_set *s, const struct ggn_eval_block *b);

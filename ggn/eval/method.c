@@ -10,9 +10,7 @@
 void ggn_method_release(struct ggn_method *m)
 {
     free(m->score);
-    free(m->verdict);
     free(m->correction);
-    free(m->own_guard);
     free(m->stop);
     free(m->asked);
     *m = (struct ggn_method){0};
@@ -124,10 +122,7 @@ int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const 
     return rc;
 }
 
-double ggn_method_verdict(const struct ggn_method *m, size_t i)
-{
-    return m->verdict ? m->verdict[i] : m->score ? m->score[i] : (double)NAN;
-}
+double ggn_method_verdict(const struct ggn_method *m, size_t i) { return m->score ? m->score[i] : (double)NAN; }
 
 static int is_held(const struct ggn_method *m, size_t i, double limit) { return m->guard && m->guard[i] > limit; }
 
@@ -141,8 +136,7 @@ static double stop_of(const struct ggn_method *m, const struct ggn_eval_set *s, 
 {
     struct ggn_stopper row = {0};
     for (size_t i = b->first; i < b->end; i++)
-        if (!isnan(ggn_method_verdict(m, i)) && ggn_stopper_pass(&row, m->passes, ggn_method_verdict(m, i) < cut) &&
-            !is_held(m, i, limit))
+        if (!isnan(m->score[i]) && ggn_stopper_pass(&row, m->passes, m->score[i] < cut) && !is_held(m, i, limit))
             return s->spp[i];
     return b->cap;
 }

@@ -17,11 +17,8 @@ enum { GGN_METHOD_NAME = 48 };
 struct ggn_method {
     char name[GGN_METHOD_NAME];
     double *score;       /* owns; [cases]; NaN: not judged there. NULL: fixed stops only */
-    double *verdict;     /* owns; [cases]: the scores that stop a block, where those are not all (see data/replay.h); NULL:
-                            score */
     double *correction;  /* owns; [cases]: octaves of noise that a residual model adds to the law's; NULL: no such model */
-    double *own_guard;   /* owns; NULL unless guard is it */
-    const double *guard; /* own_guard or borrowed from the set; [cases]; the block is held back while it exceeds guard_limit;
+    const double *guard; /* borrowed from the set; [cases]; the block is held back while it exceeds guard_limit;
                             NULL: none */
     double guard_limit;
     int passes;    /* cases in a row below the cut that stop a block, >= 1 */
@@ -69,7 +66,7 @@ int ggn_method_init(struct ggn_method *m, const struct ggn_eval_set *s, const ch
 int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score,
                       struct base_err *err);
 
-/* Sets stop from verdict, guard, passes and cut, as the stopping rule ends (ggn_stopper_pass). */
+/* Sets stop from score, guard, passes and cut, as the stopping rule ends (ggn_stopper_pass). */
 void ggn_method_run(struct ggn_method *m, const struct ggn_eval_set *s);
 /* Chooses the cut on the blocks of `split`: the one that spends fewest samples with at most `early_rate` of the blocks
  * stopped below 0.8 of their threshold; if none does, the smallest early rate. The limit of a guard is chosen with it. Then

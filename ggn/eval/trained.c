@@ -42,11 +42,10 @@ static int judge_by_law(const struct run *r, int index, struct ggn_viewer *viewe
     if (!rc) {
         list_law(r, b, &o, law);
         viewer->law = law;
-        ggn_replay(&r->set->images, c, &r->rule, ggn_viewer_logit, viewer, law, seen);
+        ggn_replay(c, &r->rule, ggn_viewer_logit, viewer, law, seen);
         for (int i = skipped; i < c->n_levels; i++) {
             size_t k = b->first + (size_t)(i - skipped);
-            r->method->score[k] = r->method->verdict[k] = seen[i].p;
-            r->method->own_guard[k] = 0;
+            r->method->score[k] = seen[i].p;
             r->method->correction[k] = i > skipped && isnan(seen[i].p) ? r->method->correction[k - 1] : seen[i].correction;
         }
     }
@@ -76,7 +75,6 @@ static int judge_block(void *data, int index, int worker, struct base_err *err)
     const struct ggn_eval_block *b = &r->set->blocks[index];
     const struct ggn_level_series *c = &r->set->images.series[b->series];
     const int skipped = r->set->window - 1;
-    struct ggn_stop_rule open = r->rule;
     struct ggn_seen *seen = malloc((size_t)c->n_levels * sizeof *seen);
 
     if (!seen)
@@ -87,15 +85,9 @@ static int judge_block(void *data, int index, int worker, struct base_err *err)
         free(seen);
         return rc;
     }
-    open.policy.gate_noise = 0;
-    ggn_replay(&r->set->images, c, &open, ggn_viewer_logit, &r->viewers[worker], NULL, seen);
+    ggn_replay(c, &r->rule, ggn_viewer_logit, &r->viewers[worker], NULL, seen);
     for (int i = skipped; i < c->n_levels; i++)
         r->method->score[b->first + (size_t)(i - skipped)] = seen[i].p;
-    ggn_replay(&r->set->images, c, &r->rule, ggn_viewer_logit, &r->viewers[worker], NULL, seen);
-    for (int i = skipped; i < c->n_levels; i++) {
-        r->method->verdict[b->first + (size_t)(i - skipped)] = seen[i].p;
-        r->method->own_guard[b->first + (size_t)(i - skipped)] = seen[i].is_held;
-    }
     free(seen);
     return 0;
 }
@@ -117,14 +109,11 @@ static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const
 
     if (rc)
         return rc;
-    m->verdict = malloc(s->n * sizeof *m->verdict);
-    m->own_guard = malloc(s->n * sizeof *m->own_guard);
     m->correction = rule->reach > 0 ? calloc(s->n, sizeof *m->correction) : NULL;
-    if (!m->verdict || !m->own_guard || (rule->reach > 0 && !m->correction)) {
+    if (rule->reach > 0 && !m->correction) {
         ggn_method_release(m);
         return base_fail_nomem(err, name);
     }
-    m->guard = m->own_guard;
     m->cut = rule->policy.threshold;
     m->passes = rule->policy.passes;
     return 0;
@@ -154,11 +143,9 @@ int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const s
     if (!rc && r.rule.reach > 0)
         rc = check_halves(s, name, err);
     const struct ggn_eval_values made_by_block[] = {{m->score, sizeof *m->score, NULL},
-                                                    {m->verdict, sizeof *m->verdict, NULL},
-                                                    {m->own_guard, sizeof *m->own_guard, NULL},
                                                     {m->correction, sizeof *m->correction, NULL}};
     if (!rc)
-        rc = ggn_eval_each_block(s, threads, judge_block, &r, made_by_block, m->correction ? 4 : 3, err);
+        rc = ggn_eval_each_block(s, threads, judge_block, &r, made_by_block, m->correction ? 2 : 1, err);
     for (int i = 0; i < made; i++)
         ggn_viewer_release(&r.viewers[i]);
     free(r.viewers);

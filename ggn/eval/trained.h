@@ -8,8 +8,8 @@
 #include "model/policy.h"
 
 /*
- * Scores are p_noisy of every window that the policy's cadence makes, for which the network is asked even where the gate
- * would spare it; stops are those of the rule (model/stopper.h, data/replay.h), with gate and guard as the policy says.
+ * Scores are p_noisy of every window that the policy's cadence makes; stops are those of the rule (model/stopper.h,
+ * data/replay.h).
  * A residual model asks between levels too, where the law is known; it needs set->images.meter. observer: of its law, as for
  * ggn_method_observer.
  */

@@ -20,10 +20,7 @@ static const struct {
     {"scale", offsetof(struct ggn_policy, scale), 1e-6, 1e6, 0},
     {"shift", offsetof(struct ggn_policy, shift), -1e6, 1e6, 0},
     {"threshold", offsetof(struct ggn_policy, threshold), 0, 1, 0},
-    {"gate_noise", offsetof(struct ggn_policy, gate_noise), 0, 1e6, 1},
     {"slope", offsetof(struct ggn_policy, slope), 0, 1e6, 1},
-    {"tail999", offsetof(struct ggn_policy, tail999), 0, 1e30, 1},
-    {"gini", offsetof(struct ggn_policy, gini), 0, 2, 1},
 };
 enum { N_FIELDS = sizeof fields / sizeof fields[0], PASSES_MAX = 16 };
 
@@ -36,7 +33,7 @@ static double get(const struct ggn_policy *p, int i)
 
 struct ggn_policy ggn_policy_default(void)
 {
-    return (struct ggn_policy){.first_spp = 20, .ratio = 1.15, .scale = 1, .threshold = 0.5, .passes = 2};
+    return (struct ggn_policy){.first_spp = 20, .ratio = 1.15, .scale = 1, .threshold = 0.5, .passes = 1};
 }
 
 int ggn_policy_check(const struct ggn_policy *p, struct base_err *err)
@@ -61,35 +58,16 @@ int ggn_policy_check(const struct ggn_policy *p, struct base_err *err)
 
 int ggn_policy_adjust(struct ggn_policy *p, const char *name, double value)
 {
-    const struct {
-        const char *name;
-        double *field;
-    } adjustable[] = {{"visible", &p->threshold}, {"tail", &p->tail999}, {"gini", &p->gini}, {"first-spp", &p->first_spp}};
-
-    for (size_t i = 0; i < sizeof adjustable / sizeof adjustable[0]; i++)
-        if (!strcmp(name, adjustable[i].name)) {
-            *adjustable[i].field = value;
-            return 1;
-        }
-    if (!strcmp(name, "passes")) {
+    if (!strcmp(name, "visible"))
+        p->threshold = value;
+    else if (!strcmp(name, "first-spp"))
+        p->first_spp = value;
+    else if (!strcmp(name, "passes"))
         p->passes = (int)value;
-        return 1;
-    }
-    if (strcmp(name, "gate"))
+    else
         return 0;
-    p->gate_noise = value != 0 ? p->gate_noise : 0;
     return 1;
 }
-
-/* Noise of the noisiest thousandth of the pixels, in mean luminances, below which nothing sparkles. */
-static const double CALM_TAIL = 0.2;
-
-int ggn_policy_tail_holds(const struct ggn_policy *p, double tail999, double gini)
-{
-    return (p->tail999 > 0 && tail999 > p->tail999) || (p->gini > 0 && gini > p->gini && tail999 > CALM_TAIL);
-}
-
-void ggn_policy_without_halves(struct ggn_policy *p) { p->tail999 = p->gini = 0; }
 
 double ggn_policy_p(const struct ggn_policy *p, double logit)
 {
@@ -105,17 +83,6 @@ double ggn_policy_next(const struct ggn_policy *p, double spp)
     double next = p->ratio > 1.001 ? floor(spp * p->ratio + 0.5) : spp + p->step_spp;
 
     return fmax(next, spp + 1);
-}
-
-double ggn_policy_level_below(const struct ggn_policy *p, double spp)
-{
-    int i = p->n_levels - 1;
-
-    if (i < 0 || spp >= p->level[i])
-        return spp;
-    while (i > 0 && p->level[i] > spp)
-        i--;
-    return fmin(p->level[i], spp);
 }
 
 /* A quarter of a step, or the sample that rounding to whole ones moves a level. */

@@ -1,5 +1,5 @@
 /*
- * How a trained model is to be used: cadence, calibration, threshold, gate. Chosen on validation scenes by the trainer. In a
+ * How a trained model is to be used: cadence, calibration, threshold. Chosen on validation scenes by the trainer. In a
  * model file: the model's calibration, and what that does not have as "policy" in its provenance. A plain value.
  */
 #ifndef GGN_MODEL_POLICY_H
@@ -18,40 +18,29 @@ struct ggn_policy {
     double scale, shift; /* calibration (Platt): p_noisy = sigmoid(scale · logit + shift) */
     double threshold;    /* stop when p_noisy < threshold ... */
     int passes;          /* ... in so many checks in a row */
-    double gate_noise; /* above this window noise (ggn_window_noise) a block is plainly noisy: no network needed; 0: never */
-    double slope;      /* by how much the calibrated logit falls when the samples double; for predictions; 0: not known */
+    double slope;        /* by how much the calibrated logit falls when the samples double; for predictions; 0: not known */
     /* The samples of the images that were learned, rising, as far as they are not `ratio` or `step_spp` apart: evenly spaced
      * levels that were thinned are both in turn. Beyond the last of them ratio or step say how it goes on. */
     int n_levels;
     double level[GGN_POLICY_LEVELS];
-    double tail999, gini; /* a block whose half buffer exceeds either is held back, see the criterion; 0: no guard */
 };
 
 struct ggn_policy ggn_policy_default(void);
 /* BASE_EINVAL naming the field that is out of range. */
 int ggn_policy_check(const struct ggn_policy *policy, struct base_err *err);
 
-/* The parameters that users may set over the model's own policy, by name: visible (the threshold), passes, gate (0: none),
- * tail, gini, first-spp. Returns 0 if there is none of this name. */
+/* The parameters that users may set over the model's own policy, by name: visible (the threshold), passes, first-spp.
+ * Returns 0 if there is none of this name. */
 int ggn_policy_adjust(struct ggn_policy *policy, const char *name, double value);
 
 /* Calibrated probability; 1 for a logit that is not finite. */
 double ggn_policy_p(const struct ggn_policy *policy, double logit);
 /* Samples at which a block last judged at `spp` is to be judged again; > spp. */
 double ggn_policy_next(const struct ggn_policy *policy, double spp);
-/* The last level of the list at or below spp; spp itself beyond the list, or without one. */
-double ggn_policy_level_below(const struct ggn_policy *policy, double spp);
 /* The policy's levels are those of images with so many samples, rising, as far as ratio and step do not tell them. */
 void ggn_policy_set_levels(struct ggn_policy *policy, const double *spp, int n);
 /* Samples at which p is expected to fall below `threshold`, from p at spp; at least spp. NaN if the slope is not known. */
 double ggn_policy_predict(const struct ggn_policy *policy, double p, double threshold, double spp);
-
-/* Whether noise with these statistics (see model/window.h) sits in too few pixels for a judgement by eye. An uneven spread
- * alone says nothing where even the noisiest pixels are calm: a block that is half sky has a large Gini coefficient for
- * ever. */
-int ggn_policy_tail_holds(const struct ggn_policy *policy, double tail999, double gini);
-/* What is left of a policy in a host without half buffers: no tail guard. */
-void ggn_policy_without_halves(struct ggn_policy *policy);
 
 /* What the model says, defaults elsewhere. BASE_EINVAL when a field is out of range. */
 int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct base_err *err);

@@ -38,8 +38,6 @@ static void push(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uint64
         s->used--;
     }
     s->spp[s->used++] = spp;
-    s->regular = s->leapt ? 1 : s->regular < s->used ? s->regular + 1 : s->used;
-    s->leapt = 0;
 }
 
 int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uint64_t spp)
@@ -68,33 +66,16 @@ int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uin
     return GGN_LOOK_NONE;
 }
 
-/* Goes on at the next level or, while the gate says that the block is plainly noisy, at the first level of the window that
- * will end where it expects to open: half of that, because the estimate is noisy itself, and at most fourfold. */
-static void schedule(const struct ggn_stop_rule *rule, struct ggn_stopper *s, double gate_opens)
+/* Goes on at the next level. */
+static void schedule(const struct ggn_stop_rule *rule, struct ggn_stopper *s)
 {
-    const struct ggn_policy *p = &rule->policy;
-    double spp = (double)s->asked_spp, next = ggn_policy_next(p, spp);
-
-    if (gate_opens > 0 && p->ratio > 1.001) {
-        double leap = fmin(0.5 * gate_opens / pow(p->ratio, rule->window - 1), 4 * spp);
-        leap = ggn_policy_level_below(p, leap); /* a window of the images that were learned */
-        s->leapt = leap > 1.5 * next;
-        next = s->leapt ? leap : next;
-    }
-    ask_at(s, to_spp(ceil(fmax(next, p->first_spp))));
+    ask_at(s, to_spp(ceil(ggn_policy_next(&rule->policy, (double)s->asked_spp))));
 }
 
 int ggn_stopper_pass(struct ggn_stopper *s, int passes, int below)
 {
     s->passes = below ? s->passes + 1 : 0;
     return s->passes >= (uint32_t)passes;
-}
-
-static int is_held(const struct ggn_policy *p, const struct ggn_evidence *e)
-{
-    double tail999, gini;
-
-    return (p->tail999 > 0 || p->gini > 0) && e->tail(e->data, &tail999, &gini) && ggn_policy_tail_holds(p, tail999, gini);
 }
 
 static const double LEAST_STEP = 1.04; /* between looks, as a share of the samples */
@@ -108,7 +89,7 @@ static double by_law(const struct ggn_stop_rule *rule, struct ggn_stopper *s, co
     const struct ggn_policy *p = &rule->policy;
     double law = e->law(e->data);
 
-    if (isnan(law) || s->regular < (uint32_t)rule->window || fabs(p->scale * law + p->shift) > CERTAIN)
+    if (isnan(law) || s->used < (uint32_t)rule->window || fabs(p->scale * law + p->shift) > CERTAIN)
         s->correction = 0;
     else if (s->spp[s->used - 1] == s->asked_spp)
         s->correction = ggn_residual_correction(e->logit(e->data), rule->reach);
@@ -129,7 +110,7 @@ static void decide_by_law(const struct ggn_stop_rule *rule, struct ggn_stopper *
     }
     v->noise = exp2(logit - s->correction);
     v->p = ggn_policy_p(p, logit);
-    if (ggn_stopper_pass(s, p->passes, v->p < p->threshold) && !is_held(p, e)) {
+    if (ggn_stopper_pass(s, p->passes, v->p < p->threshold)) {
         v->stop = 1;
         v->predicted_spp = spp;
         return;
@@ -151,26 +132,18 @@ void ggn_stopper_decide(const struct ggn_stop_rule *rule, struct ggn_stopper *s,
     struct ggn_verdict *v = &s->verdict;
     double spp = (double)s->asked_spp;
 
-    v->noise = s->used > 1 ? e->noise(e->data) : (double)NAN;
-    if (p->gate_noise > 0 && v->noise > p->gate_noise) {
-        double ratio = v->noise / p->gate_noise;
-        s->passes = 0;
-        v->predicted_spp = spp * ratio * ratio; /* the error of a mean falls as 1/√spp */
-        schedule(rule, s, v->predicted_spp);
-        return;
-    }
-    if (s->regular < (uint32_t)rule->window) {
+    if (s->used < (uint32_t)rule->window) {
         v->too_early = 1;
-        schedule(rule, s, 0);
+        schedule(rule, s);
         return;
     }
     v->p = ggn_policy_p(p, e->logit(e->data));
-    if (ggn_stopper_pass(s, p->passes, v->p < p->threshold) && !is_held(p, e)) {
+    if (ggn_stopper_pass(s, p->passes, v->p < p->threshold)) {
         v->stop = 1;
         v->predicted_spp = spp;
         return;
     }
-    schedule(rule, s, 0);
+    schedule(rule, s);
     v->predicted_spp = fmax(ggn_policy_predict(p, v->p, p->threshold, spp), (double)v->next_spp);
 }
 
@@ -189,7 +162,7 @@ static int verdict_valid(const struct ggn_stopper *s)
 
 int ggn_stopper_valid(const struct ggn_stop_rule *rule, const struct ggn_stopper *s)
 {
-    if (s->used > (uint32_t)rule->window || s->regular > s->used || s->leapt > 1 || !verdict_valid(s))
+    if (s->used > (uint32_t)rule->window || !verdict_valid(s))
         return 0;
     if (s->used && s->spp[s->used - 1] > s->asked_spp)
         return 0;

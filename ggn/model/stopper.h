@@ -5,10 +5,7 @@
  * the window and judged by what it shows, which is computed only as far as the rule needs it:
  *
  * - The first image and those after it, until a window is full, are too early for the network.
- * - The gate: while the window's noise exceeds policy.gate_noise, the block is plainly noisy, passes are forgotten, and the
- *   next image is wanted where the first window can begin that might end below it.
- * - Then the network: p = ggn_policy_p(logit). `passes` checks in a row with p below the threshold stop the block, unless
- *   the tail guard (ggn_policy_tail_holds) holds it back, which leaves the passes counted so far.
+ * - Then the network: p = ggn_policy_p(logit). `passes` checks in a row with p below the threshold stop the block.
  *
  * A residual model has `reach` > 0. Its logit is that of the law of visible noise, log2 of the newest image's error, and the
  * network's correction of up to `reach`. Then every look is judged: by the law alone until a window is full and where the
@@ -27,9 +24,9 @@
 enum { GGN_WINDOW_MAX = 16 };
 
 struct ggn_stop_rule {
-    struct ggn_policy policy; /* gate_noise 0: no gate; tail999, gini 0: no guard */
-    int window;               /* images per window, S; 1 .. GGN_WINDOW_MAX */
-    double reach;             /* octaves of noise; 0: the network answers alone */
+    struct ggn_policy policy;
+    int window;   /* images per window, S; 1 .. GGN_WINDOW_MAX */
+    double reach; /* octaves of noise; 0: the network answers alone */
 };
 
 struct ggn_verdict {
@@ -38,7 +35,7 @@ struct ggn_verdict {
     uint64_t next_spp;    /* samples at which to ask again, where it goes on */
     double p;             /* probability that the noise is still seen; NaN: the network was not asked */
     double predicted_spp; /* where it expects to stop; NaN: not known */
-    double noise;         /* of the window, see ggn_window_noise; with `reach` the law's error; NaN: not known */
+    double noise;         /* with `reach` the law's error; NaN: not known */
 };
 
 /* One block. All zero: never asked. */
@@ -46,9 +43,7 @@ struct ggn_stopper {
     uint64_t asked_spp;
     uint64_t spp[GGN_WINDOW_MAX]; /* of the window's images, oldest first */
     uint32_t used;                /* images in the window */
-    uint32_t regular;             /* of those the newest that are spaced as the network learned them */
     uint32_t passes;              /* checks in a row below the threshold */
-    uint32_t leapt;               /* the last verdict asked for a larger step than the network learned */
     struct ggn_verdict verdict;   /* the last one */
     double correction;            /* with `reach`: the network's last one, octaves of noise */
 };
@@ -56,10 +51,8 @@ struct ggn_stopper {
 /* What the window shows whose newest image is the one asked about. */
 struct ggn_evidence {
     void *data;
-    double (*noise)(void *data);                            /* ggn_window_noise of oldest and newest image */
-    double (*logit)(void *data);                            /* the network's, of a full window */
-    int (*tail)(void *data, double *tail999, double *gini); /* of the newest image's half buffer; 0: not known */
-    double (*law)(void *data); /* with `reach`: log2 of the error of the image asked about; NaN: not known */
+    double (*logit)(void *data); /* the network's, of a full window */
+    double (*law)(void *data);   /* with `reach`: log2 of the error of the image asked about; NaN: not known */
 };
 
 /* What an image asked about is. */
@@ -74,7 +67,7 @@ int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uin
 void ggn_stopper_decide(const struct ggn_stop_rule *rule, struct ggn_stopper *s, const struct ggn_evidence *evidence);
 
 /* The end of the rule, also of those criteria that have a score and a cut and no network: counts a check. 1: so many checks
- * in a row were below; the block stops unless a guard holds it back. */
+ * in a row were below; the block stops. */
 int ggn_stopper_pass(struct ggn_stopper *s, int passes, int below);
 
 /* Whether a stopper from a file can be that of this rule. */

@@ -3,17 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-double ggn_window_noise(const uint8_t *first, const uint8_t *last, size_t count, double spp_first, double spp_last)
-{
-    uint64_t sum = 0;
-
-    for (size_t i = 0; i < count; i++) {
-        int d = (int)first[i] - last[i];
-        sum += (uint64_t)(d * d);
-    }
-    return count ? sqrt((double)sum / (double)count / (spp_last / spp_first - 1)) / 255 : 0;
-}
-
 uint8_t ggn_noise_map_code(double mean, double difference, const struct ggn_display *display)
 {
     if (!isfinite(mean) || !isfinite(difference))

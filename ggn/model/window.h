@@ -1,6 +1,6 @@
 /*
- * What trainer, evaluation and criterion must do alike with a block's images: fixed point of denoised images, the noise
- * statistic that spares the network, tiles of blocks that have another size than the network. Pure functions, any thread.
+ * What trainer, evaluation and criterion must do alike with a block's images: fixed point of denoised images, noise
+ * maps, tiles of blocks that have another size than the network. Pure functions, any thread.
  *
  * A block's image is planar here: [3][height][width], all of R, then G, then B; display code 0..255 (noisy) or 16-bit
  * fixed point (denoised): code/65535, where 65534 stands for everything up to 1 and 65535 is no number.
@@ -12,11 +12,6 @@
 #include <stdint.h>
 
 #include "model/preprocess.h"
-
-/* Root mean square, in display units (1 = white), of the noise left in `last`, told from an earlier image of the same block
- * whose samples `last` contains: var(first − last) = σ²·(1/n_first − 1/n_last), so noise² = msd / (n_last/n_first − 1).
- * count: values per image. Needs spp_last > spp_first. */
-double ggn_window_noise(const uint8_t *first, const uint8_t *last, size_t count, double spp_first, double spp_last);
 
 /* The noise map of an image, one value per pixel: how many display codes apart the luminance of the mean and that of
  * mean + half difference are shown. It has the noise of the mean, whatever the samples. Both in linear light; difference: of

@@ -1,7 +1,6 @@
 /*
  * The criteria "svd-entropy", "attributes" and "noise-mask": the published models before the network (baselines/baseline.h)
  * in the renderer. An image leaves only its numbers behind; the block stops after `passes` checks in a row below `visible`.
- * As published they have no gate and no guard against rare bright paths.
  */
 #include "baselines/baseline.h"
 #include "baselines/lstm.h"
@@ -77,13 +76,6 @@ static long read_image(const struct gp_block_view *seen, uint32_t slot)
     return broken;
 }
 
-/* Only the numbers of older images are left. */
-static double no_noise(void *data)
-{
-    (void)data;
-    return (double)NAN;
-}
-
 static double window_logit(void *data)
 {
     const struct gp_block_view *seen = data;
@@ -94,14 +86,6 @@ static double window_logit(void *data)
     for (int i = 0; i < seen->in->rule.window; i++)
         features[i] = gp_history_kept(&seen->in->history, b->id, seen->head->order[i]);
     return ggn_baseline_logit(w->reader, features, b->x1 - b->x0, b->y1 - b->y0);
-}
-
-static int no_tail(void *data, double *tail999, double *gini)
-{
-    (void)data;
-    (void)tail999;
-    (void)gini;
-    return 0;
 }
 
 static void hash_model(struct lull_instance *in, const struct ggn_baseline *b)
@@ -137,7 +121,7 @@ static const struct gp_block_view_ops ops = {.load = load,
                                              .worker_destroy = worker_destroy,
                                              .model_destroy = model_destroy,
                                              .read = read_image,
-                                             .evidence = {NULL, no_noise, window_logit, no_tail, NULL}};
+                                             .evidence = {NULL, window_logit, NULL}};
 
 /* X(kind, member of criteria.h, id, name, its features) */
 #define BASELINES(X) \

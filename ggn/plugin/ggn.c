@@ -3,16 +3,10 @@
  * answer is the probability that the newest image still looks noisy. A block stops after `passes` checks in a row below
  * `visible`.
  *
- * Two cheap statistics stand beside the network. The *gate* compares the window's oldest and newest image: while their
- * difference says that the noise is far above what the model ever called clean in training, the block is plainly noisy and
- * the network is not asked; it says when to ask again. The *tail guard* reads the half buffer: a block whose noise sits
- * in a few pixels has not met its rare bright paths often enough for any judgement by eye, and is not stopped.
- *
  * A model may also take the noise map that the half buffer shows; without half buffer it decides without.
  *
  * A *residual* model begins with what `observer` measures, from the half buffer or without one from how the mean changes:
- * the network only corrects it, so gate and tail guard are not needed. `error` is then the visible noise over what is just
- * visible.
+ * the network only corrects it. `error` is then the visible noise over what is just visible.
  */
 #include "model/inference.h"
 #include "model/measure.h"
@@ -22,9 +16,8 @@
 #include "plugin/translate.h"
 #include "plugin/windowed.h"
 #include "sequence/simulate.h"
-#include "sequence/tail.h"
 
-enum { P_MODEL, P_VISIBLE, P_PASSES, P_GATE, P_TAIL, P_GINI, P_FIRST_SPP, P_COUNT };
+enum { P_MODEL, P_VISIBLE, P_PASSES, P_FIRST_SPP, P_COUNT };
 
 static const struct lull_param params[P_COUNT] = {
     [P_MODEL] = LULL_KIT_FILE("model", NULL,
@@ -35,13 +28,6 @@ static const struct lull_param params[P_COUNT] = {
                                  "own"),
     [P_PASSES] =
         LULL_KIT_INT("passes", NULL, 1, 16, "checks in a row that must be below that share; without it the model's own"),
-    [P_GATE] = LULL_KIT_BOOL("gate", "1", "spare the network while a block is plainly noisy (p_noisy is then not given)"),
-    [P_TAIL] = LULL_KIT_FLOAT("tail", NULL, 0, 1e30,
-                              "do not stop while the 99.9th percentile of the half-buffer difference exceeds this many "
-                              "times the mean luminance, 0 = no such guard; without it the model's own"),
-    [P_GINI] = LULL_KIT_FLOAT("gini", NULL, 0, 2,
-                              "do not stop while the Gini coefficient of the half-buffer difference exceeds this and its "
-                              "tail 0.2, 0 = no such guard; without it the model's own"),
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", NULL, 1, 1e9,
                                  "samples per pixel of the first image of a window; without it the model's own"),
 };
@@ -50,7 +36,6 @@ static const struct lull_param params[P_COUNT] = {
 
 struct worker {
     struct ggn_inference *inference;
-    double *noise;          /* [pixels of the largest block], for the tail guard */
     uint8_t *noise_map;     /* [pixels of the largest block], for models with the noise map */
     struct ggn_meter meter; /* of a residual model */
     struct ggn_measure measure;
@@ -75,7 +60,6 @@ static void worker_destroy(void *data)
         return;
     ggn_inference_destroy(w->inference);
     ggn_meter_release(&w->meter);
-    free(w->noise);
     free(w->noise_map);
     free(w);
 }
@@ -86,9 +70,8 @@ static void *worker_create(const struct lull_instance *in, size_t pixels, struct
 
     if (!w)
         return NULL;
-    w->noise = malloc(pixels * sizeof *w->noise);
     w->noise_map = malloc(pixels);
-    if (w->noise && w->noise_map && (in->rule.reach <= 0 || !ggn_meter_init(&w->meter, pixels, err)))
+    if (w->noise_map && (in->rule.reach <= 0 || !ggn_meter_init(&w->meter, pixels, err)))
         w->inference = ggn_inference_create(in->model, NULL, err);
     if (w->inference)
         return w;
@@ -188,19 +171,6 @@ static void scalars_of(struct gp_block_view *seen, float scalars[GGN_SCALARS])
     ggn_measure_scalars(window, spp, (int)s->used, law(seen), scalars);
 }
 
-static double window_noise(void *data)
-{
-    const struct gp_block_view *seen = data;
-    const struct gp_history *h = &seen->in->history;
-    const struct ggn_stopper *s = &seen->head->stopper;
-    const struct lull_block *b = seen->block;
-    size_t values = 3 * (size_t)(b->x1 - b->x0) * (size_t)(b->y1 - b->y0);
-
-    return ggn_window_noise(gp_history_kept(h, b->id, seen->head->order[0]),
-                            gp_history_kept(h, b->id, seen->head->order[s->used - 1]), values, (double)s->spp[0],
-                            (double)s->spp[s->used - 1]);
-}
-
 /* *split takes A − I, of n samples, the first h of them in A, to noise of the variance of the mean. 0: the view has no half
  * buffer with part of the samples. */
 static int has_half(const struct gp_block_view *seen, double *split)
@@ -262,31 +232,6 @@ static double window_logit(void *data)
     return ggn_inference_logit(worker->inference, noisy, denoised, read_noise_map(seen), scalars, w, h);
 }
 
-static int tail_statistics(void *data, double *tail999, double *gini)
-{
-    const struct gp_block_view *seen = data;
-    const struct lull_kit *kit = &seen->in->kit;
-    double *noise = ((const struct worker *)seen->worker)->noise, sum = 0, split;
-    struct lull_kit_span s;
-    size_t count = 0;
-
-    if (!has_half(seen, &split))
-        return 0;
-    for (lull_kit_span_begin(&s, seen->view, seen->block, HALVES); lull_kit_span_next(&s);)
-        for (int32_t i = 0; i < s.count; i++) {
-            double luminance = lull_kit_luminance(kit, s.value[LULL_PLANE_COLOR][i]);
-            double d = split * (lull_kit_luminance(kit, s.value[LULL_PLANE_HALF][i]) - luminance);
-            if (isfinite(luminance) && isfinite(d)) {
-                sum += luminance;
-                noise[count++] = fabs(d);
-            }
-        }
-    struct seq_tail tail = seq_tail_of(noise, count, count ? sum / (double)count : 0);
-    *tail999 = tail.tail999;
-    *gini = tail.gini;
-    return 1;
-}
-
 /* --- instance ---------------------------------------------------------------------------------------------------------- */
 
 static int32_t load(struct lull_instance *in, int kind, const char *path, struct lull_error *err)
@@ -320,7 +265,7 @@ static const struct gp_block_view_ops ops = {.model = "lull-3",
                                              .model_destroy = model_destroy,
                                              .measure = measure_block,
                                              .read = read_image,
-                                             .evidence = {NULL, window_noise, window_logit, tail_statistics, law}};
+                                             .evidence = {NULL, window_logit, law}};
 
 static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
                       struct lull_instance **instance, struct lull_error *err)
@@ -332,4 +277,4 @@ const struct lull_criterion ggn_plugin_ggn = GP_WINDOWED_TABLE(
         .create = create, .id = "ggn", .name = "Guided-Generative Network",
         .description =
             "Probability that a viewer still sees noise in the block, from the last images of it (Buisine, Teytaud,\n"
-            "Delepoulle, Renaud 2022). `error` is the root mean square of the noise in display units (1 = white).");
+            "Delepoulle, Renaud 2022). `error`, of a model with residual, is the visible noise over what is just visible.");

@@ -62,10 +62,9 @@ void gp_windowed_ready(struct lull_instance *in, const struct lull_param *params
             ggn_policy_adjust(policy, params[i].name, in->kit.value[i]);
     if (policy->n_levels)
         gp_windowed_hash(in, policy->level, (size_t)policy->n_levels * sizeof *policy->level);
-    const double numbers[] = {policy->threshold, policy->passes,    policy->gate_noise, policy->tail999,
-                              policy->gini,      policy->first_spp, in->rule.reach};
+    const double numbers[] = {policy->threshold, policy->passes, policy->first_spp, in->rule.reach};
     gp_windowed_hash(in, numbers, sizeof numbers);
-    if (policy->tail999 > 0 || policy->gini > 0 || in->rule.reach > 0)
+    if (in->rule.reach > 0)
         need->planes_used |= LULL_PLANE_BIT(LULL_PLANE_HALF);
     need->block_width = (uint32_t)width;
     need->block_height = (uint32_t)height;
@@ -221,7 +220,7 @@ long gp_windowed_read(const struct gp_block_view *seen, uint8_t *out)
  * model needs none. */
 static void tell_late(struct lull_instance *in, const struct ggn_stopper *before, uint64_t spp)
 {
-    if (in->rule.reach > 0 || !before->used || before->leapt)
+    if (in->rule.reach > 0 || !before->used)
         return;
     const double last = (double)before->spp[before->used - 1], next = ggn_policy_next(&in->rule.policy, last);
     if ((double)spp - last <= 1.5 * (next - last))

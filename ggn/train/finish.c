@@ -153,7 +153,7 @@ static int choose_threshold(const struct ggn_session *s, const struct ggn_classi
     if (rc)
         return rc;
     if (s->hyper.reach > 0)
-        rc = ggn_calibrate_stopping(&checks, policy->passes, policy->threshold, stopping, err);
+        rc = ggn_calibrate_stopping(&checks, policy->threshold, stopping, err);
     else
         rc = ggn_calibrate_threshold(&checks, s->plan->early_rate, policy, stopping, err);
     ggn_checks_release(&checks);
@@ -185,13 +185,9 @@ int ggn_session_finish(struct ggn_session *s, struct base_err *err)
     if (s->hyper.reach > 0) { /* like the law that it corrects: whose spread is known, where a few scenes tell little */
         policy.first_spp = fmax(policy.first_spp, FIRST_SPP);
         policy.threshold = GGN_OBSERVER_VISIBLE;
-        policy.passes = 1;
         policy.slope = 0.5 * s->scale;
-    } else {
-        ggn_calibrate_limits(&s->train, &policy);
-        ggn_calibrate_limits(&s->validation, &policy);
     }
-    /* the threshold last: it is chosen for the cadence, the gate and the guard that will stand beside it */
+    /* the threshold last: it is chosen for the cadence that will stand beside it */
     rc = choose_threshold(s, &v, &policy, &stopping, err);
     if (!rc)
         rc = export(s, &policy, &stopping, v.auc, accuracy, err);

@@ -4,7 +4,6 @@
 #include <stdlib.h>
 
 #include "figures/stats.h"
-#include "model/window.h"
 #include "nn/loss.h"
 
 void ggn_calibrate_platt(const double *logit, const double *label, int n, struct ggn_policy *policy)
@@ -73,7 +72,7 @@ int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *w, co
     for (int c = 0; c < w->set->n; c++) {
         struct known known = {w, logit, w->first[c], w->first[c + 1]};
         if (known.end > known.first)
-            ggn_replay(w->set, &w->set->series[c], &rule, known_logit, &known, NULL, seen);
+            ggn_replay(&w->set->series[c], &rule, known_logit, &known, NULL, seen);
         seen += w->set->series[c].n_levels;
     }
     return 0;
@@ -85,10 +84,8 @@ void ggn_checks_release(struct ggn_checks *checks)
     *checks = (struct ggn_checks){0};
 }
 
-int ggn_calibrate_stopping(const struct ggn_checks *checks, int passes, double t, struct ggn_stopping *out,
-                           struct base_err *err)
+int ggn_calibrate_stopping(const struct ggn_checks *checks, double t, struct ggn_stopping *out, struct base_err *err)
 {
-    struct ggn_policy policy = checks->policy;
     const struct ggn_windows *w = checks->windows;
     const struct ggn_seen *seen = checks->seen;
     double *error = malloc(((size_t)w->set->n + 1) * sizeof *error), spent = 0, needed = 0;
@@ -96,7 +93,6 @@ int ggn_calibrate_stopping(const struct ggn_checks *checks, int passes, double t
 
     if (!error)
         return base_fail_nomem(err, "thresholds");
-    policy.passes = passes;
     *out = (struct ggn_stopping){0};
     for (int c = 0; c < w->set->n; c++) {
         const struct ggn_level_series *series = &w->set->series[c];
@@ -104,7 +100,7 @@ int ggn_calibrate_stopping(const struct ggn_checks *checks, int passes, double t
         seen += series->n_levels;
         if (w->first[c + 1] == w->first[c])
             continue;
-        int level = ggn_replay_stop(own, series->n_levels, &policy, t);
+        int level = ggn_replay_stop(own, series->n_levels, checks->policy.passes, t);
         double truth = series->label.threshold;
         /* nothing is known after the end of the series: right if the noise is seen until there */
         double stop = level < 0 ? fmax(series->spp[series->n_levels - 1], truth) : series->spp[level];
@@ -130,18 +126,16 @@ int ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, 
     struct ggn_stopping best = {0};
 
     policy->threshold = 0;
-    for (int k = 0; k < 2 * 99; k++) {
-        const int passes = 1 + k / 99;
-        const double t = (1 + k % 99) / 100.0;
+    for (int k = 1; k <= 99; k++) {
+        const double t = k / 100.0;
         struct ggn_stopping now;
-        int rc = ggn_calibrate_stopping(checks, passes, t, &now, err);
+        int rc = ggn_calibrate_stopping(checks, t, &now, err);
         if (rc)
             return rc;
         if (policy->threshold > 0 && (now.early_rate > early_rate || now.mean_abs_log2 >= best.mean_abs_log2))
             continue;
         best = now;
         policy->threshold = t;
-        policy->passes = passes;
     }
     *out = best;
     return 0;
@@ -163,25 +157,4 @@ double ggn_calibrate_slope(const struct ggn_windows *w, const double *logit, con
     }
     double det = n * sxx - sx * sx, slope = det > 0 ? -(n * sxy - sx * sy) / det : 0;
     return slope > 0 ? slope : 0;
-}
-
-static const double GATE_MARGIN = 1.1, TAIL_MARGIN = 1.5, GINI_MARGIN = 0.25; /* of the distance to 1 */
-
-void ggn_calibrate_limits(const struct ggn_windows *w, struct ggn_policy *policy)
-{
-    const size_t values = ggn_series_set_values(w->set);
-
-    for (int i = 0; i < w->n; i++) {
-        const struct ggn_level_series *c = &w->set->series[w->list[i].series];
-        int last = w->list[i].last, first = last - w->length + 1;
-        if (c->synthetic || w->list[i].octave < log2(0.8))
-            continue;
-        double noise = ggn_window_noise(c->noisy + (size_t)first * values, c->noisy + (size_t)last * values, values,
-                                        c->spp[first], c->spp[last]);
-        policy->gate_noise = fmax(policy->gate_noise, GATE_MARGIN * noise);
-        if (w->list[i].octave < 0 || !(c->tail999[last] >= 0) || !(c->gini[last] >= 0))
-            continue;
-        policy->tail999 = fmax(policy->tail999, TAIL_MARGIN * c->tail999[last]);
-        policy->gini = fmax(policy->gini, c->gini[last] + GINI_MARGIN * (1 - c->gini[last]));
-    }
 }

@@ -21,18 +21,17 @@ int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *windo
                       const struct ggn_policy *policy, struct base_err *err);
 void ggn_checks_release(struct ggn_checks *checks);
 
-/* What stopping after so many passes below t does to these blocks. */
+/* What stopping below t does to these blocks. */
 struct ggn_stopping {
     int blocks;
     double early_rate;                     /* share stopped below 0.8 of the true threshold */
     double samples_ratio;                  /* samples spent / samples at the true thresholds */
     double median_abs_log2, mean_abs_log2; /* of stop / true threshold */
 };
-int ggn_calibrate_stopping(const struct ggn_checks *checks, int passes, double t, struct ggn_stopping *out,
-                           struct base_err *err);
+int ggn_calibrate_stopping(const struct ggn_checks *checks, double t, struct ggn_stopping *out, struct base_err *err);
 
-/* The threshold (in steps of 0.01) and the number of passes (1 or 2) with the smallest mean |log2(stop / true)| of those
- * that keep the early rate at or below `early_rate`; one pass at 0.01 if none does. (The largest threshold that keeps the
+/* The threshold (in steps of 0.01) with the smallest mean |log2(stop / true)| of those that keep the early rate at or below
+ * `early_rate`; 0.01 if none does. (The largest threshold that keeps the
  * rate would be 0.99 whenever the few blocks are easy. The labels are unsure themselves: a caller that wants a margin asks
  * for fewer viewers than half, and a margin here as well would count it twice.) Into *policy and *out. */
 int ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, struct ggn_policy *policy,
@@ -40,9 +39,5 @@ int ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, 
 
 /* Mean fall of the calibrated logit per octave of samples near the threshold. */
 double ggn_calibrate_slope(const struct ggn_windows *windows, const double *logit, const struct ggn_policy *policy);
-
-/* Gate and guard limits from windows at or beyond the threshold (down to 0.8 of it for the gate): the largest seen, with a
- * margin. Raises what the policy already has, so that several lists can be gone through. */
-void ggn_calibrate_limits(const struct ggn_windows *windows, struct ggn_policy *policy);
 
 #endif

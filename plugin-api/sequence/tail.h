@@ -2,7 +2,6 @@
  * Noise that sits in few pixels: the *tail* of a block's noise. Rare bright paths, each met by one sample or none, make it;
  * a mean over all pixels hides it. Pure functions, any thread, allocate nothing.
  *
- * - The criterion ggn is held back by tail999 and gini (ggn_policy_tail_holds).
  * - The criteria halfbuf and variance are held back by the share of unsettled pixels.
  * - A quote takes top_share for light that was not met yet (plugin-api/host/quote.c).
  * - Recorded sequences keep tail999, gini and the shares of unsettled pixels (FORMAT.md).

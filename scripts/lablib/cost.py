@@ -47,7 +47,7 @@ def baselines(o):
     return [x for b in o.baseline for x in ("--baseline", b)]
 
 
-KEYS = ("blocks", "samples", "sampling_s", "checks_cheap", "checks_full", "noisy", "early", "worst", "uniform_spp", "time_ratio", "samples_ratio",
+KEYS = ("blocks", "samples", "sampling_s", "checks_full", "noisy", "early", "worst", "uniform_spp", "time_ratio", "samples_ratio",
         "flip", "relmse")
 
 
@@ -255,7 +255,7 @@ def criteria_of(o):
     never = {"uniform": ("null", ()), "variance": ("variance", ("threshold=0",)), "halfbuf": ("halfbuf", ("threshold=0",)),
              "observer": ("observer", ("visible=0.0001", "growth=1.05"))}
     for m in o.model:
-        never[os.path.basename(m)] = ("ggn", ("model=" + os.path.abspath(os.path.join(ROOT, m)), "visible=0", "gate=0", "first-spp=4"))
+        never[os.path.basename(m)] = ("ggn", ("model=" + os.path.abspath(os.path.join(ROOT, m)), "visible=0", "first-spp=4"))
     for b in o.baseline:
         name = os.path.basename(b)[:-len(".ggn")]
         never[name] = (name, ("model=" + os.path.abspath(os.path.join(ROOT, b)), "visible=0", "first-spp=4"))
@@ -338,7 +338,7 @@ def real(o, out):
 def grow(o, out):
     """How a render's checks grow with its resolution and with threads (the picture is cheap on purpose)."""
     out["growth"] = []
-    network = ("ggn", ("model=" + os.path.abspath(os.path.join(ROOT, o.model[0])), "visible=0", "gate=0", "first-spp=1"), 6)
+    network = ("ggn", ("model=" + os.path.abspath(os.path.join(ROOT, o.model[0])), "visible=0", "first-spp=1"), 6)
     observer = ("observer", ("visible=0.0001", "first-spp=4", "growth=1.05"), 5)
     for (criterion, params, spp), plan in ((observer, ((200, 1), (400, 1), (800, 1), (800, 2), (1600, 1), (4000, 2))),
                                            (network, ((200, 1), (400, 1), (800, 1), (800, 2)))):

@@ -54,12 +54,10 @@ def points_in(out, data):
     points = []
     for p in data["points"]:
         full = price_of(out, p["criterion"])
-        cheap = price_of(out, "variance")
         network = out.get("networks", {}).get(bare(p["criterion"]))
         scenes = {}
         for scene, f in named(p["scenes"]).items():
-            f["checks"] = f["checks_full"] + f["checks_cheap"]
-            f["check_s"] = f["checks_full"] * full + f["checks_cheap"] * cheap
+            f["check_s"] = f["checks_full"] * full
             if network and f["checks_full"] > 0:  # a first window has all of its images denoised, later ones one
                 f["check_s"] += (network["window"] - 1) * network["denoiser"] * full
             if f["sampling_s"]:

@@ -12,7 +12,7 @@ BASELINES = ("svd-entropy", "attributes", "noise-mask")
 COLUMNS = {"samples": ("samples", median, "%.0f"), "time / limit": ("to_limit", median, "%.2f"), "time / uniform": ("total_ratio", median, "%.2f"),
            "noisy": ("noisy", mean, "%"), "early": ("early", mean, "%"), "worst": ("worst", median, "%.2f"), "FLIP": ("flip", mean, "%.3f"),
            "relMSE": ("relmse", median, "%.4f"), "checks' share": ("overhead", lambda v: 100 * median(v), "%.2f %%"),
-           "asked": ("checks_full", mean, "%.1f"), "spared by the gate": ("checks_cheap", mean, "%.1f"), "checks": ("checks", mean, "%.1f")}
+           "asked": ("checks_full", mean, "%.1f"), "checks": ("checks_full", mean, "%.1f")}
 
 
 def cell(p, column):
@@ -166,12 +166,12 @@ def prices_table(out):
                           "as µs per pixel: a path that takes this long costs as much": "%(us).3f"})
 
 
-PARAMETERS = ["samples", "time / limit", "noisy", "early", "worst", "asked", "spared by the gate"]
+PARAMETERS = ["samples", "time / limit", "noisy", "early", "worst", "asked"]
 
 
 def parameter_table(out, criterion):
     return settings(["setting"], [(["as shipped" if p[1] == "own" else "%s %g" % (p[1], p[2])], p) for p in points_of(out, "test")
-                                  if p[0] == criterion and p[1] in ("own", "passes", "gate", "guard", "growth")], PARAMETERS)
+                                  if p[0] == criterion and p[1] in ("own", "growth")], PARAMETERS)
 
 
 def passes_table(out):
@@ -348,13 +348,11 @@ def worst_table(out):
 
 def guards_table(out):
     """Guards that are parameters, the same replay with and without; those that were taken out of the tree."""
-    points, network, tail = points_of(out, "test"), default_network(out), "tail and Gini of the half-buffer difference"
+    points = points_of(out, "test")
     setting = lambda criterion, parameter, value: next((p for p in points if p[:3] == (criterion, parameter, value)), None)
     tell = lambda p: "early %s, worst %s, samples %s" % (cell(p, "early"), cell(p, "worst"), cell(p, "samples"))
     pairs = [("rare bright paths, `%s` (parameter)" % c, "no pixel may hang on few samples", find(points, c), setting(c + ", no guard", *out["defaults"][c]))
              for c in ("variance", "halfbuf")]
-    pairs += [("rare bright paths, network", tail, find(points, network), setting(network, "guard", 0)),
-              ("one lucky check, network", "two checks in a row", find(points, network), setting(network, "passes", 1))]
     return table(["case", "guard", "with it", "without"], [[case, guard, tell(a), tell(b)] for case, guard, a, b in pairs if a and b] + [
         ["%s (`%s`)" % (g["case"], g["test"]), g["guard"], g["with"], g["without"]] for g in out.get("guards", [])])
 

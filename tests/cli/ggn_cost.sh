@@ -53,13 +53,14 @@ assert len(p["scores"]) == windows and 0 < p["cut"] < 1 and all(x is None or 0 <
 assert any(x is not None for x in p["scores"])
 P
 check "scores of a network's windows, nothing else" $?
-run -d $data --split train --no-pictures --recorded --no-quality -m "$tmp/old.ggn" -o "$tmp/blind.json"
-run -d $data --split train --recorded --no-quality -m "$tmp/old.ggn" -o "$tmp/seeing.json" && python3 - "$tmp/blind.json" "$tmp/seeing.json" >"$tmp/err" 2>&1 <<'P'
+halves() { run -d tests/data/recorded --split train --recorded --no-quality -m tests/data/tiny.ggn "$@"; }
+halves --no-pictures -o "$tmp/blind.json"
+halves -o "$tmp/seeing.json" && python3 - "$tmp/blind.json" "$tmp/seeing.json" >"$tmp/err" 2>&1 <<'P'
 import json, sys
 def spent(file, name):
     points = [p for p in json.load(open(file))["points"] if p["criterion"] == name]
     return {(p["dial"], p["value"]): [s["samples"] for s in p["scenes"].values()] for p in points}
-blind, seeing = spent(sys.argv[1], "old.ggn, no halves"), spent(sys.argv[2], "old.ggn")
+blind, seeing = spent(sys.argv[1], "tiny.ggn, no halves"), spent(sys.argv[2], "tiny.ggn")
 assert len(blind) > 10 and blind.keys() == seeing.keys() and blind != seeing
 P
 check "without half buffers a network judges otherwise, and is named so" $?

@@ -124,11 +124,13 @@ check "compare --cap leaves out what is at the cap" $?
 figures() { $ggn evaluate -d $data --no-quality --json "$@" 2>"$tmp/err" | sed '/"early_rate_tuned_for"/d; /"window":/d'; }
 figures -m "$tmp/base.ggn" >"$tmp/figures" && [ -s "$tmp/figures" ]
 check "evaluate" $?
-for option in "--early 0.9" "--ratio 2" "--recorded" "--visible 0.9" "--retune" "-p passes=9" "-p first-spp=100"; do
+for option in "--early 0.9" "--ratio 2" "--recorded" "--visible 0.9" "--retune" "-p first-spp=100"; do
     # shellcheck disable=SC2086
     figures -m "$tmp/base.ggn" $option >"$tmp/other" && ! cmp -s "$tmp/figures" "$tmp/other"
     check "evaluate $option" $?
 done
+figures -m "$tmp/base.ggn" --visible 0.9 >"$tmp/once" && figures -m "$tmp/base.ggn" --visible 0.9 -p passes=9 >"$tmp/other" && ! cmp -s "$tmp/once" "$tmp/other"
+check "evaluate -p passes=9" $?
 figures >"$tmp/figures" && figures -w 3 >"$tmp/other" && ! cmp -s "$tmp/figures" "$tmp/other"
 check "evaluate --window, where no model says" $?
 figures --baselines --epochs 1 >"$tmp/other" && ! grep -qi 'svd\|attributes\|mask' "$tmp/figures" &&

@@ -202,7 +202,7 @@ LULL_MODEL=$tmp/a.ggn $BUILD/bin/lull-check -L "${LIMIT_S:-3600}" "$BUILD/lib/lu
 rc=$?
 grep '^not ok' "$tmp/out" >"$tmp/err"
 check "lull-check passes the criterion ggn" $rc
-LULL_MODEL=$tmp/a.ggn $BUILD/bin/lull-check -q -L "${LIMIT_S:-3600}" -o state -o repeat -o batch -p gate=0 -p visible=0.9 -p passes=1 \
+LULL_MODEL=$tmp/a.ggn $BUILD/bin/lull-check -q -L "${LIMIT_S:-3600}" -o state -o repeat -o batch -p visible=0.9 -p passes=1 \
     "$BUILD/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
 check "and with other parameters" $?
 echo "1..$n"

@@ -104,7 +104,7 @@ mv "$tmp/kept-labels" "$d/test/three/labels.json"
 run evaluate.near evaluate -d "$d" -m $model -m "$tmp/bf16.ggn" --baseline "$tmp/a.ggn" $people -w 6 -o "$got/evaluated.near"
 for method in spp constant scenesmean halfbuf variance observer peoplecsv; do rm -f "$got"/evaluated.near/*-$method.*; done # as above
 # shellcheck disable=SC2086
-run evaluate-retuned.near evaluate -d "$d" -m $model $people --no-quality --retune --visible 0.4 -p passes=1 -p first-spp=12 -p gate=0 --no-pictures
+run evaluate-retuned.near evaluate -d "$d" -m $model $people --no-quality --retune --visible 0.4 -p passes=1 -p first-spp=12 --no-pictures
 # shellcheck disable=SC2086
 run evaluate-trained.near evaluate -d "$d" $people --no-quality --baselines --epochs 2 --json
 says evaluate-errors evaluate -d "$d" -w 4

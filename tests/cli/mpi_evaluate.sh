@@ -17,29 +17,6 @@ for processes in 2 3 5; do
     t "  …the same tables" same one.txt many.txt
     t "  …the same figures" diff -r one-figures many-figures
 done
-# What holds a block back is shared too: the small set above has no half buffers, a recording does.
-mkdir guarded
-t "a recording with half buffers" "$P" "$scene" -q --size 80x80 --block 40 --sampler independent --levels geometric:2:96:1.35 \
-    --reference-spp 0 --sequence guarded/view --name view
-{
-    printf '{"format": "lull-labels", "version": 1, "source": "observer", "detail": "made up", "cap": 10000, "spread": 0.15, "blocks": ['
-    for id in 0 1 2 3; do printf '%s{"id": %d, "threshold": 20, "censored": false}' "$([ $id = 0 ] || echo ,)" $id; done
-    echo ']}'
-} >guarded/view/labels.json
-# held PROCESSES FOLDER OPTIONS...: the table to FOLDER.txt, the figures into FOLDER
-held() {
-    processes=$1 folder=$2; shift 2
-    mpirun --oversubscribe -n "$processes" "$G" evaluate -d guarded -m one.ggn -p visible=0.9 -p gate=0 --recorded --no-quality "$@" \
-        -o "$folder" >"$folder.txt"
-}
-t "the guard's tables by one process" held 1 one-held -p tail=0.6
-t "  …which holds blocks back" sh -c "$G evaluate -d guarded -m one.ggn -p visible=0.9 -p gate=0 --recorded --no-quality -p tail=0 -p gini=0 \
-    -o none-held >none-held.txt && ! cmp one-held/*-stops-oneggn.csv none-held/*-stops-oneggn.csv"
-for processes in 2 3; do
-    t "the guard's tables by $processes processes" held $processes many-held -p tail=0.6
-    t "  …the same tables" same one-held.txt many-held.txt
-    t "  …the same figures" diff -r one-held many-held
-done
 for h in 0 1; do mkdir -p host$h; cp one.ggn host$h/model.ggn; done
 mpi_refused "a.ggn: No such file" 3 "$G" evaluate -d "$data" -m a.ggn
 printf x >>host1/model.ggn

@@ -35,7 +35,7 @@ refused "no criterion nowhere" "$P" "$root/tests/cli/room.pbrt" -q --size 16x16 
 t "  …and nothing is recorded" test ! -e named
 refused "--sequence records blocks: leave out" "$P" "$root/tests/cli/room.pbrt" --explain --sequence none
 t "  …and makes no folder" test ! -e none
-refused "'maybe' is not 0 or 1" "$P" "$root/tests/cli/room.pbrt" -c ggn -p gate=maybe
+refused "'maybe' is not 0 or 1" "$P" "$root/tests/cli/room.pbrt" -c halfbuf -p area=maybe
 refused "--size 32768x32768: expected WxH of at most 2^28 pixels" "$P" "$root/tests/cli/room.pbrt" --size 32768x32768
 
 oiiotool --pattern constant:color=.5,.5,.5 8x8 3 -d float -o clean.exr

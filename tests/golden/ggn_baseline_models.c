@@ -533,11 +533,11 @@ static void described(void **state)
             text,
             kind ? "{\"kind\":\"baseline\",\"method\":\"attributes\",\"width\":24,\"height\":24,\"window\":1,\"first\":0,"
                    "\"support\":5,\"gamma\":0.125,\"rho\":0.33333333333333331,\"policy\":{\"first_spp\":20,\"ratio\":1.25,"
-                   "\"step_spp\":0,\"scale\":1,\"shift\":0,\"threshold\":0.3,\"gate_noise\":0,\"slope\":0,\"tail999\":0,"
-                   "\"gini\":0,\"passes\":1},\"provenance\":{\"blocks\":7}}"
+                   "\"step_spp\":0,\"scale\":1,\"shift\":0,\"threshold\":0.3,\"slope\":0,"
+                   "\"passes\":1},\"provenance\":{\"blocks\":7}}"
                  : "{\"kind\":\"baseline\",\"method\":\"svd-entropy\",\"width\":24,\"height\":24,\"window\":3,\"first\":5,"
                    "\"policy\":{\"first_spp\":20,\"ratio\":1.25,\"step_spp\":0,\"scale\":1,\"shift\":0,\"threshold\":0.3,"
-                   "\"gate_noise\":0,\"slope\":0,\"tail999\":0,\"gini\":0,\"passes\":1},\"provenance\":{\"blocks\":7}}");
+                   "\"slope\":0,\"passes\":1},\"provenance\":{\"blocks\":7}}");
         static const char *const names[] = {"mean", "scale", "coefficient", "support"};
         assert_int_equal(c.n_entries, kind ? 4 : 1);
         for (int i = 0; i < c.n_entries; i++) {

@@ -522,7 +522,7 @@ static void print_series(FILE *f, const struct ggn_series_set *set)
         print_codes(f, "reference", c->reference, values);
         fputc('\n', f);
         for (int k = 0; k < c->n_levels; k += 1 + (i % 3)) {
-            fprintf(f, "  %g: %.4f %.4f", c->spp[k], c->tail999[k], c->gini[k]);
+            fprintf(f, "  %g:", c->spp[k]);
             print_codes(f, "noisy", c->noisy + values * (size_t)k, values);
             if (set->noise_maps && c->has_noise_map[k])
                 print_codes(f, "picture", c->noise_map + values / 3 * (size_t)k, values / 3);

@@ -8,7 +8,7 @@
 #include "support/ggn_near.h"
 
 enum { B = 3, LEVELS = 4, N = B * LEVELS };
-static double spp[N], seconds[N], flip[N], relmse[N], score[N];
+static double spp[N], seconds[N], flip[N], relmse[N];
 static struct ggn_eval_block blocks[B];
 static struct ggn_eval_set set = {
     .n_blocks = B, .n_scenes = 1, .n = N, .blocks = blocks, .spp = spp, .seconds = seconds, .flip = flip, .relmse = relmse};
@@ -52,15 +52,14 @@ static void early(void **state)
 {
     (void)state;
     const double stop[B] = {90, 300, 400}; /* above 0.8 of the first; the last shows twice what is visible */
-    const struct ggn_checks_made checks[B] = {{1, 2}, {0, 3}, {2, 7}};
+    const double checks[B] = {2, 3, 7};
     struct ggn_cost c;
     ggn_cost_of(&set, GGN_SPLIT_TEST, 0, stop, checks, &c);
     assert_near(c.noisy, 1.0, 1e-12);
     assert_near(c.early, 2.0 / 3.0, 1e-12);
     assert_near(c.worst, 2.0, 1e-12);
     assert_near(c.uniform_spp, 400.0, 1e-9);
-    assert_near(c.full, 4.0, 1e-12);
-    assert_near(c.cheap, 1.0, 1e-12);
+    assert_near(c.checks, 4.0, 1e-12);
     assert_near(c.flip, (1 / sqrt(90) + 1 / sqrt(300) + 1.0 / 20) / 3, 1e-12); /* by the law between and before levels */
     assert_near(c.flip_worst, 1 / sqrt(90), 1e-12);
     assert_near(c.relmse, (2.0 / 90 + 2.0 / 300 + 2.0 / 400) / 3, 1e-12);
@@ -70,25 +69,22 @@ static void early(void **state)
     assert_near(1e6 * ggn_cost_path_s(&set, &blocks[2]), 40.0, 1e-9); /* 4 ms for 100 pixels */
 }
 
-/* Checks up to the stop, what the gate answered apart from what the network did. */
+/* Checks up to the stop. */
 static void checks(void **state)
 {
     (void)state;
-    double verdict[N], stop[B] = {1600, 100, 6400};
-    struct ggn_checks_made made[B];
-    struct ggn_method m = {.score = score, .verdict = verdict, .stop = stop};
+    double asked_about[N], stop[B] = {1600, 100, 6400};
+    double made[B];
+    struct ggn_method m = {.score = asked_about, .stop = stop};
     for (int i = 0; i < N; i++)
-        verdict[i] = 0.5;
-    verdict[0] = INFINITY;
-    verdict[1] = (double)NAN; /* not asked */
+        asked_about[i] = 0.5;
+    asked_about[1] = (double)NAN; /* not asked */
     ggn_cost_checks(&m, &set, made);
-    assert_true(made[0].cheap == 1 && made[0].full == 1);
-    assert_true(made[1].cheap == 0 && made[1].full == 1);
-    assert_true(made[2].cheap == 0 && made[2].full == 4);
+    assert_true(made[0] == 2 && made[1] == 1 && made[2] == 4);
     double asked[B] = {5, 6, 7};
     m.asked = asked;
     ggn_cost_checks(&m, &set, made);
-    assert_true(made[2].full == 7 && made[0].cheap == 0);
+    assert_true(made[2] == 7);
 }
 
 int main(void)

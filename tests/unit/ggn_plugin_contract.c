@@ -52,16 +52,6 @@ static int across(const struct other *o) { return o->r->x1 - o->r->x0; }
 
 static int down(const struct other *o) { return o->r->y1 - o->r->y0; }
 
-static double other_noise(void *data)
-{
-    const struct other *o = data;
-    const struct ggn_stopper *s = &o->stopper;
-
-    return o->is_network ? ggn_window_noise(o->codes[0], o->codes[o->images - 1], (size_t)(3 * across(o) * down(o)),
-                                            (double)s->spp[0], (double)s->spp[s->used - 1])
-                         : (double)NAN;
-}
-
 static double other_logit(void *data)
 {
     const struct other *o = data;
@@ -89,30 +79,9 @@ static double other_logit(void *data)
     return logit;
 }
 
-/* |half − mean| · √(h/(n − h)) of the luminance, over the mean luminance. */
-static int other_tail(void *data, double *tail999, double *gini)
-{
-    const struct other *o = data;
-    double noise[VALUES], sum = 0, h = floor((double)o->stopper.asked_spp * 3 / 8), n = (double)o->stopper.asked_spp;
-    size_t count = 0;
-
-    if (!o->is_network)
-        return 0;
-    for (int y = o->r->y0; y < o->r->y1; y++)
-        for (int x = o->r->x0; x < o->r->x1; x++) {
-            sum += gp_host_luminance(gp_host_color[y][x]);
-            noise[count++] =
-                fabs(sqrt(h / (n - h)) * (gp_host_luminance(gp_host_half[y][x]) - gp_host_luminance(gp_host_color[y][x])));
-        }
-    struct seq_tail tail = seq_tail_of(noise, count, sum / (double)count);
-    *tail999 = tail.tail999;
-    *gini = tail.gini;
-    return 1;
-}
-
 static void other_ask(struct other *o, uint64_t spp)
 {
-    const struct ggn_evidence evidence = {o, other_noise, other_logit, other_tail, NULL};
+    const struct ggn_evidence evidence = {o, other_logit, NULL};
 
     if (!ggn_stopper_ask(&o->rule, &o->stopper, spp))
         return;
@@ -274,8 +243,7 @@ static void answers_of_a_baseline(void **state)
 /* What is saved: a header, then of each block its place, its head and the kept bytes; no other criterion's, model's or setting's. */
 static void states(void **state)
 {
-    static const char *const settings[][2] = {{"visible", "0.4"}, {"passes", "2"},    {"gate", "0"}, {"tail", "3"},
-                                              {"gini", "0.7"},    {"first-spp", "9"}, {NULL, NULL}};
+    static const char *const settings[][2] = {{"visible", "0.4"}, {"passes", "2"}, {"first-spp", "9"}, {NULL, NULL}};
     static const char foreign[] = "state: saved by another criterion, model, parameter set or frame";
     const struct lull_criterion *c = &ggn_plugin_ggn;
     const struct lull_frame frame = gp_host_frame(0xff, &gp_host_usual, 0);
@@ -517,9 +485,7 @@ static int setup(void **state)
     policy = ggn_policy_default();
     policy.first_spp = 8;
     policy.ratio = 1.9;
-    policy.gate_noise = 0.05;
     policy.slope = 2;
-    policy.tail999 = 0.06;
     policy.passes = 3;
     policy.scale = 20;
     policy.shift = 2.5;

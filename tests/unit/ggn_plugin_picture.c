@@ -93,7 +93,7 @@ static double asked(uint64_t half_spp, int with_half)
 {
     static const struct lull_host host = {.struct_size = sizeof host, .max_workers = 1};
     const struct lull_criterion *criterion = &ggn_plugin_ggn;
-    const struct lull_pair pairs[] = {{"model", path}, {"gate", "0"}};
+    const struct lull_pair pairs[] = {{"model", path}};
     struct lull_error err = {.struct_size = sizeof err};
     struct lull_requirements need = {.struct_size = sizeof need};
     struct lull_instance *in = NULL;
@@ -111,7 +111,7 @@ static double asked(uint64_t half_spp, int with_half)
                                .rgb_to_xyz = {0, 0, 0, 0.2, 0.7, 0.1, 0, 0, 0}};
     struct lull_decision d = {.p_noisy = (double)NAN};
 
-    if (criterion->create(&host, pairs, 2, sizeof pairs[0], &in, &err) != LULL_OK)
+    if (criterion->create(&host, pairs, 1, sizeof pairs[0], &in, &err) != LULL_OK)
         fail_msg("%s", err.message);
     assert_int_equal(criterion->requirements(in, &need, &err), LULL_OK);
     assert_true(need.planes_used & LULL_PLANE_BIT(LULL_PLANE_HALF));

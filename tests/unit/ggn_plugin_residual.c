@@ -227,30 +227,17 @@ struct show {
     int asked;
 };
 
-static double no_noise(void *data)
-{
-    (void)data;
-    return 1;
-}
-
 static double logit(void *data)
 {
     ((struct show *)data)->asked++;
     return ((struct show *)data)->logit;
 }
 
-static int no_tail(void *data, double *tail999, double *gini)
-{
-    (void)data;
-    *tail999 = *gini = 0;
-    return 0;
-}
-
 static double law(void *data) { return ((struct show *)data)->law; }
 
 static int ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uint64_t spp, struct show *show)
 {
-    const struct ggn_evidence e = {show, no_noise, logit, no_tail, law};
+    const struct ggn_evidence e = {show, logit, law};
     int what = ggn_stopper_ask(rule, s, spp);
 
     if (what)

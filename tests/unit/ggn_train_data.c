@@ -85,7 +85,6 @@ static void extended_levels_continue_the_recording(void **state)
     for (int i = 1; i < set.n; i++) {
         const struct ggn_level_series *c = &set.series[i];
         assert_true(c->n_levels > 17 && c->spp[14] > c->spp[13] && c->spp[c->n_levels - 1] > 1800);
-        assert_true(isnan(c->tail999[14]));
         double e[2] = {0, 0};
         for (size_t v = 0; v < values; v++) {
             /* a level and the next share samples: so do their errors */
@@ -121,7 +120,7 @@ static void simulated_levels_lie_as_far_apart_as_asked(void **state)
             double low = 0, high = 0;
             int half = 0;
             assert_true(c->simulated && c->spp[0] == first && c->spp[end] <= SEQ_SIMULATED_CAP &&
-                        c->spp[end] * wanted[t] > SEQ_SIMULATED_CAP && isnan(c->tail999[0]));
+                        c->spp[end] * wanted[t] > SEQ_SIMULATED_CAP);
             for (int k = 1; k < end; k++)
                 assert_true(c->spp[k] == fmax(c->spp[k - 1] + 1, floor(c->spp[k - 1] * wanted[t] + 0.5)));
             while (c->spp[half] < 100)
