@@ -48,12 +48,6 @@ static const struct base_option list[] = {
      .help = "end after so many validations without a lower loss, 0 = never (lull 8)"},
     {"lr-denoiser", 0, "N", TO(plan.lr_r), 1e-9, 1, .help = "learning rate of the denoiser (lull 1e-3, paper 2e-4)"},
     {"lr", 0, "N", TO(plan.lr), 1e-9, 1, .help = "learning rate of generator and discriminator (lull 1e-3, paper 2e-4)"},
-    {"difference", 0, "N", TO(plan.difference), 0, 1000,
-     .help = "train on gain * (image - newest image), folded away on saving; 0 = off (lull 8)"},
-    {"soft-labels", 0, "N", TO(plan.soft_labels), 0, 1, .help = "1: labels between 0 and 1 near the threshold (lull 1)"},
-    {"flips", 0, "N", TO(plan.flips), 0, 1, .help = "1: windows are flipped and rotated at random (lull 1)"},
-    {"jitter", 0, "N", TO(plan.jitter), 0, 2,
-     .help = "octaves over which the exposure of a window is varied; not with --residual (lull 0.3)"},
     {"picture", 0, "SHARE", TO(plan.noise_map), 0, 1,
      .help = "share of windows that come with the noise picture of their half buffers, 0 = networks without that input; "
              "preset lull only (0)"},

@@ -48,7 +48,7 @@ visible block
 compare cap block
 import block
 label source spread threads
-train preset seed window kr km kd crop batch-denoiser batch steps-denoiser steps epochs epoch-steps patience lr-denoiser lr difference soft-labels flips jitter picture synthetic extend ratio validation-windows early-rate threads
+train preset seed window kr km kd crop batch-denoiser batch steps-denoiser steps epochs epoch-steps patience lr-denoiser lr picture synthetic extend ratio validation-windows early-rate threads
 baseline epochs early ratio window type threads
 evaluate visible early epochs ratio window threads
 cost split precision ratio cadence threads
