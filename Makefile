@@ -126,7 +126,7 @@ GGN_CORE_OBJ := $(call o,$(GGN_SRC)) $(BASE_OBJ)
 GGN_OBJ     := $(GGN_CORE_OBJ) $(call o,$(IMAGES_SRC))
 GGN_PLUGIN_OBJ := $(call o,$(GGN_PLUGIN))
 
-PROGRAMS := $(addprefix $(BIN)/,lull-render ggn lull-study lull-report lull-check)
+PROGRAMS := $(addprefix $(BIN)/,lull-render ggn lull-study lull-plot lull-report lull-check)
 MPI_MODULE := $(if $(MPI),$(OUT)/lib/lull/modules/lull-mpi.so)# loaded only by processes that a launcher has started
 # The host library for renderers (lull/host.h): the file has the major version in its name, programs link the other.
 HOST_LIB := $(OUT)/lib/liblull-host.so.1
@@ -192,8 +192,8 @@ $(BIN)/lull-render: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(IMAGES
 	$(link) $^ $(LDFLAGS_ALL) $(PT_LIBS) -o $@
 $(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_CORE_OBJ) | $(IMAGES)
 	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
-# Its package is found beside it where it is installed, else in the source tree.
-$(BIN)/lull-study: plugin-api/python/lull-study | $(BIN)/ggn
+# Their packages are found beside them where they are installed, else in the source tree.
+$(BIN)/lull-study $(BIN)/lull-plot: plugin-api/python/program | $(BIN)/ggn
 	@install -D -m 755 $< $@
 # Of what both programs stand on the checker takes what it names.
 $(OBJ)/base.a: $(BASE_OBJ)
@@ -398,11 +398,12 @@ INSTALLED = $(call put,$(PREFIX)/bin,755,$(PROGRAMS) scripts/packages/lull-denoi
     $(call put,$(share)/man/man1,644,$(wildcard docs/man/*.1)) $(call put,$(share)/man/man7,644,$(wildcard docs/man/*.7)) \
     $(call put,$(share)/bash-completion/completions,644,$(wildcard scripts/packages/completions/*)) \
     $(call put,$(share)/lull,644,$(wildcard ggn/models/*.ggn)) \
+    $(call put,$(share)/lull/plot,644,$(wildcard plugin-api/python/lull/plot/*.py)) \
     $(call put,$(share)/lull/study,644,$(wildcard $(STUDY)/*.py)) \
     $(call put,$(share)/lull/study/page,644,$(wildcard $(STUDY)/page/*.*)) \
     $(call put,$(share)/lull/study/page/vendor,644,$(wildcard $(STUDY)/page/vendor/*))
 OWN_FOLDERS = $(libdir)/lull/modules $(libdir)/lull $(libdir)/cmake/lull $(PREFIX)/include/lull \
-    $(share)/lull/study/page/vendor $(share)/lull/study/page $(share)/lull/study $(share)/lull
+    $(share)/lull/study/page/vendor $(share)/lull/study/page $(share)/lull/study $(share)/lull/plot $(share)/lull
 # Where LIBDIR is elsewhere, this link: programs find their criteria and modules in ../lib/lull.
 OWN_LINK = $(filter-out $(libdir)/lull,$(PREFIX)/lib/lull)
 PC_FILES := $(OUT)/lull-criterion.pc $(OUT)/lull-host.pc

@@ -18,13 +18,13 @@ struct options {
     int block, json;
 };
 
-static const char *const written[] = {"scatter.png", "errors.png", "heatmaps.png", "blocks.csv", "summary.json", NULL};
+static const char *const written[] = {"blocks.csv", "summary.json", NULL};
 
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
     {"json", 'j', NULL, TO(json), .help = "print the statistics as one JSON object"},
     {"output", 'o', "DIR", TO(dir), .output = BASE_FOLDER, .files = written,
-     .help = "write scatter.png, errors.png, heatmaps.png, blocks.csv and summary.json there"},
+     .help = "write blocks.csv and summary.json there; lull-plot draws the first"},
     {"view", 'v', "NAME", TO(view), .help = "compare with this view of REFERENCE only"},
     {"cap", 'c', "SPP", TO(cap), 1e-9, 1e12, .help = "thresholds at the cap are censored (10000)"},
     {"block", 'b', "PIXELS", TO(block), 1, 32768, .help = "side of a block in an EXR stop map (200)"},
@@ -37,8 +37,11 @@ static int write_outputs(const struct options *o, const struct ggn_pairing *p, c
     struct base_file_out out;
     if (mkdir(o->dir, 0777) != 0 && errno != EEXIST)
         return base_fail(err, BASE_EIO, "%s: %s", o->dir, strerror(errno));
-    int rc = ggn_compare_pictures(o->dir, p, base_file_name(o->paths[0]), base_file_name(o->paths[1]), err);
-    snprintf(path, sizeof path, "%s/summary.json", o->dir);
+    int rc = base_file_join(path, o->dir, "blocks.csv", err);
+    if (!rc)
+        rc = ggn_compare_write_blocks(path, p, err);
+    if (!rc)
+        rc = base_file_join(path, o->dir, "summary.json", err);
     if (!rc)
         rc = base_file_begin(&out, path, err);
     if (rc)

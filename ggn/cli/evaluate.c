@@ -77,7 +77,7 @@ static const struct base_option list[] = {
     {.help = "What comes out:"},
     {"json", 'j', NULL, TO(json), .help = "print the figures as JSON"},
     {"output", 'o', "DIR", TO(out), .output = BASE_FOLDER, .files = written,
-     .help = "write figures.json and pictures there"},
+     .help = "write figures.json, stops and strips of blocks there; lull-plot draws the first"},
     {.help = "How:"},
     {"early", 0, "RATE", TO(early), 0, 1, .help = "early-stop rate that cuts are tuned for on the training scenes (0.05)"},
     {"retune", 0, NULL, TO(retune),
@@ -290,34 +290,57 @@ static void report_changes(const struct evaluation *j, enum ggn_split split, cJS
     }
 }
 
-/* Of every block, where each method stops. */
+/* What each method said of a block's windows. */
+static void report_windows(const struct evaluation *j, const struct ggn_eval_block *block, cJSON *to, int *failed)
+{
+    const struct ggn_eval_set *s = &j->set;
+    cJSON *spp = base_json_array(to, "spp", failed), *noisy = base_json_array(to, "noisy", failed);
+    for (size_t k = block->first; k < block->end; k++) {
+        base_json_number(spp, NULL, ggn_eval_compared(block, s->spp[k]), failed);
+        base_json_number(noisy, NULL, s->noisy[k] < 0 ? (double)NAN : s->noisy[k], failed);
+    }
+    cJSON *scores = base_json_object(to, "scores", failed);
+    for (int i = 0; i < j->n; i++) {
+        cJSON *of = j->methods[i].score ? base_json_array(scores, j->methods[i].name, failed) : NULL;
+        for (size_t k = block->first; k < block->end && of; k++)
+            base_json_number(of, NULL, j->methods[i].score[k], failed);
+    }
+}
+
+/* Of every block, where each method stops, and why. */
 static void report_stops(const struct evaluation *j, cJSON *to, int *failed)
 {
     for (int b = 0; b < j->set.n_blocks; b++) {
         const struct ggn_eval_block *block = &j->set.blocks[b];
         const struct ggn_dataset_view *view = &j->set.images.data.views[block->view];
+        const struct seq_manifest_block *at = &view->manifest.blocks[block->index];
         cJSON *o = base_json_object(to, NULL, failed);
         base_json_text(o, "scene", view->manifest.scene, failed);
         base_json_text(o, "view", view->name, failed);
-        base_json_number(o, "block", view->manifest.blocks[block->index].id, failed);
+        base_json_number(o, "block", at->id, failed);
         base_json_number(o, "threshold", ggn_eval_compared(block, block->label.threshold), failed);
         base_json_bool(o, "censored", block->label.censored, failed);
         cJSON *spp = base_json_object(o, "spp", failed);
         for (int i = 0; i < j->n; i++)
             base_json_number(spp, j->methods[i].name, ggn_eval_compared(block, j->methods[i].stop[b]), failed);
+        base_json_text(o, "split", ggn_split_names[block->split], failed);
+        base_json_number(o, "column", at->x0 / view->manifest.block, failed);
+        base_json_number(o, "row", at->y0 / view->manifest.block, failed);
+        report_windows(j, block, base_json_object(o, "windows", failed), failed);
     }
 }
 
-static int pictures(const struct evaluation *j, enum ggn_split split, struct base_err *err)
+/* What beside the figures goes into the folder: stops, and strips of what the first model's networks make of blocks. */
+static int write_beside(const struct evaluation *j, enum ggn_split split, cJSON *strips, int *failed, struct base_err *err)
 {
     char path[4096];
-    int rc = ggn_report_pictures(j->o->out, &j->set, split, j->methods, j->n, err);
+    int rc = ggn_report_stops(j->o->out, &j->set, split, j->methods, j->n, err);
     if (rc || j->o->n_models == 0 || split == GGN_SPLIT_TRAIN)
         return rc;
     snprintf(path, sizeof path, "%.3900s/%s-denoiser.png", j->o->out, ggn_split_names[split]);
-    rc = ggn_eval_denoiser_picture(path, &j->set, j->models[0], split, err);
+    rc = ggn_eval_denoiser_picture(path, &j->set, j->models[0], split, strips, failed, err);
     snprintf(path, sizeof path, "%.3900s/%s-features.png", j->o->out, ggn_split_names[split]);
-    return !rc ? ggn_eval_feature_picture(path, &j->set, j->models[0], split, err) : rc;
+    return !rc ? ggn_eval_feature_picture(path, &j->set, j->models[0], split, strips, failed, err) : rc;
 }
 
 static int report(struct evaluation *j, int skipped, struct base_err *err)
@@ -333,6 +356,7 @@ static int report(struct evaluation *j, int skipped, struct base_err *err)
     base_json_number(root, "early_rate_tuned_for", j->o->early, &failed);
     base_json_text(root, "tuned_on", ggn_split_names[j->tuning], &failed);
     cJSON *splits = base_json_object(root, "splits", &failed), *changes = base_json_object(root, "changes", &failed);
+    cJSON *strips = j->o->out ? base_json_object(root, "strips", &failed) : NULL;
     int rc = 0;
     if (!j->o->json)
         printf("labels: %s; split: %s; cuts tuned on %s for %.1f %% early stops%s\n",
@@ -352,7 +376,7 @@ static int report(struct evaluation *j, int skipped, struct base_err *err)
         ggn_report_json(base_json_object(splits, ggn_split_names[split], &failed), j->methods, metrics, j->n, &failed);
         report_changes(j, (enum ggn_split)split, base_json_object(changes, ggn_split_names[split], &failed), &failed);
         if (j->o->out)
-            rc = pictures(j, (enum ggn_split)split, err);
+            rc = write_beside(j, (enum ggn_split)split, strips, &failed, err);
     }
     report_stops(j, base_json_array(root, "stops", &failed), &failed);
     if (!rc && j->o->json)

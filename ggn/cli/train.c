@@ -16,7 +16,7 @@ static const struct base_option list[] = {
     {"data", 'd', "DIR", TO(plan.data.dir), .input = BASE_FOLDER, .needed = 1,
      .help = "data set: a folder of recorded, labelled sequences (needed)"},
     {"out", 'o', "FILE", TO(plan.out), .needed = 1, .output = BASE_FILE, .kind = &ggn_container_kind,
-     .help = "model file; FILE.ckpt, .csv, .png and .card.json lie beside it (needed)"},
+     .help = "model file; FILE.ckpt, .csv and .card.json lie beside it (needed)"},
     {"preset", 0, NULL, TO(preset), .words = ggn_preset_names, .help = "networks, procedure and defaults (lull)"},
     {"init", 0, "FILE", TO(plan.init), .input = BASE_FILE, .help = "start from this model"},
     {"resume", 0, NULL, TO(plan.resume), .help = "continue from FILE.ckpt if it is there"},
@@ -75,7 +75,7 @@ static const struct base_option list[] = {
 /* What training leaves beside the model has longer names, and could be what it begins with. */
 static int check_beside(const struct ggn_train_plan *plan, struct base_err *err)
 {
-    static const char *const endings[] = {".ckpt", ".csv", ".png", ".card.json"};
+    static const char *const endings[] = {".ckpt", ".csv", ".card.json"};
     struct base_inputs inputs = BASE_INPUTS_EMPTY;
     char path[4096 + sizeof ".card.json"];
     int rc = plan->init ? base_inputs_add(&inputs, plan->init, err) : 0;

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "base/files.h"
-#include "figures/charts.h"
 
 void ggn_pairing_release(struct ggn_pairing *p)
 {
@@ -122,54 +121,20 @@ static int columns_of(const struct ggn_pair *p)
     return c > 0 ? c : (int)lround(ceil(sqrt((double)p->truth->n)));
 }
 
-int ggn_compare_heatmaps(const char *path, const struct ggn_pairing *p, const char *truth_name, const char *model_name,
-                         struct base_err *err)
-{
-    struct ggn_map_pair *maps = malloc((size_t)p->n_views * sizeof *maps);
-    if (!maps)
-        return base_fail_nomem(err, path);
-    for (int v = 0; v < p->n_views; v++) {
-        const struct ggn_pair *pair = &p->views[v];
-        maps[v] =
-            (struct ggn_map_pair){pair->truth->name, pair->truth->n, columns_of(pair), pair->truth->spp, pair->model->spp};
-    }
-    int rc = ggn_plot_heatmaps(path, maps, p->n_views, truth_name, model_name, err);
-    free(maps);
-    return rc;
-}
-
-static int write_blocks(const char *path, const struct ggn_pairing *p, struct base_err *err)
+int ggn_compare_write_blocks(const char *path, const struct ggn_pairing *p, struct base_err *err)
 {
     struct base_file_out out;
     int rc = base_file_begin(&out, path, err);
     if (rc)
         return rc;
-    fputs("view;block;true_spp;model_spp;log2_error\n", out.file);
+    fputs("view;block;true_spp;model_spp;log2_error;column;row\n", out.file);
     for (int v = 0; v < p->n_views; v++) {
         const struct ggn_view *t = p->views[v].truth, *m = p->views[v].model;
+        const int columns = columns_of(&p->views[v]);
         for (int b = 0; b < t->n; b++)
             if (!isnan(t->spp[b]) && !isnan(m->spp[b]))
-                fprintf(out.file, "%s;%d;%.10g;%.10g;%.4f\n", t->name, b, t->spp[b], m->spp[b], log2(m->spp[b] / t->spp[b]));
+                fprintf(out.file, "%s;%d;%.10g;%.10g;%.4f;%d;%d\n", t->name, b, t->spp[b], m->spp[b],
+                        log2(m->spp[b] / t->spp[b]), b % columns, b / columns);
     }
     return base_file_commit(&out, err);
-}
-
-int ggn_compare_pictures(const char *dir, const struct ggn_pairing *p, const char *truth_name, const char *model_name,
-                         struct base_err *err)
-{
-    char path[4096];
-    int n = snprintf(path, sizeof path, "%s/blocks.csv", dir);
-    if (n < 0 || (size_t)n + 16 >= sizeof path)
-        return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
-    int rc = write_blocks(path, p, err);
-    snprintf(path, sizeof path, "%s/scatter.png", dir);
-    if (!rc)
-        rc = ggn_plot_scatter(path, p->truth, p->model, p->n, truth_name, model_name, err);
-    snprintf(path, sizeof path, "%s/errors.png", dir);
-    if (!rc)
-        rc = ggn_plot_errors(path, p->truth, p->model, p->n, model_name, err);
-    snprintf(path, sizeof path, "%s/heatmaps.png", dir);
-    if (!rc)
-        rc = ggn_compare_heatmaps(path, p, truth_name, model_name, err);
-    return rc;
 }

@@ -1,5 +1,5 @@
 /*
- * Two sets of thresholds side by side: pairing by view and block, figures, pictures.
+ * Two sets of thresholds side by side: pairing by view and block, figures.
  */
 #ifndef GGN_EVAL_COMPARE_H
 #define GGN_EVAL_COMPARE_H
@@ -31,11 +31,7 @@ void ggn_agreement_print_table(FILE *f, const struct ggn_agreement *a);
 /* One JSON object, no newline after it. */
 void ggn_agreement_print_json(FILE *f, const struct ggn_agreement *a);
 
-/* DIR/scatter.png, errors.png, heatmaps.png and blocks.csv. The names are the labels of the two sides. */
-int ggn_compare_pictures(const char *dir, const struct ggn_pairing *p, const char *truth_name, const char *model_name,
-                         struct base_err *err);
-/* The last alone: the true map left, the model's right. */
-int ggn_compare_heatmaps(const char *path, const struct ggn_pairing *p, const char *truth_name, const char *model_name,
-                         struct base_err *err);
+/* A line for each block that both sides have, with its place in the view; where neither side knows that, in a square. */
+int ggn_compare_write_blocks(const char *path, const struct ggn_pairing *p, struct base_err *err);
 
 #endif

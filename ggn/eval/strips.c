@@ -1,14 +1,14 @@
-/* Strips of equal tiles, one under the other. */
+/* Strips of equal tiles, one under the other, pixel for pixel. */
 #include "eval/strips.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
+#include "base/files.h"
+#include "base/json.h"
 #include "eval/viewer.h"
-#include "figures/charts.h"
 #include "model/policy.h"
 #include "nn/ssim.h"
 #include "picture/colour_map.h"
@@ -16,31 +16,33 @@
 
 enum { STRIPS = 4 };
 struct strips {
-    int n;
-    char file[STRIPS][4128]; /* removed at the end */
+    int n, tiles, width, height; /* of a strip: tiles, pixels of one */
+    uint8_t *rgb;                /* owns; [STRIPS][height][tiles * width][3] */
     char title[STRIPS][256];
 };
 
-static int add_strip(struct strips *s, const char *path, const uint8_t *rgb, int w, int h, struct base_err *err)
+static int begin_strips(struct strips *out, const struct ggn_eval_set *s, int tiles, struct base_err *err)
 {
-    snprintf(s->file[s->n], sizeof s->file[0], "%.4000s.part%d.png", path, s->n);
-    int rc = pic_write_png(s->file[s->n], w, h, 3, rgb, err);
-    s->n += !rc;
-    return rc;
+    *out = (struct strips){.tiles = tiles, .width = s->images.width, .height = s->images.height};
+    out->rgb = malloc((size_t)STRIPS * (size_t)tiles * ggn_series_set_values(&s->images));
+    return out->rgb ? 0 : base_fail_nomem(err, "strips");
 }
 
-/* Draws the strips if rc says so; removes their files. */
-static int finish_strips(struct strips *s, const char *path, int width, int height_each, int rc, struct base_err *err)
+/* Room for one more, of title out->title[out->n - 1]. */
+static uint8_t *next_strip(struct strips *s)
 {
-    const char *files[STRIPS], *titles[STRIPS];
-    for (int i = 0; i < s->n; i++) {
-        files[i] = s->file[i];
-        titles[i] = s->title[i];
-    }
+    return s->rgb + (size_t)s->n++ * 3 * (size_t)s->tiles * (size_t)s->width * (size_t)s->height;
+}
+
+/* Writes them if rc says so, and says in `to` what they are called. */
+static int finish_strips(struct strips *s, const char *path, cJSON *to, int *failed, int rc, struct base_err *err)
+{
     if (!rc && s->n > 0)
-        rc = ggn_plot_strips(path, files, titles, s->n, width, height_each, err);
-    for (int i = 0; i < s->n; i++)
-        unlink(s->file[i]);
+        rc = pic_write_png(path, s->tiles * s->width, s->n * s->height, 3, s->rgb, err);
+    cJSON *titles = !rc && s->n > 0 ? base_json_array(to, base_file_name(path), failed) : NULL;
+    for (int i = 0; i < s->n && titles; i++)
+        base_json_text(titles, NULL, s->title[i], failed);
+    free(s->rgb);
     return rc;
 }
 
@@ -62,16 +64,16 @@ static double ssim_of(struct ggn_ssim *ssim, const float *a, const float *b, siz
 }
 
 static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_block *b, struct ggn_viewer *v,
-                          const char *path, struct strips *strips, struct base_err *err)
+                          struct strips *strips, struct base_err *err)
 {
     const struct ggn_level_series *c = &s->images.series[b->series];
     int w = s->images.width, h = s->images.height;
     size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
-    uint8_t *strip = malloc(3 * values);
     float *planes = malloc(3 * values * sizeof *planes);
     struct ggn_ssim *ssim = ggn_ssim_create(h, w, NULL, err);
-    int rc = !strip || !planes || !ssim ? base_fail_nomem(err, path) : 0;
+    int rc = !planes || !ssim ? base_fail_nomem(err, "strips") : 0;
     if (!rc) {
+        uint8_t *strip = next_strip(strips);
         ggn_viewer_turn(v, c);
         const uint16_t *denoised = ggn_viewer_denoise(v, 0);
         for (size_t i = 0; i < values; i++) {
@@ -81,36 +83,35 @@ static int denoiser_strip(const struct ggn_eval_set *s, const struct ggn_eval_bl
         }
         for (int k = 0; k < 3; k++)
             put_tile(strip, 3, k, planes + (size_t)k * values, (size_t)w, (size_t)h);
-        snprintf(strips->title[strips->n], sizeof strips->title[0],
+        snprintf(strips->title[strips->n - 1], sizeof strips->title[0],
                  "%.80s block %u at %.0f spp: SSIM %.3f     denoised: SSIM %.3f     reference",
                  s->images.data.views[b->view].name, b->label.id, c->spp[0],
                  ssim_of(ssim, planes, planes + 2 * values, pixels, w),
                  ssim_of(ssim, planes + values, planes + 2 * values, pixels, w));
-        rc = add_strip(strips, path, strip, 3 * w, h, err);
     }
     ggn_ssim_destroy(ssim);
     free(planes);
-    free(strip);
     return rc;
 }
 
 int ggn_eval_denoiser_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model,
-                              enum ggn_split split, struct base_err *err)
+                              enum ggn_split split, struct cJSON *titles, int *failed, struct base_err *err)
 {
-    struct strips strips = {0};
+    struct strips strips;
     struct ggn_viewer v;
     int last_view = -1, rc = ggn_viewer_init(&v, model, GGN_PRECISION_F32, &s->images, err);
     if (rc)
         return rc;
+    rc = begin_strips(&strips, s, 3, err);
     for (int b = 0; b < s->n_blocks && strips.n < STRIPS && !rc; b++) {
         const struct ggn_eval_block *block = &s->blocks[b];
         if (block->split != split || block->view == last_view || !s->images.series[block->series].reference)
             continue;
         last_view = block->view;
-        rc = denoiser_strip(s, block, &v, path, &strips, err);
+        rc = denoiser_strip(s, block, &v, &strips, err);
     }
     ggn_viewer_release(&v);
-    return finish_strips(&strips, path, 960, 360, rc, err);
+    return finish_strips(&strips, path, titles, failed, rc, err);
 }
 
 /* Grey tile of a feature map, or of the difference of two (black 0), stretched to what it spans. */
@@ -131,16 +132,15 @@ static void put_map(uint8_t *strip, int tiles, int k, const float *a, const floa
 
 /* The window that ends at `level` of a block, as a strip. */
 static int feature_strip(const struct ggn_eval_set *s, const struct ggn_eval_block *b, int level,
-                         const struct ggn_policy *policy, struct ggn_viewer *v, const char *path, struct strips *strips,
-                         struct base_err *err)
+                         const struct ggn_policy *policy, struct ggn_viewer *v, struct strips *strips, struct base_err *err)
 {
     const struct ggn_level_series *c = &s->images.series[b->series];
     int w = s->images.width, h = s->images.height, row;
     size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
-    uint8_t *strip = malloc(4 * values);
     float *planes = malloc((values + 2 * pixels) * sizeof *planes);
-    int rc = !strip || !planes ? base_fail_nomem(err, path) : 0;
+    int rc = !planes ? base_fail_nomem(err, "strips") : 0;
     if (!rc) {
+        uint8_t *strip = next_strip(strips);
         int levels[GGN_WINDOW_MAX];
         for (int i = 0; i < v->window; i++)
             levels[i] = level - v->window + 1 + i;
@@ -158,20 +158,18 @@ static int feature_strip(const struct ggn_eval_set *s, const struct ggn_eval_blo
         put_map(strip, 4, 1, planes + values, NULL, (size_t)w, (size_t)h);
         put_map(strip, 4, 2, planes + values + pixels, NULL, (size_t)w, (size_t)h);
         put_map(strip, 4, 3, planes + values, planes + values + pixels, (size_t)w, (size_t)h);
-        snprintf(strips->title[strips->n], sizeof strips->title[0],
+        snprintf(strips->title[strips->n - 1], sizeof strips->title[0],
                  "%.60s block %u, threshold %.0f: %.0f spp, p(noisy) %.3f   NFM of denoised   NFM of noisy   difference",
                  s->images.data.views[b->view].name, b->label.id, b->label.threshold, c->spp[level], p);
-        rc = add_strip(strips, path, strip, 4 * w, h, err);
     }
     free(planes);
-    free(strip);
     return rc;
 }
 
 int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, const struct ggn_model *model,
-                             enum ggn_split split, struct base_err *err)
+                             enum ggn_split split, struct cJSON *titles, int *failed, struct base_err *err)
 {
-    struct strips strips = {0};
+    struct strips strips;
     struct ggn_policy policy;
     struct ggn_viewer v;
     const struct ggn_eval_block *block = NULL;
@@ -200,8 +198,9 @@ int ggn_eval_feature_picture(const char *path, const struct ggn_eval_set *s, con
     int at[3] = {model->hyper.window - 1, model->hyper.window - 1, c->n_levels - 1};
     while (at[1] + 1 < c->n_levels && c->spp[at[1]] < block->label.threshold)
         at[1]++;
+    rc = begin_strips(&strips, s, 4, err);
     for (int k = 0; k < 3 && !rc; k++)
-        rc = feature_strip(s, block, at[k], &policy, &v, path, &strips, err);
+        rc = feature_strip(s, block, at[k], &policy, &v, &strips, err);
     ggn_viewer_release(&v);
-    return finish_strips(&strips, path, 1100, 320, rc, err);
+    return finish_strips(&strips, path, titles, failed, rc, err);
 }

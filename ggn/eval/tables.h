@@ -1,4 +1,4 @@
-/* What an evaluation says: table, JSON, pictures. */
+/* What an evaluation says: table, JSON, stops. */
 #ifndef GGN_EVAL_TABLES_H
 #define GGN_EVAL_TABLES_H
 
@@ -18,10 +18,8 @@ int ggn_report_people(FILE *f, const struct ggn_eval_set *s, const struct ggn_me
 void ggn_report_json(struct cJSON *to, const struct ggn_method *methods, const struct ggn_method_metrics *metrics, int n,
                      int *failed);
 
-/* Pictures of one split into DIR: SPLIT-roc.png, and for each method SPLIT-errors-K.png, SPLIT-scatter-K.png,
- * SPLIT-heatmaps-K.png, SPLIT-score-K.png where it has scores (against spp, with the thresholds), and its stops as
- * SPLIT-stops-K.csv. */
-int ggn_report_pictures(const char *dir, const struct ggn_eval_set *s, enum ggn_split split,
-                        const struct ggn_method *methods, int n, struct base_err *err);
+/* The stops of one split as DIR/SPLIT-stops-K.csv for each method. */
+int ggn_report_stops(const char *dir, const struct ggn_eval_set *s, enum ggn_split split, const struct ggn_method *methods,
+                     int n, struct base_err *err);
 
 #endif

@@ -97,17 +97,6 @@ int ggn_stats_spearman(const double *x, const double *y, size_t n, double *rho, 
     return rc;
 }
 
-void ggn_stats_line(const double *x, const double *y, size_t n, double *a, double *b)
-{
-    double mx = ggn_stats_mean(x, n), my = ggn_stats_mean(y, n), xy = 0.0, xx = 0.0;
-    for (size_t i = 0; i < n; i++) {
-        xy += (x[i] - mx) * (y[i] - my);
-        xx += (x[i] - mx) * (x[i] - mx);
-    }
-    *b = xx > 0.0 ? xy / xx : (double)NAN;
-    *a = my - *b * mx;
-}
-
 int ggn_stats_auc(const double *score, const unsigned char *label, size_t n, double *auc, struct base_err *err)
 {
     double *rank = malloc((n > 0 ? n : 1) * sizeof *rank), sum = 0.0;

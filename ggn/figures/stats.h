@@ -15,8 +15,6 @@ double ggn_stats_quantile(double *x, size_t n, double q);
 double ggn_stats_pearson(const double *x, const double *y, size_t n);
 /* Pearson of the ranks, ties get their mean rank. BASE_ENOMEM only. */
 int ggn_stats_spearman(const double *x, const double *y, size_t n, double *rho, struct base_err *err);
-/* Least squares y = a + b x. */
-void ggn_stats_line(const double *x, const double *y, size_t n, double *a, double *b);
 
 /* Area under the ROC curve of `score` for telling label 1 from label 0 (Mann-Whitney; ties count half). NaN if one class is
  * empty. BASE_ENOMEM only. */

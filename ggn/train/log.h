@@ -1,4 +1,4 @@
-/* Learning curves: one row per epoch, kept in the checkpoint, written as CSV and drawn. */
+/* Learning curves: one row per epoch, kept in the checkpoint, written as CSV. */
 #ifndef GGN_TRAIN_LOG_H
 #define GGN_TRAIN_LOG_H
 
@@ -21,7 +21,5 @@ struct ggn_log {
 int ggn_log_add(struct ggn_log *log, const struct ggn_log_row *row, struct base_err *err);
 void ggn_log_release(struct ggn_log *log);
 int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct base_err *err);
-/* Needs gnuplot. */
-int ggn_log_draw(const struct ggn_log *log, const char *path, struct base_err *err);
 
 #endif

@@ -24,17 +24,6 @@ static void announce(const struct ggn_session *s)
         fprintf(s->plan->progress, "no validation windows: the last epoch counts and p stays uncalibrated\n");
 }
 
-/* gnuplot is optional: without it there is no picture. */
-static void draw_curves(const struct ggn_session *s)
-{
-    char path[4096];
-    struct base_err err = {0};
-
-    ggn_session_path(s, ".png", path, sizeof path);
-    if (ggn_log_draw(&s->log, path, &err) && s->plan->progress)
-        fprintf(s->plan->progress, "no picture of the learning curves: %s\n", err.text);
-}
-
 /* *path is set to NULL where there is none. */
 static int find_checkpoint(const struct ggn_train_plan *plan, const char **path, int *phase, struct base_err *err)
 {
@@ -69,8 +58,6 @@ int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
         rc = ggn_phase_classifier(&s, checkpoint, err);
     if (!rc)
         rc = ggn_session_finish(&s, err);
-    if (!rc)
-        draw_curves(&s);
     ggn_session_release(&s);
     return rc;
 }

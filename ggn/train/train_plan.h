@@ -13,7 +13,7 @@ enum { GGN_TRAIN_INTERRUPTED = 1 }; /* returned by ggn_train and its phases besi
 
 struct ggn_train_plan {
     struct ggn_series_set_options data;
-    const char *out;  /* model file; OUT.ckpt, OUT.csv, OUT.png and OUT.card.json lie beside it */
+    const char *out;  /* model file; OUT.ckpt, OUT.csv and OUT.card.json lie beside it */
     const char *init; /* model file to start from, or NULL */
     int resume;       /* continue from OUT.ckpt if it is there */
     enum ggn_preset preset;

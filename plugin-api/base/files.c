@@ -239,14 +239,7 @@ static int name_tmp(const char *target, int n, char *tmp_path, size_t room, stru
 
 /* --- writing --- */
 
-int base_file_tmp_name(const char *path, char *tmp_path, size_t room, struct base_err *err)
-{
-    char target[PATH_ROOM];
-    int rc = check_output(path, target, err);
-    return rc ? rc : name_tmp(target, 0, tmp_path, room, err);
-}
-
-int base_file_rename(const char *tmp_path, const char *path, struct base_err *err)
+static int put_in_place(const char *tmp_path, const char *path, struct base_err *err)
 {
     char target[PATH_ROOM];
     int rc = follow(path, target, err);
@@ -333,7 +326,7 @@ int base_file_commit(struct base_file_out *out, struct base_err *err)
         unlink(out->tmp_path);
         return base_fail(err, BASE_EIO, "%s: write failed: %s", out->path, strerror(saved != 0 ? saved : EIO));
     }
-    int rc = base_file_rename(out->tmp_path, out->path, err);
+    int rc = put_in_place(out->tmp_path, out->path, err);
     if (!rc && out->durable)
         sync_folder(out->path);
     return rc;

@@ -63,9 +63,4 @@ int base_file_write_line(const char *path, const char *text, struct base_err *er
 /* Closes and removes the temporary. Safe after commit and on a zeroed object. */
 void base_file_abort(struct base_file_out *out);
 
-/* For programs that write a file by name themselves (gnuplot): checks `path` like base_file_check_output and makes the
- * temporary's name, which keeps the extension of `path`; base_file_rename puts it in place. tmp_path has `room` bytes. */
-int base_file_tmp_name(const char *path, char *tmp_path, size_t room, struct base_err *err);
-int base_file_rename(const char *tmp_path, const char *path, struct base_err *err);
-
 #endif

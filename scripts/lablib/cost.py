@@ -3,7 +3,7 @@
 Every step is kept as soon as it is done: interrupted, --only goes on with the others. Times are processor seconds of all threads, so
 that a busy machine disturbs them less; prices of checks are measured in this run, in real renders. Networks that are not shipped (of
 lab ablation, of the published preset) and baselines that are not (`ggn baseline svd-entropy`) are taken from BUILD/cost/models and
-BUILD/cost. Needs gnuplot and oiiotool."""
+BUILD/cost. Needs matplotlib and oiiotool."""
 import glob
 import json
 import os
@@ -11,8 +11,8 @@ import re
 import resource
 import statistics
 
-from lablib import tool
-from lablib.cost_figures import bare, draw
+from lablib import plots, tool
+from lablib.cost_figures import bare
 from lablib.recordings import link_views, manifest_of, people_views
 from lablib.tool import BUILD, GGN, RENDER, ROOT, Refused, ggn, run
 
@@ -486,6 +486,8 @@ def main(o):
             out.setdefault("measured", {})[step] = tool.measured(level=tool.observer_law(), visible=out["defaults"]["observer"][1])
             tool.save(rounded(out), o.out, "results", "cost.json", separators=(",", ":"))
     if "draw" in steps:
-        draw(o.out, out)
+        plots.charts()  # which says what is missing
+        from lablib import cost_pictures
+        cost_pictures.draw(o.out, out)
         from lablib import pages
         pages.fill(o.out)

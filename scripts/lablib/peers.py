@@ -177,7 +177,6 @@ class Scene:
 
 def cells(path, size):
     """Mean of R + G + B in each cell of the picture, row by row."""
-    sys.path.insert(0, os.path.join(tool.ROOT, "plugin-api", "python"))
     from lull import exr
     plain = path + ".plain.exr"
     tool.run("oiiotool", path, "--ch", "R,G,B", "-d", "float", "--compression", "none", "-o", plain)

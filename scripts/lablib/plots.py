@@ -1,20 +1,22 @@
-"""Pictures by gnuplot."""
+"""Pictures, by the charts of lull-plot."""
 import os
-import subprocess
 
 from lablib.tool import Refused
 
 
-def plot(folder, name, size, script, font="sans,11"):
-    path = os.path.join(folder, name)
-    head = ("set encoding utf8\nset terminal pngcairo size %d,%d noenhanced font '%s' background '#ffffff'\nset output '%s'\n"
-            "set border lc '#444444'\nset grid lc '#dddddd'\nset key noenhanced\nset datafile missing 'nan'\n" % (*size, font, path + ".tmp"))
-    done = subprocess.run(["gnuplot"], input=head + script, text=True, capture_output=True)
-    if done.returncode:
-        raise Refused("%s: %s" % (name, (done.stderr.strip() or "gnuplot failed").splitlines()[-1]))
-    os.replace(path + ".tmp", path)
+def charts():
+    """The module lull.plot.charts; it needs matplotlib, which pages do without."""
+    try:
+        from lull.plot import charts as module
+    except ImportError as why:
+        raise Refused("%s is needed: apt-get install python3-matplotlib python3-numpy" % (why.name or "numpy")) from why
+    return module
 
 
-def data(name, rows):
-    """A block of data under $name; a row is a list of numbers."""
-    return "$%s << E\n%s\nE\n" % (name, "\n".join(" ".join("%g" % v for v in row) for row in rows))
+def draw(folder, name, size, some, across=2):
+    """The picture of `some` charts, side by side in rows of `across`."""
+    module = charts()
+    try:
+        module.draw(os.path.join(folder, name), some, size, across)
+    except module.Refused as why:
+        raise Refused(str(why)) from why

@@ -115,13 +115,14 @@ def parts(r):
 
 
 def draw(folder, r):
+    charts = plots.charts()
     last = max(10.0, *[p[0] for run in r["runs"] for p in run["points"]])
-    data = "".join(plots.data("run%d" % i, [(p[0], p[2]) for p in run["points"]]) for i, run in enumerate(r["runs"]))
-    lines = ["$run%d using 1:2 with linespoints lw 2 pt 7 ps 0.6 lc '%s' title '%s'" % (i, COLOURS[i % len(COLOURS)], run["name"]) for i, run in enumerate(r["runs"])]
-    lines += ['%g with lines dt %d lc "#666666" title "%s"' % (r["judged"][name]["auc"], i + 2, shown)
-              for i, (name, shown) in enumerate(beside(r))]
-    plots.plot(folder, "published-curve.png", (760, 460), data + "set logscale x\nset xrange [0.005:%g]\nset yrange [0.4:1.03]\nset grid\nset key center right\n"
-               "set xlabel 'processor hours'\nset ylabel 'AUC on validation windows'\nplot %s\n" % (2 * last, ", ".join(lines)))
+    series = [charts.Series([p[0] for p in run["points"]], [p[2] for p in run["points"]], run["name"], COLOURS[i % len(COLOURS)], marker="o")
+              for i, run in enumerate(r["runs"])]
+    rules = [charts.Rule("y", r["judged"][name]["auc"], title=shown, line=("--", ":", "-.")[i % 3], colour="#666666")
+             for i, (name, shown) in enumerate(beside(r))]
+    plots.draw(folder, "published-curve.png", (760, 460), [charts.Chart(
+        series, "", "processor hours", "AUC on validation windows", 10, x_range=(0.005, 2 * last), y_range=(0.4, 1.03), rules=rules, key="center right")])
 
 
 def main(o):

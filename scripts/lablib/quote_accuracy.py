@@ -146,14 +146,15 @@ def text(run):
 
 
 def draw(rows, folder):
-    points = [(r["s"], r["said_s"], r["low_s"], r["high_s"], r["role"] == "held") for r in rows]
-    plots.plot(folder, "quote.png", (720, 560), plots.data("d", points) + """set logscale xy; set key top left
-set xlabel 'real thread seconds'; set ylabel 'quoted thread seconds'
-set grid; plot x with lines lc rgb '#888888' title 'exact', x*1.35 with lines dt 2 lc rgb '#888888' title '35 %', \
-x/1.35 with lines dt 2 lc rgb '#888888' notitle, \
-$d using 1:($5==1?$2:1/0):3:4 with yerrorbars pt 7 lc rgb '#1f77b4' title 'not seen in tuning', \
-$d using 1:($5==0?$2:1/0):3:4 with yerrorbars pt 6 lc rgb '#d62728' title 'seen in tuning'
-""")
+    charts = plots.charts()
+    ends = [f(r[k] for r in rows for k in ("s", "low_s", "high_s")) for f in (min, max)]
+    series = [charts.Series(ends, [e * off for e in ends], title, "#888888", line)
+              for off, title, line in ((1, "exact", "-"), (1.35, "35 %", "--"), (1 / 1.35, "", "--"))]
+    for role, title, colour in (("held", "not seen in tuning", "#1f77b4"), ("tuned", "seen in tuning", "#d62728")):
+        mine = [r for r in rows if r["role"] == role]
+        series.append(charts.Series([r["s"] for r in mine], [r["said_s"] for r in mine], title, colour, "", "o", filled=role == "held",
+                                    spans=[(r["low_s"], r["high_s"]) for r in mine]))
+    plots.draw(folder, "quote.png", (720, 560), [charts.Chart(series, "", "real thread seconds", "quoted thread seconds", 10, 10, key="upper left")])
 
 
 def with_walls(result):

@@ -29,11 +29,11 @@ def exponent(points):
 
 
 def draw(kinds, folder, name):
+    charts = plots.charts()
     every = [b for points in kinds.values() for b, _ in points]
-    blocks = "".join(plots.data("d%d" % i, points) for i, points in enumerate(kinds.values()))
-    blocks += plots.data("slope", [(b, b * 1e-8) for b in (min(every), max(every))])
-    clauses = ["$d%d with linespoints pointsize 0.6 linecolor '%s' pointtype %d title '%s: %.2f'"
-               % (i, COLOURS.get(kind.split(":")[0], OTHERS), i % 15 + 1, kind, exponent(points)) for i, (kind, points) in enumerate(kinds.items())]
-    plots.plot(folder, name, (1000, 640), blocks + "set logscale xy\nset xlabel 'size, bytes'\nset ylabel 'processor time of reading, seconds'\n"
-               "set format x '10^%L'\nset format y '10^%L'\nset key outside right center title 'kind, exponent' samplen 2\nplot " + ", ".join(
-                   clauses + ["$slope with lines dashtype 2 linewidth 2 linecolor 'black' title 'slope 1 (100 MB/s)'"]) + "\n", "sans,10")
+    ends = min(every), max(every)
+    series = [charts.Series(*zip(*points), "%s: %.2f" % (kind, exponent(points)), COLOURS.get(kind.split(":")[0], OTHERS), marker="os^vD*Xp<>hdP8H"[i % 15])
+              for i, (kind, points) in enumerate(kinds.items())]
+    series.append(charts.Series(ends, [b * 1e-8 for b in ends], "slope 1 (100 MB/s)", "#000000", "--"))
+    plots.draw(folder, name, (1000, 640), [charts.Chart(series, "", "size, bytes", "processor time of reading, seconds", 10, 10, key="outside",
+                                                        key_title="kind, exponent")])

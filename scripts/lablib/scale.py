@@ -221,11 +221,10 @@ def page(results, name):
 
 
 def draw(rows, path):
-    frames = list(dict.fromkeys(r["frame"] for r in rows))
-    blocks = "".join(plots.data(f"d{i}", [(r["cores"], r["efficiency"]) for r in rows if r["frame"] == f]) for i, f in enumerate(frames))
-    plots.plot(os.path.dirname(path), os.path.basename(path), (900, 500), blocks + "set logscale x\nset xlabel 'cores'\nset ylabel 'efficiency'\n"
-               "set yrange [0:1.05]\nset key bottom left\nset grid\nplot "
-               + ", ".join(f"$d{i} with linespoints lw 2 title '{f}'" for i, f in enumerate(frames)) + "\n")
+    charts = plots.charts()
+    frames = {f: [r for r in rows if r["frame"] == f] for f in dict.fromkeys(r["frame"] for r in rows)}
+    series = [charts.Series([r["cores"] for r in mine], [r["efficiency"] for r in mine], f, marker="o") for f, mine in frames.items()]
+    plots.draw(*os.path.split(path), (900, 500), [charts.Chart(series, "", "cores", "efficiency", 10, y_range=(0, 1.05), key="lower left")])
 
 
 def options(parser):
@@ -236,7 +235,7 @@ def options(parser):
     parser.add_argument("--cores", default="1,2,4,8,16,64,256,1024,4096,10000", help="(%(default)s)")
     parser.add_argument("--threads", type=int, default=64, help="of each process, at most (64)")
     parser.add_argument("--work", type=float, default=1.0, metavar="FACTOR", help="how many times dearer a sample is than in the recordings")
-    parser.add_argument("--png", type=tool.path, metavar="FILE", help="a picture of the efficiency too (gnuplot)")
+    parser.add_argument("--png", type=tool.path, metavar="FILE", help="a picture of the efficiency too")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.add_argument("--here", metavar="SCENE", help="no recordings: render SCENE with 1, 2, 4 and 8 processes of this machine and compare "
                         "with the model, which is fed with the blocks of the first; wants a machine with nothing else to do")

@@ -14,6 +14,7 @@ RENDER = os.path.join(BUILD, "bin", "lull-render")
 SHARED = os.path.join(ROOT, "..", "shared")
 DOCS = os.path.join(ROOT, "docs")
 THREADS = len(os.sched_getaffinity(0))
+sys.path.append(os.path.join(ROOT, "plugin-api", "python"))  # the package lull, of this tree
 
 
 class Refused(Exception):

@@ -135,7 +135,6 @@ def judge(o, scene):
     references = [record(o, scene, seed, o.reference_spp, "--spp") for seed in REFERENCES]
     if not all(folders + references):
         return None
-    sys.path.insert(0, os.path.join(tool.ROOT, "plugin-api", "python"))
     import lull
     reference, found = Reference(*references), {}
     for folder in folders:

@@ -51,13 +51,6 @@ echo '#include <lull/host.h>' | plant ggn/plugin/h.c
 echo 'int h;' | plant plugin-api/include/lull/host.h
 finds "a criterion that hosts" "ggn/plugin/h.c:1: only hosts may see the host library"
 rm "$tmp/t/ggn/plugin/h.c"
-echo 'floors: cli plugin figures nn' | plant ggn/README.md
-echo '#include "figures/plot.h"' | plant ggn/cli/c.c
-echo 'char p[] = "gnuplot";' | plant ggn/figures/plot.h
-finds "a picture's language outside its folder" "ggn/cli/c.c:1: only ggn/figures writes gnuplot: hand figures/charts.h series"
-echo 'char c[] = "gnuplot";' | plant ggn/cli/c.c
-finds "gnuplot started outside its folder" "ggn/cli/c.c:1: only ggn/figures starts gnuplot"
-rm -r "$tmp/t/ggn/cli/c.c" "$tmp/t/ggn/figures"
 rm "$tmp/t/pathtracer/render/c.h"
 echo '#include "shade/c.h"' | plant pathtracer/shade/b.c
 echo '#include "shade/b.h"' | plant pathtracer/shade/c.h

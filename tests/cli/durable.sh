@@ -53,11 +53,6 @@ t "labels" written "" 0 "$G" label labelled
 t "  …too" in_place labelled/labels.json
 t "a picture of ggn" written "" 0 "$G" reconstruct "$data/scene0" -o r.png
 t "  …too" in_place r.png
-if command -v gnuplot >/dev/null; then
-    printf 'a;100;200;400;800;\n' >t.csv
-    t "pictures of gnuplot" written "" 0 "$G" compare t.csv t.csv -o pictures
-    t "  …have their mode" test "$(stat -c %a pictures/* | sort -u)" = 644
-fi
 (umask 077; "$P" "$scene" -q --spp 1 --report private.json)
 t "who wants files to be private has them so" test "$(stat -c %a private.json)" = 600
 echo "1..$n"

@@ -19,8 +19,8 @@ grep -q "judge .*10/20 .*AUC .*windows/s .*ETA" "$tmp/err"
 check "progress has loss, AUC, rate and ETA" $?
 $ggn inspect "$tmp/a.ggn" >"$tmp/out" 2>"$tmp/err" && grep -q "stops below" "$tmp/out"
 check "inspect reads it" $?
-[ "$(wc -l <"$tmp/a.ggn.csv")" -eq 5 ] && [ -s "$tmp/a.ggn.png" ] && grep -q '"labels":.*"observer"' "$tmp/a.ggn.card.json"
-check "curves, picture and card" $?
+[ "$(wc -l <"$tmp/a.ggn.csv")" -eq 5 ] && [ ! -e "$tmp/a.ggn.png" ] && grep -q '"labels":.*"observer"' "$tmp/a.ggn.card.json"
+check "curves and card" $?
 $ggn train $tiny --out "$tmp/b.ggn" --threads 1 -q 2>"$tmp/err" && cmp "$tmp/a.ggn" "$tmp/b.ggn" 2>"$tmp/err"
 check "the same bytes with one thread" $?
 $ggn train $tiny --out "$tmp/c.ggn" --seed 2 -q 2>"$tmp/err" && ! cmp -s "$tmp/a.ggn" "$tmp/c.ggn"

@@ -1,18 +1,10 @@
 #!/bin/sh
 # All that the commands of ggn print and write for small recorded inputs, compared with tests/golden/whole/ggn*.txt (whole.py says how).
-# gnuplot is one that hands its script back as the picture, and keeps the parts of a picture. What is called *.near depends on networks.
+# What is called *.near depends on networks.
 . "$(dirname "$0")/ggn_setup"
 recorded=tests/data/recorded model=tests/data/tiny.ggn
 got=$tmp/got
-mkdir "$tmp/path" "$got"
-cat >"$tmp/path/gnuplot" <<'END'
-#!/bin/sh
-out=$(sed -n "s/^set output '\(.*\)'$/\1/p" "$1")
-cp "$1" "$out"
-for part in "${out%/*}"/*.part?.png; do [ ! -f "$part" ] || cp "$part" "${part%.png}.kept"; done
-END
-chmod +x "$tmp/path/gnuplot"
-PATH=$tmp/path:$PATH
+mkdir "$got"
 ggn=$(pwd)/$ggn
 run() { # run NAME ARGUMENT...: what ggn says, and its exit status
     name=$1
@@ -168,14 +160,6 @@ run compare-constant compare "$tmp/two.csv" "$tmp/two.csv"
 for i in 1 2 3 4 5 6 7; do printf 'v%d;%d;%d;\n' $i $((100 * i)) $((50 * i)) >>"$tmp/many.csv"; done
 sed 's/;1/;2/g' "$tmp/many.csv" >"$tmp/others.csv"
 run compare-many compare "$tmp/many.csv" "$tmp/others.csv" -o "$got/compared-many"
-for i in $(seq 101); do echo "v$i;$i"; done >"$tmp/101.csv"
-"$ggn" compare "$tmp/101.csv" "$tmp/101.csv" -o "$tmp/101" >"$tmp/said" 2>"$tmp/err" && grep -c '<< EOD' "$tmp/101/heatmaps.png" >"$got/compare-101"
-mkdir "$tmp/broken" "$tmp/empty" && printf '#!/bin/sh\nexit 1\n' >"$tmp/broken/gnuplot" && chmod +x "$tmp/broken/gnuplot"
-for where in broken empty; do
-    rm -rf "$tmp/plots"
-    env PATH="$tmp/$where" "$ggn" compare "$tmp/t.csv" "$tmp/m.csv" -o "$tmp/plots" 2>&1
-    echo "exit $?" && ls -A "$tmp/plots"
-done >"$got/compare-gnuplot"
 says compare-errors compare "$tmp/t.csv" "$tmp/q.csv"
 says compare-errors compare "$tmp/t.csv" "$tmp/m.csv" -v zz
 says compare-errors compare "$tmp/t.csv" "$tmp/m.csv" -v d -o "$tmp/none/x"

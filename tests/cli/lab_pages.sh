@@ -14,7 +14,6 @@ t() { # t NAME COMMAND...: passes if the command does
         failed=1
     fi
 }
-skip() { n=$((n + 1)); echo "ok $n - $1 # SKIP $2"; }
 refuses() { # refuses WORDS ARGUMENTS...: status 2 and one line with the words
     words=$1
     shift
@@ -54,14 +53,10 @@ t "other figures make other pages" test "$(cut -d' ' -f3 "$tmp/err" | xargs -n 1
 sed -i 's/"people"/"somebody"/' "$tmp/tree/docs/results/agreement.json"
 t "figures that lack are one line" refuses "results.md: its figures are not whole" pages --docs "$tmp/tree/docs"
 
-if command -v gnuplot >/dev/null; then
-    mkdir -p "$tmp/out/results" && cp docs/results/cost.json "$tmp/out/results"
-    t "lab cost draws from the figures" scripts/lab cost --only draw --out "$tmp/out"
-    t "  …the same page" diff "$tmp/out/cost.md" docs/cost.md
-    t "  …and every picture of it" sh -c 'for p in $(grep -o "](cost-[a-z-]*\.png)" "$1/cost.md" | tr -d "]()"); do [ -s "docs/$p" ] || { echo "$p"; exit 1; }; done' - "$tmp/out"
-else
-    skip "lab cost draws from the figures" "no gnuplot"
-fi
+mkdir -p "$tmp/out/results" && cp docs/results/cost.json "$tmp/out/results"
+t "lab cost draws from the figures" scripts/lab cost --only draw --out "$tmp/out"
+t "  …the same page" diff "$tmp/out/cost.md" docs/cost.md
+t "  …and every picture of it" sh -c 'for p in $(grep -o "](cost-[a-z-]*\.png)" "$1/cost.md" | tr -d "]()"); do [ -s "docs/$p" ] || { echo "$p"; exit 1; }; done' - "$tmp/out"
 mkdir -p "$tmp/some/results" && python3 - "$tmp/some/results/cost.json" <<'P'
 import json, sys
 figures = json.load(open("docs/results/cost.json"))

@@ -98,8 +98,8 @@ done
 echo mine >new.ggn.ckpt
 refused "new.ggn.ckpt: not a model file, it would be replaced" $train new.ggn
 refused "m.ggn: this is an input" "$ggn" train -d "$data" --init m.ggn --out m.ggn
-cp m.ggn begin.ggn.png
-refused "begin.ggn.png: this is an input" "$ggn" train -d "$data" --init begin.ggn.png --out begin.ggn
+cp m.ggn begin.ggn.csv
+refused "begin.ggn.csv: this is an input" "$ggn" train -d "$data" --init begin.ggn.csv --out begin.ggn
 t "a checkpoint replaces a checkpoint, and an empty file" sh -c "for i in 1 2; do $P room.pbrt -q --spp 1 -o k.exr --checkpoint empty.ckp --checkpoint-every 0 || exit 1; done"
 refused "m.ggn: not a checkpoint" "$P" room.pbrt -q -c ggn -p model=m.ggn --checkpoint m.ggn
 cp m.ggn m.png

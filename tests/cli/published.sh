@@ -28,7 +28,7 @@ assert len(run["points"]) == 4 and run["points"][-1][1] == 8 and [p[0] for p in 
 published.draw(sys.argv[1], {"runs": [run], "judged": {"order.ggn": judged, "observer": judged}})
 END
 check "points of all validations in the order of their hours" $?
-! command -v gnuplot >/dev/null || [ -s "$tmp/published-curve.png" ]
+[ -s "$tmp/published-curve.png" ]
 check "  …are drawn" $?
 ! published --only none && [ "$(wc -l <"$tmp/err")" -eq 1 ] && grep -q "only none: expected some of order, rests" "$tmp/err"
 check "no such line" $?

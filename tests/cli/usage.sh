@@ -21,7 +21,7 @@ for c in $commands; do
     check "ggn $c --help, and its manual page names every option" $?
     refused "nonsense" "$bin/ggn" "$c" --nonsense
 done
-for p in ggn lull-check lull-render lull-report lull-study; do
+for p in ggn lull-check lull-plot lull-render lull-report lull-study; do
     "$bin/$p" --version >"$tmp/out" 2>"$tmp/err" && grep -qx "$p (Lull) $("$bin/ggn" --version | sed 's/.* //')" "$tmp/out"
     check "$p --version is the project's" $?
 done

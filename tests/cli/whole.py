@@ -6,9 +6,8 @@ Every file below FOLDER is a section of a record tests/golden/whole/NAME*.txt, c
 missing or is new is a failure. FIRST is the number of the first line of TAP. What a REGEX matches is recorded, and compared, as WORD:
 folders, times, names drawn at random. Long JSON is recorded as tables, a PNG as mean codes.
 
-Which record a section is in follows from what it is: NAME-pictures has the mean codes, NAME-marks what somebody who has read the other
-records need not read, a mark for each; NAME-near and NAME-marks-near have what comes from networks in single precision, whose
-sums each instruction set makes in another order (.near in its name).
+Which record a section is in follows from what it is: NAME-pictures has the mean codes, NAME-near what comes from networks in single
+precision, whose sums each instruction set makes in another order (.near in its name).
 """
 
 import collections
@@ -98,14 +97,10 @@ def laid_out(text):
     return "\n".join(table("", value, set())) + text[end:]
 
 
-READ = re.compile(r".*(json|csv)|compared/|evaluated/people-(roc|.*-observer)[.]png")  # of what is drawn
-
-
 def record_of(name, section, text):
     if PICTURE.match(text):
         return name + "-pictures"
-    is_marked = re.match("(compared|evaluated).*/", section) and not READ.match(section)
-    return name + ("-marks" if is_marked else "") + ("-near" if ".near" in section else "")
+    return name + ("-near" if ".near" in section else "")
 
 
 def compare(name, sections, first):

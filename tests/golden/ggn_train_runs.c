@@ -1,6 +1,6 @@
 /*
  * Whole trainings of tiny networks on made-up blocks that are not square: everything they say and write (progress, learning curves, card,
- * checkpoint, script of the picture, weights) against tests/golden/ggn_train_runs.txt; interrupted after each epoch and resumed, the same
+ * checkpoint, weights) against tests/golden/ggn_train_runs.txt; interrupted after each epoch and resumed, the same
  * bytes; every refusal as a whole line. With the kernels of any processor, so that another one computes the same.
  */
 #define _GNU_SOURCE /* syscall, fopencookie, memmem */
@@ -31,7 +31,7 @@
 
 enum { WIDTH = 24, HEIGHT = 20 };
 
-static char dir[] = "/tmp/ggn_runs.XXXXXX", data[64], bare[64], script[64];
+static char dir[] = "/tmp/ggn_runs.XXXXXX", data[64], bare[64];
 static FILE *report;
 static char *reported;
 static size_t reported_size;
@@ -73,21 +73,6 @@ static void make_views(const char *to, uint32_t reference_spp, double samples_pe
     }
 }
 
-/* gnuplot writes down its script, and an empty picture. */
-static void make_gnuplot(void)
-{
-    char path[96];
-
-    snprintf(path, sizeof path, "%s/gnuplot", dir);
-    FILE *f = fopen(path, "w");
-    assert_non_null(f);
-    snprintf(script, sizeof script, "%s/script", dir);
-    fprintf(f, "#!/bin/sh\n/bin/grep -v '^set output' \"$1\" >%s\n: >\"${1%%.gp}\"\n", script);
-    assert_int_equal(fclose(f), 0);
-    assert_int_equal(chmod(path, 0755), 0);
-    setenv("PATH", dir, 1);
-}
-
 static int setup(void **state)
 {
     (void)state;
@@ -98,7 +83,6 @@ static int setup(void **state)
     snprintf(bare, sizeof bare, "%s/bare", dir);
     make_views(data, 512, 120);
     make_views(bare, 0, 120);
-    make_gnuplot();
     report = open_memstream(&reported, &reported_size);
     return report ? 0 : -1;
 }
@@ -264,7 +248,6 @@ static void run(const char *name, struct ggn_train_plan plan)
         return;
     }
     put_file(path_of(name, ".csv"));
-    put_file(script);
     put_card(path_of(name, ".card.json"));
     put_checkpoint(path_of(name, ".ckpt"));
     put_model(path_of(name, ""));

@@ -12,6 +12,7 @@ t "networks that find their models" "$at/bin/lull-render" $room -c ggn -o "$tmp/
 t "modules that the programs find" sh -c "$at/bin/ggn flip scenes/demo-reference.png scenes/demo-reference.png && [ -x $at/lib/lull/modules/lull-denoiser ]"
 t "a study, with the pictures of ggn and the words of its page" sh -c "$at/bin/lull-study init $tmp/study --task thresholds --views \
     tests/data/recorded/train/one-view0 --asked-by Ada --contact here && [ -s $tmp/study/texts.json ] && [ -s $tmp/study/stimuli/v0/b0-8.png ]"
+t "a picture of numbers" sh -c "printf 'view;block;threshold;censored;stop;score\\na;0;100;0;110;\\na;1;200;0;190;\\n' >$tmp/stops.csv && $at/bin/lull-plot $tmp/stops.csv -o $tmp/stops.png && [ -s $tmp/stops.png ]"
 t "a man page of each program" sh -c "for p in $at/bin/*; do [ -s $at/share/man/man1/\${p##*/}.1 ] || exit 1; done"
 # As people press Tab: $@ are the words of the line, the last one is completed.
 complete() { bash -c 'PATH=$0/bin:$PATH; . $0/share/bash-completion/completions/${1##*/}; COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)); _lull; echo "${COMPREPLY[@]}"' "$at" "$@"; }

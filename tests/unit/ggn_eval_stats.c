@@ -16,7 +16,7 @@ static void correlations(void **state)
 {
     (void)state;
     const double x[] = {1, 2, 3, 4}, y[] = {2, 4, 6, 9}, down[] = {4, 3, 2, 1}, flat[] = {5, 5, 5, 5}, ties[] = {1, 1, 2, 3};
-    double rho, a, b;
+    double rho;
     assert_near(ggn_stats_pearson(x, y, 4), 11.5 / sqrt(5.0 * 26.75), 1e-12);
     assert_near(ggn_stats_pearson(x, down, 4), -1.0, 1e-12);
     assert_true(isnan(ggn_stats_pearson(x, flat, 4)));
@@ -24,9 +24,6 @@ static void correlations(void **state)
     assert_near(rho, 1.0, 1e-12);
     ggn_stats_spearman(x, ties, 4, &rho, NULL); /* ranks 1.5 1.5 3 4 */
     assert_near(rho, 4.5 / sqrt(5.0 * 4.5), 1e-12);
-    ggn_stats_line(x, y, 4, &a, &b);
-    assert_near(b, 2.3, 1e-12);
-    assert_near(a, 5.25 - 2.3 * 2.5, 1e-12);
 }
 
 static void quantiles(void **state)

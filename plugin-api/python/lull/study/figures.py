@@ -7,11 +7,10 @@ import os
 from typing import Iterator, Sequence
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from ..plot.charts import new_figure, save
 from .definition import TWO_INTERVAL, VALIDATION
-from .files import replaced
 from .people import People
 from .psychometric import p_correct
 from .summary import Threshold, estimates, share
@@ -19,15 +18,9 @@ from .summary import Threshold, estimates, share
 BLUE, RED, ACROSS, MOST_CURVES = "#3b6ea5", "#c0504d", 4, 48
 
 
-def _figure(width: int, height: int) -> Figure:
-    figure = Figure(figsize=(width / 100, height / 100), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
 def thresholds_figure(people: People, thresholds: Sequence[Threshold]) -> Figure:
     """Thresholds of all blocks, view after view, with their intervals."""
-    figure = _figure(900, 420)
+    figure = new_figure(900, 420)
     axes = figure.add_subplot(xlabel="block, view after view", ylabel="samples per pixel")
     axes.set_xlim(-0.5, len(thresholds) - 0.5)
     axes.set_yscale("log", base=2)
@@ -39,7 +32,7 @@ def thresholds_figure(people: People, thresholds: Sequence[Threshold]) -> Figure
 
 def people_figure(people: People, thresholds: Sequence[Threshold]) -> Figure:
     """Each person's thresholds against the mean of all; of who does not count, none."""
-    figure = _figure(560, 560)
+    figure = new_figure(560, 560)
     spp = "samples per pixel"
     axes = figure.add_subplot(xlabel="mean over people, " + spp, ylabel="one person, " + spp, box_aspect=1)
     axes.set_xscale("log", base=2)
@@ -57,7 +50,7 @@ def curves_figure(people: People, thresholds: Sequence[Threshold]) -> Figure:
     known = [c for c, t in enumerate(thresholds) if not math.isnan(t.t)][:MOST_CURVES]
     across = min(len(known), ACROSS)
     down = -(-len(known) // across)
-    figure = _figure(250 * across, 240 * down)
+    figure = new_figure(250 * across, 240 * down)
     for i, c in enumerate(known):
         view, block = people.cells[c]
         axes = figure.add_subplot(down, across, i + 1, ylim=(0.35, 1.05), xscale="log")
@@ -74,7 +67,7 @@ def curves_figure(people: People, thresholds: Sequence[Threshold]) -> Figure:
 
 def shares_figure(people: People) -> Figure:
     """Per view and pooled: the share of "same" of each condition with its interval."""
-    study, figure = people.study, _figure(900, 420)
+    study, figure = people.study, new_figure(900, 420)
     rows = [*enumerate(view.name for view in study.views), (None, "(all)")]
     axes = figure.add_subplot(ylabel="judged the same, %", ylim=(0, 100), xlim=(-0.6, len(rows) - 0.4))
     for c, name in enumerate(study.conditions):
@@ -99,5 +92,4 @@ def figures(people: People, thresholds: Sequence[Threshold]) -> Iterator[tuple[s
 
 def write_pictures(folder: str, people: People, thresholds: Sequence[Threshold]) -> None:
     for name, figure in figures(people, thresholds):
-        with replaced(os.path.join(folder, name)) as file:
-            figure.savefig(file.buffer, format="png", metadata={"Software": None})
+        save(figure, os.path.join(folder, name))
