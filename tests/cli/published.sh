@@ -19,7 +19,7 @@ published --only order && [ "$(validations order)" -eq 5 ] && [ "$(validations r
 check "with more hours the one named goes on to its end" $?
 published --table && [ "$(validations rests)" -eq 2 ] && grep -q '^| rests ' "$tmp/table"
 check "--table trains nothing" $?
-PYTHONPATH=scripts python3 -B - "$tmp" <<'END'
+PYTHONPATH=scripts /usr/bin/python3 -B - "$tmp" <<'END'
 import sys
 from lablib import published
 judged = {"auc": 0.9, "early_stop_rate": 0.1, "samples_ratio": 1.1, "median_abs_log2": 0.3}
