@@ -311,10 +311,11 @@ tests: $(TESTS) test-tools
 test-tools: $(ABI_PLUGINS) $(OIDN_STUB) $(OUT)/tests/approve $(OUT)/tests/processors/embree_isa.so # what test scripts need
 replay: $(REPLAY)
 
-# `test` builds in sub-makes so that packages installed by setup are seen by pkg-config.
+# Sub-makes, so that packages installed by setup are seen by pkg-config; by all processors, if no -j says by how many.
+build = $(MAKE) --no-print-directory $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 test: setup ## build everything, run every test; closes with "N passed, N failed"
-	@$(MAKE) --no-print-directory all tests
-	@$(MAKE) --no-print-directory MODE=asan all replay $(SANE)
+	@$(build) all tests
+	@$(build) MODE=asan all replay $(SANE)
 	@BUILD=build tests/run $(patsubst tests/%.c,build/tests/%,$(TEST_SRC)) $(SCRIPT_TEST) \
 	    --processors tests/processors/list \
 	    --asan $(SANE) --replay $(patsubst tests/fuzz/%.c,build/asan/fuzz/replay-%,$(FUZZ_SRC))
@@ -322,11 +323,11 @@ test: setup ## build everything, run every test; closes with "N passed, N failed
 CLANG_TEST := $(patsubst tests/%.c,build/clang/tests/%,$(filter tests/unit/% tests/golden/% tests/abi/%,$(TEST_SRC)))
 test-clang: ## build the product with clang, without a warning, into build/clang, and pass the unit, golden and ABI tests
 	@scripts/setup clang
-	@$(MAKE) --no-print-directory OUT=build/clang CC=clang CXX=clang++ CFLAGS="$(CFLAGS) -Werror" all $(CLANG_TEST)
+	@$(build) OUT=build/clang CC=clang CXX=clang++ CFLAGS="$(CFLAGS) -Werror" all $(CLANG_TEST)
 	@BUILD=build/clang tests/run $(CLANG_TEST)
 
 test-hosts: setup ## install Blender, Mitsuba and bpy as far as they can be had, and test Lull in them
-	@$(MAKE) --no-print-directory all $(ABI_PLUGINS) $(OIDN_STUB)
+	@$(build) all $(ABI_PLUGINS) $(OIDN_STUB)
 	@scripts/hosts/setup
 	@BUILD=build tests/run $(HOST_TEST)
 
@@ -334,11 +335,11 @@ test-packages: all $(OIDN_STUB) ## make, install, use and remove what people ins
 	@BUILD=build JOBS=1 tests/run $(wildcard tests/packages/*.sh)
 
 asan tsan: ## run the unit and ABI tests under the sanitizer
-	@$(MAKE) --no-print-directory MODE=$@ all tests
+	@$(build) MODE=$@ all tests
 	@BUILD=build/$@ tests/run --$@ $(SANE_SRC:tests/%.c=build/$@/tests/%) $(if $(filter tsan,$@),$(wildcard tests/tsan/*.sh))
 
 test-study: setup ## the page of lull-study in Chromium, simulated participants, load, as far as it can be installed
-	@$(MAKE) --no-print-directory $(BIN)/lull-study
+	@$(build) $(BIN)/lull-study
 	@BUILD=build tests/run $(filter-out %/node.sh,$(wildcard tests/study/*.sh))
 
 FUZZ_SECONDS ?= 60
@@ -377,7 +378,7 @@ abi-check: $(OUT)/tests/abi/api_layout ## the layouts of the ABI and the host li
 
 # --- running -------------------------------------------------------------------------------------------------------------
 demo: setup ## install what is missing, build, render a scene with per-block stopping
-	@$(MAKE) --no-print-directory all
+	@$(build) all
 	@scripts/demo
 bench: all $(BENCHES) ## measure speed as ratios, interleaved, against the peers that are installed (docs/speed.md)
 	@scripts/lab bench --write
