@@ -1,13 +1,13 @@
 #include "data/agree.h"
 
-#include <stdio.h>
 #include <zlib.h>
 
+#include "base/identity.h"
 #include "base/inputs.h"
 #include "base/version.h"
 #include "base/isa.h"
 
-static unsigned data_crc(const struct ggn_series_set *set)
+uint32_t ggn_series_set_crc(const struct ggn_series_set *set)
 {
     const size_t values = ggn_series_set_values(set);
     uLong crc = crc32(0, NULL, 0);
@@ -26,7 +26,7 @@ static unsigned data_crc(const struct ggn_series_set *set)
                 crc = crc32_z(crc, c->noise_map + (size_t)k * (values / 3), values / 3);
         }
     }
-    return (unsigned)crc;
+    return (uint32_t)crc;
 }
 
 static int files_crc(const char *const *files, int n, uint32_t *crc, struct base_err *err)
@@ -45,15 +45,21 @@ static int files_crc(const char *const *files, int n, uint32_t *crc, struct base
 int ggn_agree(struct job *job, const struct ggn_series_set *set, const char *const *files, int n_files, int threads,
               struct base_err *err)
 {
+    struct base_identity all = {0};
     uint32_t files_are = 0;
-    char text[512];
 
     if (!job)
         return 0;
     int rc = files_crc(files, n_files, &files_are, err);
     if (rc)
         return rc;
-    snprintf(text, sizeof text, "version=%s\ninstructions=%s (LULL_ISA)\ndata-crc=%08x\nfiles-crc=%08x\n", BASE_VERSION,
-             base_isa_name(base_isa_best()), data_crc(set), (unsigned)files_are);
-    return job_handshake(job, text, threads, err);
+    base_identity_add(&all, "version", "%s", BASE_VERSION);
+    base_identity_add(&all, "instructions", "%s (LULL_ISA)", base_isa_name(base_isa_best()));
+    base_identity_add(&all, "data-crc", "%08x", ggn_series_set_crc(set));
+    base_identity_add(&all, "files-crc", "%08x", files_are);
+    rc = base_identity_check(&all, err);
+    if (!rc)
+        rc = job_handshake(job, all.text, threads, err);
+    base_identity_release(&all);
+    return rc;
 }

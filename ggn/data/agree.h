@@ -5,6 +5,9 @@
 #include "job/job.h"
 #include "data/series.h"
 
+/* CRC-32 of the images and labels. */
+uint32_t ggn_series_set_crc(const struct ggn_series_set *set);
+
 /* The handshake of a job (job/job.h) with what makes its processes compute the same: refuses (BASE_EINVAL) one of another
  * version, with vectors of another length, with other images or labels, or other bytes in files[n_files]. Nothing without
  * a job. */

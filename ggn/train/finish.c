@@ -10,7 +10,6 @@
 #include "observer/observer.h"
 #include "train/fit_policy.h"
 #include "train/phase_classifier.h"
-#include "train/resume.h"
 #include "train/start.h"
 
 /* What a run is made of. The same data, options and seed give the same bytes, so nothing of time or place is in it. */
@@ -39,7 +38,7 @@ static cJSON *describe_run(const struct ggn_session *s, int *failed)
                    {"extended", p->extend},
                    {"best_step", (double)s->progress.best_step},
                    {"divergences", s->progress.divergences},
-                   {"data_key", ggn_resume_key(s)}};
+                   {"data_key", s->data_crc}};
 
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
         base_json_number(o, numbers[i].name, numbers[i].value, failed);

@@ -4,59 +4,19 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <zlib.h>
 
 #include "base/json.h"
 #include "model/container.h"
 
 enum { N_ROW = 10 };
 
-uint32_t ggn_resume_key(const struct ggn_session *s)
+int ggn_resume_identity(const struct ggn_session *s, struct base_identity *to, struct base_err *err)
 {
-    const struct ggn_train_plan *p = s->plan;
-    const double numbers[] = {(double)p->preset,
-                              p->window,
-                              p->k_r,
-                              p->k_m,
-                              p->k_d,
-                              s->crop,
-                              p->batch_r,
-                              p->batch,
-                              p->steps_r,
-                              p->steps,
-                              p->epochs,
-                              p->epoch_steps,
-                              p->patience,
-                              p->lr_r,
-                              p->lr,
-                              p->difference,
-                              p->soft_labels,
-                              p->flips,
-                              p->jitter,
-                              p->noise_map,
-                              p->reach,
-                              p->scalars,
-                              p->painted,
-                              p->synthetic,
-                              p->extend,
-                              p->validation_windows,
-                              p->seed,
-                              s->set.width,
-                              s->set.height,
-                              s->set.n};
-    uLong crc = crc32(0, (const Bytef *)numbers, sizeof numbers);
-
-    for (int i = 0; i < s->set.n; i++) {
-        const struct ggn_level_series *c = &s->set.series[i];
-        const double what[] = {c->split, c->block, c->n_levels, c->has_label ? c->label.threshold : -1};
-        crc = crc32(crc, (const Bytef *)what, sizeof what);
-        if (c->n_levels)
-            crc =
-                crc32(crc, c->noisy, (uInt)(ggn_series_set_values(&s->set) < 4096 ? ggn_series_set_values(&s->set) : 4096));
-    }
-    if (p->init)
-        crc = crc32(crc, (const Bytef *)p->init, (uInt)strlen(p->init));
-    return (uint32_t)crc;
+    base_identity_append(to, &s->plan->identity);
+    base_identity_add(to, "crop", "%d", s->crop);
+    base_identity_add(to, "size", "%dx%d", s->set.width, s->set.height);
+    base_identity_add(to, "data-crc", "%08x", s->data_crc);
+    return base_identity_check(to, err);
 }
 
 /* What the phase changes, as arrays in a fixed order; NULL past the end. */
@@ -100,7 +60,7 @@ static double *row_field(struct ggn_log_row *r, int i)
     return fields[i];
 }
 
-static char *describe(struct ggn_session *s)
+static char *describe(struct ggn_session *s, const struct base_identity *identity)
 {
     const struct ggn_progress *p = &s->progress;
     cJSON *root = cJSON_CreateObject();
@@ -109,8 +69,7 @@ static char *describe(struct ggn_session *s)
     const struct {
         const char *name;
         double value;
-    } numbers[] = {{"key", ggn_resume_key(s)},
-                   {"phase", p->phase},
+    } numbers[] = {{"phase", p->phase},
                    {"step", (double)p->step},
                    {"stale", p->stale},
                    {"divergences", p->divergences},
@@ -126,6 +85,7 @@ static char *describe(struct ggn_session *s)
                    {"t2", (double)s->trainer->adam_t[2]}};
 
     base_json_text(root, "kind", "training", &failed);
+    base_json_text(root, "identity", identity->text, &failed);
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
         base_json_number(root, numbers[i].name, numbers[i].value, &failed);
     for (int i = 0; i < s->log.n; i++) {
@@ -180,11 +140,14 @@ static int restore(struct ggn_session *s, const cJSON *root, const char *path, s
 
 int ggn_resume_save(struct ggn_session *s, const char *path, struct base_err *err)
 {
-    struct ggn_container c = {.json = describe(s)};
+    struct ggn_container c = {0};
+    struct base_identity identity = {0};
     size_t count;
     float *array;
-    int rc = c.json ? 0 : base_fail_nomem(err, "checkpoint");
+    int rc = ggn_resume_identity(s, &identity, err);
 
+    if (!rc && !(c.json = describe(s, &identity)))
+        rc = base_fail_nomem(err, "checkpoint");
     for (int i = 0; !rc && (array = state_array(s, i, &count)); i++) {
         char name[16];
         int dim = (int)count;
@@ -193,6 +156,7 @@ int ggn_resume_save(struct ggn_session *s, const char *path, struct base_err *er
     }
     if (!rc)
         rc = ggn_container_write(&c, path, err);
+    base_identity_release(&identity);
     ggn_container_release(&c);
     return rc;
 }
@@ -229,6 +193,21 @@ int ggn_resume_phase(const char *path, int *phase, struct base_err *err)
     return 0;
 }
 
+static int compare(const struct ggn_session *s, const cJSON *root, const char *path, struct base_err *err)
+{
+    static const struct base_identity_words words = {": made with", ": made without", "this run"};
+    const cJSON *saved = cJSON_GetObjectItemCaseSensitive(root, "identity");
+    struct base_identity identity = {0};
+
+    if (!cJSON_IsString(saved))
+        return base_fail(err, BASE_EINVAL, "%s: made by an earlier version of Lull: train anew, without --resume", path);
+    int rc = ggn_resume_identity(s, &identity, err);
+    if (!rc)
+        rc = base_identity_compare(&identity, saved->valuestring, strlen(saved->valuestring), path, &words, NULL, err);
+    base_identity_release(&identity);
+    return rc;
+}
+
 int ggn_resume_load(struct ggn_session *s, const char *path, struct base_err *err)
 {
     struct ggn_container c = {0};
@@ -239,8 +218,7 @@ int ggn_resume_load(struct ggn_session *s, const char *path, struct base_err *er
 
     if (rc)
         return rc;
-    if (field(root, "key") != ggn_resume_key(s))
-        rc = base_fail(err, BASE_EINVAL, "%s: made with other data or options", path);
+    rc = compare(s, root, path, err);
     for (int i = 0; !rc && (array = state_array(s, i, &count)); i++) {
         char name[16];
         int dim = (int)count;

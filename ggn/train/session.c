@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "data/agree.h"
 #include "nn/hash.h"
 #include "observer/observer.h"
 
@@ -107,6 +108,7 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     rc = ggn_windows_create(&s->train, &s->set, &train, err);
     if (!rc)
         rc = ggn_windows_create(&s->validation, &s->set, &validation, err);
+    s->data_crc = ggn_series_set_crc(&s->set);
     if (!rc)
         rc = check_plan(s, err);
     if (rc)

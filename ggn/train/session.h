@@ -27,6 +27,7 @@ struct ggn_session {
     const struct ggn_train_plan *plan;
     struct base_threads *threads;
     struct ggn_series_set set;
+    uint32_t data_crc; /* of the set */
     struct ggn_windows train, validation;
     int crop;                    /* side of the denoiser's samples */
     struct ggn_hyper hyper;      /* of the model */

@@ -5,6 +5,7 @@
 #include <signal.h>
 #include <stdio.h>
 
+#include "base/identity.h"
 #include "data/series.h"
 #include "model/networks.h"
 
@@ -40,6 +41,7 @@ struct ggn_train_plan {
     double early_rate;      /* share of validation blocks that may be stopped early (ggn_stopping.early_rate) */
     uint32_t seed;
     int threads;                              /* 0: all that the process may use */
+    struct base_identity identity;            /* owns; options that decide the result, for resuming; empty: none */
     FILE *progress;                           /* lines for people, or NULL */
     const volatile sig_atomic_t *interrupted; /* checked between steps, or NULL */
 };

@@ -159,7 +159,7 @@ static int render_image(const struct pt_cli *cli, struct pt_open *o, const char 
     char processor[128];
     struct pt_output_info info = describe(cli, o, quote, processor_name(processor));
     if (cli->checkpoint.resume) {
-        int rc = pt_checkpoint_load(cli->checkpoint.path, o->render, o->settings, err);
+        int rc = pt_checkpoint_load(cli->checkpoint.path, o->render, &o->identity, err);
         if (rc)
             return rc;
     }

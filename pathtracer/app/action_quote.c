@@ -56,7 +56,7 @@ int pt_action_pilot(const struct pt_cli *cli, struct pt_open *o, struct base_log
     base_log_clear(log);
     *status = pt_action_status(outcome);
     if (!rc && cli->checkpoint.path && outcome == PT_RENDER_PILOT)
-        rc = pt_checkpoint_save(cli->checkpoint.path, o->render, o->settings, err);
+        rc = pt_checkpoint_save(cli->checkpoint.path, o->render, &o->identity, err);
     if (!rc && outcome != PT_RENDER_LOST)
         rc = pt_quote_finish(pilot.quote, o->render, err);
     *out = pilot.quote;

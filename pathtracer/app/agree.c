@@ -1,6 +1,5 @@
 #include "agree.h"
 
-#include <stdio.h>
 #include <zlib.h>
 
 #include "base/version.h"
@@ -23,8 +22,7 @@ static int32_t add_to_crc(const struct lull_writer *to, const void *data, uint64
     return LULL_OK;
 }
 
-/* What every process of a job must agree about: the settings, and the model that the criterion starts with. */
-int pt_agree_job(const struct pt_open *o, char *text, size_t room, struct base_err *err)
+int pt_agree_identity(const struct pt_open *o, struct base_identity *to, struct base_err *err)
 {
     uint32_t crc = (uint32_t)crc32(0, NULL, 0);
     struct lull_writer adder = {.struct_size = sizeof adder, .context = &crc, .write = add_to_crc};
@@ -32,13 +30,18 @@ int pt_agree_job(const struct pt_open *o, char *text, size_t room, struct base_e
     int32_t code = o->render && o->criterion ? lull_host_save_history(o->criterion, &adder, &e) : LULL_OK;
     if (code != LULL_OK)
         return pt_host_fail(code, &e, err);
-    snprintf(text, room, "version=%s\n%scriterion-model-crc=%08x\n", BASE_VERSION, o->settings, (unsigned)crc);
-    return 0;
+    base_identity_add(to, "version", "%s", BASE_VERSION);
+    base_identity_append(to, &o->identity);
+    base_identity_add(to, "criterion-model-crc", "%08x", (unsigned)crc);
+    return base_identity_check(to, err);
 }
 
 int pt_agree_handshake(const struct pt_open *o, struct job *job, struct base_err *err)
 {
-    char text[PT_AGREE_JOB];
-    int rc = job ? pt_agree_job(o, text, sizeof text, err) : 0;
-    return rc ? rc : job_handshake(job, text, base_threads_count(o->threads), err);
+    struct base_identity all = {0};
+    int rc = job ? pt_agree_identity(o, &all, err) : 0;
+    if (!rc)
+        rc = job_handshake(job, all.text, base_threads_count(o->threads), err);
+    base_identity_release(&all);
+    return rc;
 }

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/options.h"
 #include "job/job.h"
 #include "pbrt/xform.h"
 #include "render/checkpoint.h"
@@ -209,6 +208,67 @@ static int set_quote_pilot(void *into, const char *value, struct base_err *err)
     return expected(err, "SPP or SPP:SECONDS, samples per pixel from 1, seconds from 0.01");
 }
 
+/* --- what the image depends on: options of several parts, or whose line has another name --------------------------  */
+
+static void tell_uniform(const void *from, struct base_identity *to)
+{
+    base_identity_add(to, "uniform", "%d", ((const struct pt_cli *)from)->render.uniform);
+}
+
+static void tell_block(const void *from, struct base_identity *to)
+{
+    const struct pt_render_config *r = &((const struct pt_cli *)from)->render;
+    base_identity_add(to, "block", "%dx%d", r->block_width, r->block_height);
+}
+
+static void tell_seam(const void *from, struct base_identity *to)
+{
+    base_identity_add(to, "max-seam", "%g", ((const struct pt_cli *)from)->render.max_seam);
+}
+
+static void tell_params(const void *from, struct base_identity *to)
+{
+    const struct pt_cli_params *params = &((const struct pt_cli *)from)->params;
+    for (uint32_t i = 0; i < params->count; i++)
+        base_identity_add(to, "param", "%s=%s", params->list[i].key, params->list[i].value);
+}
+
+static void tell_size(const void *from, struct base_identity *to)
+{
+    const struct pt_render_config *r = &((const struct pt_cli *)from)->render;
+    base_identity_add(to, "size", "%dx%d", r->width, r->height);
+}
+
+static void tell_crop(const void *from, struct base_identity *to)
+{
+    const int *crop = ((const struct pt_cli *)from)->render.crop;
+    base_identity_add(to, "crop", "%d,%d,%d,%d", crop[0], crop[1], crop[2], crop[3]);
+}
+
+static void tell_look_at(const void *from, struct base_identity *to)
+{
+    const struct pt_view *view = &((const struct pt_cli *)from)->load.view;
+    base_identity_add_reals(to, "look-at", view->look_at_world, view->has_look_at ? 9 : 0);
+}
+
+static void tell_light_selection(const void *from, struct base_identity *to)
+{
+    base_identity_add(to, "light-selection", "%s",
+                      pt_light_selection_words[((const struct pt_cli *)from)->load.light_selection]);
+}
+
+static void tell_filter(const void *from, struct base_identity *to)
+{
+    const struct pt_integrator *i = &((const struct pt_cli *)from)->render.integrator;
+    base_identity_add(to, "filter", "%d:%gx%g:%g", i->filter, (double)i->filter_x, (double)i->filter_y,
+                      (double)i->filter_sigma);
+}
+
+static void tell_aov(const void *from, struct base_identity *to)
+{
+    base_identity_add(to, "aov", "%u", ((const struct pt_cli *)from)->render.planes);
+}
+
 /* --- options -------------------------------------------------------------------------------------------------------- */
 
 static const char *const frame_seed_words[] = {"fresh", "fixed", NULL};
@@ -218,7 +278,7 @@ static const char *const exr[] = {"exr", NULL}, *const png[] = {"png", NULL}, *c
 
 #define TO(member) BASE_TO(struct pt_cli, member)
 
-static const struct base_option options[] = {
+const struct base_option pt_cli_options[] = {
     {.help = "When to stop:"},
     {"criterion", 'c', "NAME|PATH[:ID]", TO(criterion),
      .help = "Stopping criterion: a name (see --list-criteria) or a shared object; default observer"},
@@ -228,42 +288,49 @@ static const struct base_option options[] = {
     {"mask", 0, "FILE.png", TO(mask), .input = BASE_FILE, .words = png,
      .help = "A grey picture of the image's size: lighter regions are rendered better. White takes a quarter of the quality "
              "parameter (visible, else threshold), black leaves it; the lightest pixel of a block counts"},
-    {"param", 'p', "KEY=VALUE", .set = set_param, .help = "Parameter of the criterion; may be repeated"},
+    {"param", 'p', "KEY=VALUE", .set = set_param, .role = PT_ROLE_RULE, .tell = tell_params,
+     .help = "Parameter of the criterion; may be repeated"},
     {"list-criteria", 0, NULL, TO(action), PT_CLI_LIST_CRITERIA,
      .help = "List the criteria that are found and their parameters, and exit"},
-    {"spp-min", 0, "N", TO(render.spp_min), 1, INT32_MAX, .help = "Samples per pixel before the first check (default 16)"},
-    {"spp-max", 0, "N", TO(render.spp_max), 1, INT32_MAX,
+    {"spp-min", 0, "N", TO(render.spp_min), 1, INT32_MAX, .role = PT_ROLE_LIMIT,
+     .help = "Samples per pixel before the first check (default 16)"},
+    {"spp-max", 0, "N", TO(render.spp_max), 1, INT32_MAX, .role = PT_ROLE_END,
      .help = "Samples per pixel at which every block stops (default 10000)"},
-    {"spp", 0, "N", TO(spp), 1, INT32_MAX,
+    {"spp", 0, "N", TO(spp), 1, INT32_MAX, .role = BASE_DECIDES, .tell = tell_uniform,
      .help = "The same number of samples everywhere; a criterion, if given, is asked once at the end"},
     {"time-budget", 0, "SECONDS", TO(render.time_budget_s), 0, 1e9, .help = "Stop after so long; 0 = no limit (default)"},
-    {"block", 0, "N|WxH", .set = set_block, .help = "Block size in pixels (default 200)"},
+    {"block", 0, "N|WxH", .set = set_block, .role = BASE_DECIDES, .tell = tell_block,
+     .help = "Block size in pixels (default 200)"},
     {"max-check-overhead", 0, "SHARE", TO(render.max_check_overhead), 0, 1,
      .help = "Leave out checks while they took more than this share of the time, e.g. 0.03; 0 = no bound (default). With a "
              "bound, as with a time budget, the result depends on the clock"},
-    {"max-seam", 0, "RATIO", .set = set_seam,
+    {"max-seam", 0, "RATIO", .set = set_seam, .role = PT_ROLE_LIMIT, .tell = tell_seam,
      .help = "Re-open stopped blocks beside one with more than RATIO times their samples, so that no seam shows; 0 = never "
              "(default)"},
     {.help = "What to render:"},
-    {"size", 0, "WxH", .set = set_size, .help = "Image size, instead of the scene's"},
-    {"crop", 0, "X0,Y0,X1,Y1", .set = set_crop,
+    {"size", 0, "WxH", .set = set_size, .role = BASE_DECIDES, .tell = tell_size,
+     .help = "Image size, instead of the scene's"},
+    {"crop", 0, "X0,Y0,X1,Y1", .set = set_crop, .role = BASE_DECIDES, .tell = tell_crop,
      .help = "Keep only these pixels. Blocks that the crop touches are rendered whole, so that they stop as in the full "
              "image"},
-    {"look-at", 0, "\"EX EY EZ AX AY AZ UX UY UZ\"", .set = set_look_at,
+    {"look-at", 0, "\"EX EY EZ AX AY AZ UX UY UZ\"", .set = set_look_at, .role = BASE_DECIDES, .tell = tell_look_at,
      .help = "Look from E at A with U up, in the scene's world, instead of through the scene's camera"},
-    {"fov", 0, "DEGREES", TO(load.view.fov_deg), 1e-3, 179.9,
+    {"fov", 0, "DEGREES", TO(load.view.fov_deg), 1e-3, 179.9, .role = BASE_DECIDES,
      .help = "Field of view over the image's short side, instead of the scene's"},
-    {"light-selection", 0, NULL, TO(load.light_selection), .words = pt_light_selection_words,
+    {"light-selection", 0, NULL, TO(load.light_selection), .words = pt_light_selection_words, .role = BASE_DECIDES,
+     .tell = tell_light_selection,
      .help = "How next-event estimation picks among many lights (default hierarchy: by distance and orientation too)"},
-    {"sampler", 0, NULL, TO(render.integrator.sampler), .words = pt_sampler_words, .help = "Instead of the scene's"},
-    {"integrator", 0, NULL, TO(render.integrator.strategy), .words = pt_strategy_words,
+    {"sampler", 0, NULL, TO(render.integrator.sampler), .words = pt_sampler_words, .role = BASE_DECIDES,
+     .help = "Instead of the scene's"},
+    {"integrator", 0, NULL, TO(render.integrator.strategy), .words = pt_strategy_words, .role = BASE_DECIDES,
      .help = "path: next-event estimation with multiple importance sampling (default); bsdf-only: brute force, for "
              "checking"},
-    {"max-depth", 0, "N", TO(render.integrator.max_depth), -1, 1000000,
+    {"max-depth", 0, "N", TO(render.integrator.max_depth), -1, 1000000, .role = BASE_DECIDES,
      .help = "Most bounces, instead of the scene's; -1 = unlimited"},
-    {"filter", 0, &(PT_FILTERS(PT_WORD_OR) "[:RADIUS]")[1], .set = set_filter,
+    {"filter", 0, &(PT_FILTERS(PT_WORD_OR) "[:RADIUS]")[1], .set = set_filter, .role = BASE_DECIDES, .tell = tell_filter,
      .help = "Pixel filter, instead of the scene's; radius in pixels"},
-    {"seed", 0, "N", TO(render.integrator.seed), 0, UINT32_MAX, .help = "Seed of all random numbers (default 0)"},
+    {"seed", 0, "N", TO(render.integrator.seed), 0, UINT32_MAX, .role = BASE_DECIDES,
+     .help = "Seed of all random numbers (default 0)"},
     {"effects", 0, NULL, TO(all_effects), .words = effect_words, .help = "all: use the general kernel (same image, slower)"},
     {"strict", 0, NULL, TO(load.strict), .help = "Unsupported scene features are errors"},
     {"threads", 't', "N", TO(threads), 1, 1024,
@@ -286,7 +353,7 @@ static const struct base_option options[] = {
          "block, what was run where"},
     {"quoted", 0, "FILE.json", TO(files.quoted), .input = BASE_FILE, .words = json,
      .help = "What --quote --json printed before: the page compares it with what became of it"},
-    {"aov", 0, "LIST", .set = set_aov, .help = "More layers: albedo,normal,depth"},
+    {"aov", 0, "LIST", .set = set_aov, .role = BASE_DECIDES, .tell = tell_aov, .help = "More layers: albedo,normal,depth"},
     {"denoise", 0, "blend|full", .set = set_denoise, .optional = 1,
      .help =
          "Keep the denoised picture, and stop blocks by what is seen of it (criterion denoised): blend (default) keeps as "
@@ -512,7 +579,7 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err
                "Exit status: 0 done, 1 memory ran out, 2 bad input or an output could not be written, 130 interrupted "
                "(everything is written all the same).",
         .args_doc = "SCENE.pbrt",
-        .list = options,
+        .list = pt_cli_options,
         .args_max = 1,
         .args = offsetof(struct pt_cli, scene),
         .args_are = BASE_ARGS_FILES,

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "base/err.h"
+#include "base/options.h"
 #include "base/outputs.h"
 #include "pbrt/load_options.h"
 #include "render/denoised.h"
@@ -82,6 +83,10 @@ struct pt_cli {
 /* Fills *cli (zeroed first). --help, --version and --usage print and exit. BASE_EINVAL with one line in err otherwise. */
 int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err);
 void pt_cli_release(struct pt_cli *cli);
+
+/* The table of the options: roles and lines of the identity, too, of a command line in which the scene's own settings stand
+ * where it says nothing. */
+extern const struct base_option pt_cli_options[];
 
 /* It is about the frames of a shot. */
 int pt_cli_is_shot(const struct pt_cli *cli);

@@ -166,45 +166,31 @@ static int check_outputs(struct pt_cli *cli, const struct pt_open *o, struct bas
     return rc ? rc : protect_parameters(cli, err);
 }
 
-/* --- settings ------------------------------------------------------------------------------------------------------- */
+/* --- identity ------------------------------------------------------------------------------------------------------- */
 
-/* Everything that decides the bytes of the image, and nothing else, as lines of key=value. A criterion's model is in its
- * saved state. */
-static int write_settings(const struct pt_cli *cli, struct pt_open *o, struct base_err *err)
+/* Everything that decides the bytes of the image, and nothing else: the options, with the scene's own settings where they
+ * say nothing, and what was read. A criterion's model is in its saved state. */
+static int identify(const struct pt_cli *cli, struct pt_open *o, struct base_err *err)
 {
+    struct base_identity *id = &o->identity;
+    struct pt_cli all = *cli;
+    const struct pt_integrator *i = &o->config.integrator;
+    const struct lull_criterion *t = o->criterion ? lull_host_table(o->criterion) : NULL;
     uint32_t scene_crc = 0, judging_crc = 0;
     int rc = base_inputs_crc32(&o->scene_files, &scene_crc, err);
     if (!rc)
         rc = base_inputs_crc32(&o->judging, &judging_crc, err);
     if (rc)
         return rc;
-    const struct pt_render_config *c = &o->config;
-    const struct pt_integrator *i = &c->integrator;
-    size_t room = sizeof o->settings,
-           used = (size_t)snprintf(o->settings, room,
-                                   "scene-crc=%08x\nsize=%dx%d\ncrop=%d,%d,%d,%d\nblock=%dx%d\nspp-min=%llu\nspp-max=%"
-                                   "llu\nuniform=%d\nmax-seam=%g\n"
-                                   "aov=%u\nseed=%u\nsampler=%d\nsampler-version=%d\nintegrator=%d\nfilter=%d:%gx%g:%g\n"
-                                   "light-selection=%s\nmax-depth=%d\nrr-depth=%d\nclamp=%g\n",
-                                   scene_crc, c->width, c->height, c->crop[0], c->crop[1], c->crop[2], c->crop[3],
-                                   c->block_width, c->block_height, (unsigned long long)c->spp_min,
-                                   (unsigned long long)c->spp_max, c->uniform, c->max_seam, c->planes, i->seed, i->sampler,
-                                   PT_SAMPLER_VERSION, i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y,
-                                   (double)i->filter_sigma, pt_light_selection_words[cli->load.light_selection],
-                                   i->max_depth, i->rr_depth, (double)i->max_component);
-    const struct pt_view *view = &cli->load.view;
-    used += (size_t)snprintf(o->settings + used, room - used, "fov=%.17g\nlook-at=", view->fov_deg);
-    for (int k = 0; view->has_look_at && k < 9; k++)
-        used += (size_t)snprintf(o->settings + used, room - used, "%.17g ", view->look_at_world[k]);
-    const struct lull_criterion *t = o->criterion ? lull_host_table(o->criterion) : NULL;
-    used +=
-        (size_t)snprintf(o->settings + used, room - used, "\ncriterion=%s %s\n", t ? t->id : "none", t ? t->version : "");
-    if (used < room)
-        used += (size_t)snprintf(o->settings + used, room - used, "plugin-and-mask-crc=%08x\n", judging_crc);
-    for (uint32_t k = 0; k < cli->params.count && used < room; k++)
-        used += (size_t)snprintf(o->settings + used, room - used, "param=%s=%s\n", cli->params.list[k].key,
-                                 cli->params.list[k].value);
-    return used < room ? 0 : base_fail(err, BASE_EINVAL, "the criterion's parameters are too long");
+    all.render = o->config;
+    base_identity_add(id, "scene-crc", "%08x", scene_crc);
+    base_options_identify(pt_cli_options, &all, id);
+    base_identity_add(id, "sampler-version", "%d", PT_SAMPLER_VERSION);
+    base_identity_add(id, "rr-depth", "%d", i->rr_depth);
+    base_identity_add(id, "clamp", "%g", (double)i->max_component);
+    base_identity_add(id, "criterion", "%s %s", t ? t->id : "none", t ? t->version : "");
+    base_identity_add(id, "plugin-and-mask-crc", "%08x", judging_crc);
+    return base_identity_check(id, err);
 }
 
 /* --- render --------------------------------------------------------------------------------------------------------- */
@@ -227,7 +213,7 @@ int pt_open_render(struct pt_cli *cli, struct job *job, struct base_log *log, st
     if (!rc && !records && job_rank(job) == 0) /* the others write nothing */
         rc = check_outputs(cli, o, err);
     if (!rc && (cli->checkpoint.path || job))
-        rc = write_settings(cli, o, err);
+        rc = identify(cli, o, err);
     return rc || records ? rc : pt_render_create(c, o->scene, o->kernel, o->threads, o->criterion, &o->render, err);
 }
 
@@ -240,4 +226,5 @@ void pt_open_release(struct pt_open *o)
     base_threads_destroy(o->threads);
     base_inputs_release(&o->scene_files);
     base_inputs_release(&o->judging);
+    base_identity_release(&o->identity);
 }

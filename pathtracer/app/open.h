@@ -30,8 +30,8 @@ struct pt_open {
     struct lull_plane mask;                /* data NULL: none */
     const struct pt_cli_params *params;    /* borrows; of the criterion, as given */
     struct lull_host_criterion *criterion; /* NULL: uniform, or a recording that asks none */
-    char settings[4096];      /* what decides the image, for checkpoints and other processes; "" when there are none */
-    struct pt_render *render; /* of an image or its quote */
+    struct base_identity identity;         /* of the image, for checkpoints and other processes; empty without */
+    struct pt_render *render;              /* of an image or its quote */
 };
 
 /* Threads and scene. job: NULL = this process is alone. BASE_EINVAL when an input is not as it should be; *out may be

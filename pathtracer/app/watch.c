@@ -74,7 +74,7 @@ void pt_watch_end(struct pt_watch *w)
 static void save_now_and_then(struct pt_watch *w, const struct pt_render *render)
 {
     struct base_err why = {0};
-    if (pt_checkpoint_save(w->checkpoint->path, render, w->open->settings, &why) != 0)
+    if (pt_checkpoint_save(w->checkpoint->path, render, &w->open->identity, &why) != 0)
         base_log_say(w->log, "no checkpoint, the render goes on: %s", why.text);
     w->checkpoint_at_s = base_clock_wall_s() + w->checkpoint->every_s;
 }
@@ -146,7 +146,7 @@ static int after_slice(void *data, struct pt_render *render, struct base_err *er
 static int suspend(void *data, struct pt_render *render, struct base_err *err)
 {
     const struct pt_watch *w = data;
-    return w->checkpoint->path ? pt_checkpoint_save(w->checkpoint->path, render, w->open->settings, err) : 0;
+    return w->checkpoint->path ? pt_checkpoint_save(w->checkpoint->path, render, &w->open->identity, err) : 0;
 }
 
 struct pt_render_hooks pt_watch_hooks(struct pt_watch *w)

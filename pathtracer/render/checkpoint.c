@@ -9,7 +9,7 @@
 #include "render/host.h"
 
 /*
- * magic[8], settings bytes, settings; film bytes, film arrays; the state of the frame (lull_host_save); crc32 of all before.
+ * magic[8], identity bytes, identity; film bytes, film arrays; the state of the frame (lull_host_save); crc32 of all before.
  * Counts are u64.
  */
 const struct base_file_kind pt_checkpoint_kind = {"checkpoint", {'L', 'U', 'L', 'L', 'C', 'K', 'P', '1'}};
@@ -44,7 +44,8 @@ static int32_t put_state(const struct lull_writer *writer, const void *data, uin
     return LULL_OK;
 }
 
-int pt_checkpoint_save(const char *path, const struct pt_render *r, const char *settings, struct base_err *err)
+int pt_checkpoint_save(const char *path, const struct pt_render *r, const struct base_identity *identity,
+                       struct base_err *err)
 {
     struct base_file_out out;
     int rc = base_file_begin(&out, path, err);
@@ -53,8 +54,8 @@ int pt_checkpoint_save(const char *path, const struct pt_render *r, const char *
     out.durable = 1;
     struct sink s = {.file = out.file, .crc = (uint32_t)crc32(0, NULL, 0)};
     put(&s, pt_checkpoint_kind.magic, sizeof pt_checkpoint_kind.magic);
-    put_count(&s, strlen(settings));
-    put(&s, settings, strlen(settings));
+    put_count(&s, identity->size);
+    put(&s, identity->text, identity->size);
     put_count(&s, r->film.bytes);
     struct pt_film_array arrays[PT_FILM_ARRAYS];
     int n = pt_film_list_arrays(&r->film, arrays);
@@ -88,75 +89,18 @@ static int take(struct source *s, void *data, size_t size, struct base_err *err)
     return 0;
 }
 
-/* Settings that do not change samples, only how many there are. */
-static const char *const free_keys[] = {"spp-min", "spp-max", "max-seam", "param"};
-enum { SPP_MAX = 1, PARAM = 3, FREE_KEYS };
-
-struct settings {
-    char *fixed, *free[FREE_KEYS]; /* lines by key, in memory that `fixed` owns */
-};
-
-/* Appends the lines of text[0, size) whose key is free_keys[which], or none of them. */
-static char *copy_lines(char *to, const char *text, size_t size, int which)
+/* others: what differs of what may, bits 1 << role */
+static int take_identity(struct source *s, const struct base_identity *present, unsigned *others, struct base_err *err)
 {
-    for (const char *at = text, *end = text + size, *next; at < end; at = next) {
-        const char *newline = memchr(at, '\n', (size_t)(end - at));
-        int key = 0;
-        next = newline ? newline + 1 : end;
-        while (key < FREE_KEYS && strncmp(at, free_keys[key], strlen(free_keys[key])) != 0)
-            key++;
-        if (key != which)
-            continue;
-        memcpy(to, at, (size_t)(next - at));
-        to += next - at;
-    }
-    *to = '\0';
-    return to + 1;
-}
-
-static int split_settings(const char *text, size_t size, struct settings *out, struct base_err *err)
-{
-    char *at = out->fixed = malloc(size + FREE_KEYS + 1);
-    if (!at)
-        return base_fail_nomem(err, "settings");
-    at = copy_lines(at, text, size, FREE_KEYS);
-    for (int key = 0; key < FREE_KEYS; key++)
-        at = copy_lines(out->free[key] = at, text, size, key);
-    return 0;
-}
-
-/* others: PT_RENDER_OTHER_ */
-static int compare_settings(const char *path, const struct settings *saved, const struct settings *present, int *others,
-                            struct base_err *err)
-{
-    struct lull_error e = {.struct_size = sizeof e};
-    int32_t code = lull_host_same_identity(saved->fixed, strlen(saved->fixed), present->fixed, path, &e);
-    if (code != LULL_OK)
-        return pt_host_fail(code, &e, err);
-    *others = 0;
-    for (int key = 0; key < FREE_KEYS; key++)
-        if (key != SPP_MAX && strcmp(saved->free[key], present->free[key]) != 0)
-            *others |= key == PARAM ? PT_RENDER_OTHER_RULE : PT_RENDER_OTHER_LIMITS;
-    return 0;
-}
-
-static int take_settings(struct source *s, const char *text, int *others, struct base_err *err)
-{
+    static const struct base_identity_words words = {": made with", ": made without", "this render"};
     uint64_t n = 0;
-    struct settings saved = {0}, present = {0};
     int rc = take(s, &n, sizeof n, err);
-    if (rc)
-        return rc;
-    if (n > s->size - s->at)
-        return base_fail(err, BASE_EINVAL, "%s: the checkpoint is too short", s->path);
-    rc = split_settings((const char *)s->data + s->at, (size_t)n, &saved, err);
+    if (!rc && n > s->size - s->at)
+        rc = base_fail(err, BASE_EINVAL, "%s: the checkpoint is too short", s->path);
     if (!rc)
-        rc = split_settings(text, strlen(text), &present, err);
+        rc = base_identity_compare(present, (const char *)s->data + s->at, (size_t)n, s->path, &words, others, err);
     if (!rc)
-        rc = compare_settings(s->path, &saved, &present, others, err);
-    free(saved.fixed);
-    free(present.fixed);
-    s->at += (size_t)n;
+        s->at += (size_t)n;
     return rc;
 }
 
@@ -174,15 +118,15 @@ static int take_film(struct source *s, const struct pt_film *film, struct base_e
 }
 
 /* Other parameters of the criterion may not understand its history: it begins anew. */
-static int take_state(struct source *s, struct lull_host_frame *frame, int others, struct base_err *err)
+static int take_state(struct source *s, struct lull_host_frame *frame, unsigned others, struct base_err *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
-    int32_t code = (others & PT_RENDER_OTHER_RULE ? lull_host_load_blocks : lull_host_load)(frame, s->data + s->at,
-                                                                                            s->size - s->at, s->path, &e);
+    int32_t code = (others >> PT_ROLE_RULE & 1 ? lull_host_load_blocks : lull_host_load)(frame, s->data + s->at,
+                                                                                         s->size - s->at, s->path, &e);
     return code == LULL_OK ? 0 : pt_host_fail(code, &e, err);
 }
 
-int pt_checkpoint_load(const char *path, struct pt_render *r, const char *settings, struct base_err *err)
+int pt_checkpoint_load(const char *path, struct pt_render *r, const struct base_identity *identity, struct base_err *err)
 {
     char *data = NULL;
     size_t size = 0;
@@ -202,8 +146,8 @@ int pt_checkpoint_load(const char *path, struct pt_render *r, const char *settin
     }
     struct source s = {.path = path, .data = (const unsigned char *)data, .at = begin, .size = size - sizeof crc};
     const uint64_t first_spp = r->blocks->list[0].next_spp;
-    int others = 0;
-    rc = take_settings(&s, settings, &others, err);
+    unsigned others = 0;
+    rc = take_identity(&s, identity, &others, err);
     if (!rc)
         rc = take_film(&s, &r->film, err);
     if (!rc)

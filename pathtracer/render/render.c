@@ -163,10 +163,10 @@ void pt_render_plan(struct pt_render *r, const uint32_t *spp)
 }
 
 /* Another rule is asked about every block as it is, in the place of the last answer if that was about as many samples. */
-static void reschedule(const struct lull_host_blocks *blocks, struct lull_host_block *b, int others, uint64_t first_spp)
+static void reschedule(const struct lull_host_blocks *blocks, struct lull_host_block *b, unsigned others, uint64_t first_spp)
 {
     const int judged = b->reason == LULL_REASON_CRITERION || b->reason == LULL_REASON_DROPPED;
-    const int asks = (others & PT_RENDER_OTHER_RULE) && b->checks > 0;
+    const int asks = (others >> PT_ROLE_RULE & 1) && b->checks > 0;
     if (judged && (asks || b->spp < blocks->spp_min))
         b->reason = LULL_REASON_NONE;
     if (b->reason != LULL_REASON_NONE)
@@ -185,13 +185,13 @@ static void reschedule(const struct lull_host_blocks *blocks, struct lull_host_b
         b->next_spp = b->spp;
 }
 
-void pt_render_go_on(struct pt_render *r, int others, uint64_t first_spp)
+void pt_render_go_on(struct pt_render *r, unsigned others, uint64_t first_spp)
 {
     struct lull_host_blocks *blocks = r->blocks;
     lull_host_extend(blocks);
-    for (uint32_t i = 0; others && i < blocks->count && !r->config.uniform; i++)
+    for (uint32_t i = 0; (others & ~(1u << PT_ROLE_END)) && i < blocks->count && !r->config.uniform; i++)
         reschedule(blocks, &blocks->list[i], others, first_spp);
-    if ((others & PT_RENDER_OTHER_LIMITS) && r->config.max_seam >= 1.0)
+    if ((others >> PT_ROLE_LIMIT & 1) && r->config.max_seam >= 1.0)
         lull_host_reopen(blocks, r->config.max_seam);
 }
 

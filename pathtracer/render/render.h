@@ -14,6 +14,7 @@
 #include <stdint.h>
 
 #include "base/err.h"
+#include "base/identity.h"
 #include "base/log.h"
 #include "base/threads.h"
 #include "integ/integrator.h"
@@ -88,12 +89,15 @@ void pt_render_destroy(struct pt_render *render);
 /* Of a uniform render: block i gets spp[i] samples instead, 1 … spp_max. To be said again after a state was loaded. */
 void pt_render_plan(struct pt_render *render, const uint32_t *spp);
 
-/* What differs from the settings that a loaded state was made with. */
-#define PT_RENDER_OTHER_LIMITS 1 /* besides the most samples and the time */
-#define PT_RENDER_OTHER_RULE 2   /* parameters of the criterion */
-/* After a state was loaded, whose most samples may have been others: what these settings would not have stopped is active
- * again. first_spp: where a fresh render of these settings has its first check. */
-void pt_render_go_on(struct pt_render *render, int others, uint64_t first_spp);
+/* Options that may differ when a render goes on: they change no sample, only how many there are (base_option.role). */
+enum pt_role {
+    PT_ROLE_END = BASE_OWN_ROLE, /* the most samples */
+    PT_ROLE_LIMIT,               /* where else blocks are checked and re-opened */
+    PT_ROLE_RULE                 /* parameters of the criterion */
+};
+/* After a state was loaded, whose most samples may have been others: what these options would not have stopped is active
+ * again. others: 1 << role of those that differ. first_spp: where a fresh render of these has its first check. */
+void pt_render_go_on(struct pt_render *render, unsigned others, uint64_t first_spp);
 
 /* Renders until all blocks are stopped, time is up, a pilot is over, or *interrupted is set. A pilot leaves the render
  * as it is between two slices: going on gives what it would have been without. */

@@ -130,6 +130,23 @@ static void describe(struct recorder *r)
     m->reference_independent = 1;
 }
 
+static int compare(const struct recorder *r, const char *path, const struct seq_manifest *old, struct base_err *err)
+{
+    static const struct base_identity_words words = {": begun with", ": begun without", "this render"};
+    struct base_identity ours = {0}, theirs = {0};
+    struct base_err why = {0};
+    seq_manifest_identity(&r->manifest, &ours);
+    seq_manifest_identity(old, &theirs);
+    int rc = base_identity_check(&ours, err);
+    if (!rc)
+        rc = base_identity_check(&theirs, err);
+    if (!rc && base_identity_compare(&ours, theirs.text, theirs.size, path, &words, NULL, &why) != 0)
+        rc = base_fail(err, why.code, "%s; use another folder", why.text);
+    base_identity_release(&ours);
+    base_identity_release(&theirs);
+    return rc;
+}
+
 /* Takes over the finished blocks of an earlier run and unmarks them. */
 static int resume(struct recorder *r, struct base_err *err)
 {
@@ -141,9 +158,9 @@ static int resume(struct recorder *r, struct base_err *err)
         return rc;
     if ((rc = seq_manifest_read(r->config->directory, &old, err)) != 0)
         return rc;
-    const char *member = seq_manifest_difference(&r->manifest, &old);
-    if (member)
-        rc = base_fail(err, BASE_EINVAL, "%s: this sequence was begun with another %s; use another folder", path, member);
+    if (old.inputs_crc32 == 0) /* recorded before it was noted */
+        old.inputs_crc32 = r->manifest.inputs_crc32;
+    rc = compare(r, path, &old, err);
     for (uint32_t i = 0; i < old.n_blocks && !rc; i++) {
         struct seq_block b;
         if (old.blocks[i].id >= r->grid->count || seq_manifest_read_block(r->config->directory, &old, i, &b, NULL) != 0)

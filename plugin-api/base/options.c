@@ -151,6 +151,39 @@ static const struct base_option *find(const struct base_option *list, int key)
     return NULL;
 }
 
+/* --- identity --- */
+
+static void add_option(struct base_identity *id, const struct base_option *o, const void *from)
+{
+    const void *at = (const char *)from + o->to.offset;
+    switch (o->to.type) {
+    case BASE_STORE_INT: base_identity_add(id, o->name, "%d", *(const int *)at); return;
+    case BASE_STORE_U32: base_identity_add(id, o->name, "%lu", (unsigned long)*(const uint32_t *)at); return;
+    case BASE_STORE_U64: base_identity_add(id, o->name, "%llu", (unsigned long long)*(const uint64_t *)at); return;
+    case BASE_STORE_REAL: base_identity_add(id, o->name, "%.17g", *(const double *)at); return;
+    case BASE_STORE_TEXT:
+        base_identity_add(id, o->name, "%s", *(const char *const *)at ? *(const char *const *)at : "");
+        return;
+    case BASE_STORE_TEXTS:
+        for (int i = 0; i < *(const int *)(const void *)((const char *)from + o->to.count); i++)
+            base_identity_add(id, o->name, "%s", ((const char *const *)at)[i]);
+        return;
+    case BASE_STORE_NONE: return; /* it is told by its row */
+    }
+}
+
+void base_options_identify(const struct base_option *list, const void *from, struct base_identity *id)
+{
+    for (const struct base_option *o = list; o->name || o->help; o++) {
+        if (o->role > BASE_DECIDES)
+            base_identity_role(id, o->name, o->role);
+        if (o->role != BASE_NO_IDENTITY && o->tell)
+            o->tell(from, id);
+        else if (o->role != BASE_NO_IDENTITY)
+            add_option(id, o, from);
+    }
+}
+
 /* --- help --- */
 
 /* What --help calls the value, or the words: a|b|c. */

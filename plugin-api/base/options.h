@@ -19,6 +19,7 @@
 
 #include "base/err.h"
 #include "base/files.h"
+#include "base/identity.h"
 
 enum base_store_type {
     BASE_STORE_NONE,
@@ -69,6 +70,9 @@ struct base_option {
     enum base_path output; /* the value is written: refused when it cannot be, is an input, or is written twice */
     const struct base_file_kind *kind; /* of a file: refused when one of another kind is there; NULL: any is replaced */
     const char *const *files;          /* of a folder: names written there that an input might have; ends with NULL */
+    int role; /* in the identity of the result (base/identity.h): does another value make another one? */
+    /* For a value of several parts, or a key of another name: appends its lines to the identity. */
+    void (*tell)(const void *from, struct base_identity *to);
 };
 
 struct base_options {
@@ -87,6 +91,9 @@ struct base_options {
 /* Fills *into from argv (whose order it may change); what is not on the command line stays as it was. --help, --usage and
  * --version print and exit. Otherwise 0, or BASE_EINVAL with one line that names the option. */
 int base_options_parse(const struct base_options *options, int argc, char **argv, void *into, struct base_err *err);
+
+/* Appends the lines of the options with a role, as `from` has them, and the roles of their names. */
+void base_options_identify(const struct base_option *list, const void *from, struct base_identity *identity);
 
 /* The parts, for values that are made of several: the whole text must be one number in [min, max]. 1 if it is. */
 int base_parse_integer(const char *text, int64_t min, int64_t max, int64_t *out);

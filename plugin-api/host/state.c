@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/identity.h"
+
 /*
  * blocks, block records; totals; dropped samples; criterion bytes, criterion; half counts unless they follow from the
  * samples. Counts are u64, records are the structs below, made without padding.
@@ -273,4 +275,20 @@ int32_t lull_host_load_blocks(struct lull_host_frame *f, const void *data, uint6
                               struct lull_error *err)
 {
     return load(f, data, size, name, 0, err);
+}
+
+/* --- identity ------------------------------------------------------------------------------------------------------- */
+
+int32_t lull_host_same_identity(const char *saved, uint64_t saved_size, const char *present, const char *name,
+                                struct lull_error *err)
+{
+    static const struct base_identity_words words = {": made with", ": made without", "this render"};
+    struct base_err why = {0};
+    int32_t code = lull_host_given(err, "saved", saved, "present", present, "name", name, NULL);
+    if (code != LULL_OK)
+        return code;
+    const struct base_identity ours = {.text = (char *)(size_t)present, .size = strlen(present)};
+    return base_identity_compare(&ours, saved, (size_t)saved_size, name, &words, NULL, &why) == 0
+               ? LULL_OK
+               : lull_error_set(err, LULL_E_VALUE, "%s", why.text);
 }

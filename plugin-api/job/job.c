@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/identity.h"
 #include "base/module.h"
 #include "base/threads.h"
 #include "job/message.h"
@@ -155,20 +156,6 @@ static int look_round(struct job *job, int rank, double waited_s)
     return rc ? rc : job_give_up(job, rank, waited_s);
 }
 
-/* Names the first line of key=value that is not the same. */
-static int refuse(struct job *job, int rank, const char *theirs, const char *ours)
-{
-    while (*theirs != '\0' && *ours != '\0') {
-        int a = (int)strcspn(theirs, "\n"), b = (int)strcspn(ours, "\n");
-        if (a != b || memcmp(theirs, ours, (size_t)a) != 0)
-            return base_fail(&job->failed, BASE_EINVAL, "%s has %.*s, but rank 0 has %.*s: give all hosts the same files",
-                             name_of(job, rank), a, theirs, b, ours);
-        theirs += a + (theirs[a] != '\0');
-        ours += b + (ours[b] != '\0');
-    }
-    return base_fail(&job->failed, BASE_EINVAL, "%s has other settings than rank 0", name_of(job, rank));
-}
-
 /* --- messages -------------------------------------------------------------------------------------------------------- */
 
 int job_send(struct job *job, int rank, void *message, size_t size)
@@ -280,12 +267,15 @@ static int say_hello(struct job *job, const char *settings, int threads)
 
 static int hear_hello(struct job *job, int rank, const struct job_message *message, size_t size, const char *ours)
 {
+    static const struct base_identity_words words = {" has", " has no", "rank 0"};
     const struct job_hello *hello = (const struct job_hello *)message;
+    const struct base_identity here = {.text = (char *)(size_t)ours, .size = strlen(ours)}; /* every key decides */
+    struct base_err why = {0};
     if (message->kind != JOB_HELLO || size <= sizeof *hello || ((const char *)message)[size - 1] != '\0' ||
         hello->threads < 1 || job->workers[rank].threads > 0)
         return job_nonsense(job, rank);
-    if (strcmp(hello->settings, ours) != 0)
-        return refuse(job, rank, hello->settings, ours);
+    if (base_identity_compare(&here, hello->settings, strlen(hello->settings), name_of(job, rank), &words, NULL, &why) != 0)
+        return base_fail(&job->failed, BASE_EINVAL, "%s: give all hosts the same files", why.text);
     job->workers[rank].threads = hello->threads;
     job->threads += hello->threads;
     return 0;

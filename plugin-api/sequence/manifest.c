@@ -1,5 +1,6 @@
 #include "sequence/manifest.h"
 
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -273,32 +274,24 @@ int seq_manifest_write(const char *dir, const struct seq_manifest *m, struct bas
     return rc;
 }
 
-const char *seq_manifest_difference(const struct seq_manifest *a, const struct seq_manifest *b)
+void seq_manifest_identity(const struct seq_manifest *m, struct base_identity *to)
 {
-    const struct {
-        const char *member;
-        int same;
-    } members[] = {
-        {"scene", !strcmp(a->scene, b->scene)},
-        {"source_crc32", a->source_crc32 == b->source_crc32},
-        {"inputs_crc32", !a->inputs_crc32 || !b->inputs_crc32 || a->inputs_crc32 == b->inputs_crc32},
-        {"camera", !strcmp(a->camera, b->camera)},
-        {"look_at", a->has_look_at == b->has_look_at && !memcmp(a->look_at, b->look_at, sizeof a->look_at)},
-        {"fov", a->fov_deg == b->fov_deg},
-        {"renderer", !strcmp(a->renderer, b->renderer)},
-        {"width", a->width == b->width},
-        {"height", a->height == b->height},
-        {"block", a->block == b->block},
-        {"seed", a->seed == b->seed},
-        {"reference_seed", a->reference_seed == b->reference_seed},
-        {"reference_spp", a->reference_spp == b->reference_spp},
-        {"reference_independent", a->reference_independent == b->reference_independent},
-        {"levels", a->n_levels == b->n_levels && !memcmp(a->levels, b->levels, a->n_levels * sizeof *a->levels)},
-    };
-    for (size_t i = 0; i < sizeof members / sizeof members[0]; i++)
-        if (!members[i].same)
-            return members[i].member;
-    return NULL;
+    base_identity_add(to, "scene", "%s", m->scene);
+    base_identity_add(to, "source_crc32", "%08x", m->source_crc32);
+    base_identity_add(to, "inputs_crc32", "%08x", m->inputs_crc32);
+    base_identity_add(to, "camera", "%s", m->camera);
+    base_identity_add_reals(to, "look_at", m->look_at, m->has_look_at ? 9 : 0);
+    base_identity_add(to, "fov", "%.17g", m->fov_deg);
+    base_identity_add(to, "renderer", "%s", m->renderer);
+    base_identity_add(to, "width", "%u", m->width);
+    base_identity_add(to, "height", "%u", m->height);
+    base_identity_add(to, "block", "%u", m->block);
+    base_identity_add(to, "seed", "%" PRIu64, m->seed);
+    base_identity_add(to, "reference_seed", "%" PRIu64, m->reference_seed);
+    base_identity_add(to, "reference_spp", "%u", m->reference_spp);
+    base_identity_add(to, "reference_independent", "%d", m->reference_independent);
+    for (uint32_t i = 0; i < m->n_levels; i++)
+        base_identity_add(to, "level", "%u", m->levels[i]);
 }
 
 /* --- blocks --- */

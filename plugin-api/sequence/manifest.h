@@ -8,6 +8,7 @@
 #include <stdint.h>
 
 #include "base/err.h"
+#include "base/identity.h"
 #include "sequence/block.h"
 
 enum { SEQ_MANIFEST_NAME = 256, SEQ_MANIFEST_PATH = 4096 };
@@ -45,9 +46,8 @@ int seq_manifest_parse(const char *path, const char *text, size_t size, struct s
 int seq_manifest_write(const char *dir, const struct seq_manifest *m, struct base_err *err);
 void seq_manifest_release(struct seq_manifest *m);
 
-/* What tells two runs apart, up to their blocks: the first member that differs, or NULL. `source` may differ: its CRC
- * decides. */
-const char *seq_manifest_difference(const struct seq_manifest *a, const struct seq_manifest *b);
+/* What tells two runs apart, up to their blocks. `source` may differ: its CRC decides. */
+void seq_manifest_identity(const struct seq_manifest *m, struct base_identity *to);
 
 /* Index of the block with this id; n_blocks: it is not listed. */
 uint32_t seq_manifest_find(const struct seq_manifest *m, uint32_t id);

@@ -20,6 +20,7 @@
 #include "render/denoised.h"
 #include "render/host_find.h"
 #include "render/output.h"
+#include "support/pt_identity.h"
 
 enum { LEVELS_MAX = 32, BLOCKS_MAX = 1024, PAIRS_MAX = 8 };
 
@@ -158,9 +159,10 @@ static void run(const struct pt_render_config *config, struct pt_scene *scene, s
             pt_render_destroy(r); /* a checkpoint wants a fresh one */
             r = NULL;
             if (pt_render_create(config, scene, kernel, threads, NULL, &r, &err) ||
-                pt_checkpoint_load(path, r, settings, &err))
+                pt_checkpoint_load(path, r, PT_IDENTITY(settings), &err))
                 die(&err);
-        } else if (pt_render_advance(r, o.spp[k], &hooks, &stopped, &err) || pt_checkpoint_save(path, r, settings, &err)) {
+        } else if (pt_render_advance(r, o.spp[k], &hooks, &stopped, &err) ||
+                   pt_checkpoint_save(path, r, PT_IDENTITY(settings), &err)) {
             die(&err);
         }
         write_pictures(r, o.spp[k]);

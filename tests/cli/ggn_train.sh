@@ -125,10 +125,15 @@ interrupted $(($(cat "$tmp/best") + 2)) "$tmp/h.ggn" $long && [ "$(wc -l <"$tmp/
 check "  …and a resumed run where it ends the other" $?
 
 cp "$tmp/a.ggn.ckpt" "$tmp/bad.ggn.ckpt"
-fails "a checkpoint of another run is refused" "other data or options" $ggn train $tiny --seed 3 --resume
+fails "a checkpoint of another run is refused" "made with seed=1, but this run has seed=3" $ggn train $tiny --seed 3 --resume
+for option in "preset paper" "window 4" "kr 4" "km 4" "kd 5" "crop 16" "batch-denoiser 4" "batch 4" "steps-denoiser 30" "steps 30" \
+    "epoch-steps 5" "patience 3" "lr-denoiser 0.01" "lr 0.01" "synthetic 0" "extend 0" \
+    "validation-windows 100" "init $tmp/a.ggn"; do # what makes another model
+    fails "  …by its name: --${option% *}" "made with ${option%% *}=" $ggn train $tiny --$option --resume
+done
 cp -r $data "$tmp/labelled" && sed -i '0,/"threshold":[[:space:]]*[0-9.]*/s//"threshold": 77/' "$tmp/labelled/scene0/labels.json" && ! cmp -s $data/scene0/labels.json "$tmp/labelled/scene0/labels.json"
 check "a copy of the data with another label" $?
-fails "a checkpoint of other labels is refused" "other data or options" $ggn train $tiny --data "$tmp/labelled" --resume
+fails "a checkpoint of other labels is refused" "made with data-crc=" $ggn train $tiny --data "$tmp/labelled" --resume
 head -c 4000 "$tmp/a.ggn.ckpt" >"$tmp/bad.ggn.ckpt"
 fails "a truncated checkpoint" "bad.ggn.ckpt" $ggn train $tiny --resume
 rm -f "$tmp/bad.ggn.ckpt"

@@ -27,5 +27,5 @@ refused "made with light-selection=hierarchy, but this render has light-selectio
 record="$many -q --size 24x24 --block 24 --sampler independent --levels linear:2:4:2"
 t "a recording names the hierarchy in its manifest" sh -c "$P $record --sequence seq && grep -q 'renderer.*light hierarchy' seq/manifest.json"
 t "  …but not power" sh -c "$P $record --sequence by-power --light-selection power && ! grep -q 'light hierarchy' by-power/manifest.json"
-refused "begun with another renderer" $record --sequence seq --light-selection power
+refused "begun with renderer=" $record --sequence seq --light-selection power
 exit $bad

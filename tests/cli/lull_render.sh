@@ -278,7 +278,7 @@ t "  …manifest" sh -c "grep -q '\"camera\":[[:space:]]*\"view4\"' seq/manifest
 cp seq/block-00005.lseq five.lseq && rm seq/block-00005.lseq
 t "  …goes on where files are missing" "$P" $seq --sequence seq --name rooms/view4
 t "  …refuses nothing that is the same" test -s seq/block-00005.lseq
-refused "begun with another" $seq --sequence seq --name rooms/view4 --seed 3
+refused "begun with seed=0, but this render has seed=3; use another folder" $seq --sequence seq --name rooms/view4 --seed 3
 t "  …no temporaries" test -z "$(ls -A seq | grep tmp)"
 
 echo "1..$n"

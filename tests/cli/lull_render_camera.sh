@@ -48,14 +48,14 @@ t "  …goes on with its own" "$P" $long --resume --look-at "$camera"
 seq="$scene -q --block 16 --levels linear:4:8:4 --blocks 1"
 t "a sequence of another view" "$P" $seq --sequence seq --look-at "$camera" --fov 50
 rm seq/*.lseq
-refused "begun with another look_at" $seq --sequence seq --fov 50
-refused "begun with another look_at" $seq --sequence seq --fov 50 --look-at "0 1 3  0 1 0  0 1 0"
-refused "begun with another fov" $seq --sequence seq --look-at "$camera"
-refused "begun with another fov" $seq --sequence seq --look-at "$camera" --fov 51
+refused "begun with look_at=" $seq --sequence seq --fov 50
+refused "begun with look_at=" $seq --sequence seq --fov 50 --look-at "0 1 3  0 1 0  0 1 0"
+refused "begun with fov=" $seq --sequence seq --look-at "$camera"
+refused "begun with fov=" $seq --sequence seq --look-at "$camera" --fov 51
 t "  …goes on with its own" "$P" $seq --sequence seq --look-at "$camera" --fov 50
 t "a sequence of the scene's own camera" "$P" $seq --sequence own
 rm own/*.lseq
-refused "begun with another look_at" $seq --sequence own --look-at "$camera"
+refused "begun with look_at=" $seq --sequence own --look-at "$camera"
 
 echo "1..$n"
 exit $bad

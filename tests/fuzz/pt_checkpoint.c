@@ -9,6 +9,7 @@
 #include <zlib.h>
 
 #include "render/checkpoint.h"
+#include "support/pt_identity.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -51,7 +52,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (!threads || pt_render_create(&config, NULL, no_kernel, threads, NULL, &render, &err) != 0)
         abort();
     const char *path = write_file(data, size);
-    int rc = pt_checkpoint_load(path, render, "seed=1\n", &err);
+    int rc = pt_checkpoint_load(path, render, PT_IDENTITY("seed=1\n"), &err);
     if (!rc) { /* whatever was accepted can be finished */
         struct pt_render_hooks hooks = {0};
         enum pt_render_outcome outcome;

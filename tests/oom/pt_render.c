@@ -18,6 +18,7 @@
 #include "scene/scene.h"
 #include "support/fail_alloc.h"
 #include "support/pt_fake.h"
+#include "support/pt_identity.h"
 
 static char folder[] = "/tmp/pt_oom_XXXXXX";
 static struct base_threads *pool;
@@ -112,11 +113,11 @@ static int write_csv(struct pt_render *r, struct base_err *err)
 }
 static int save_checkpoint(struct pt_render *r, struct base_err *err)
 {
-    return pt_checkpoint_save(in_folder("c.ckp"), r, "a=1\n", err);
+    return pt_checkpoint_save(in_folder("c.ckp"), r, PT_IDENTITY("a=1\n"), err);
 }
 static int load_checkpoint(struct pt_render *r, struct base_err *err)
 {
-    return pt_checkpoint_load(in_folder("c.ckp"), r, "a=1\n", err);
+    return pt_checkpoint_load(in_folder("c.ckp"), r, PT_IDENTITY("a=1\n"), err);
 }
 
 struct bytes {

@@ -16,6 +16,7 @@
 #include "sequence/builder.h"
 #include "sequence/manifest.h"
 #include "support/pt_fake.h"
+#include "support/pt_identity.h"
 
 static const char settings[] = "seed=1\n";
 
@@ -263,7 +264,7 @@ static char *checkpoint(size_t items, size_t *size)
 {
     struct base_threads *threads = base_threads_create(1, NULL);
     struct pt_render *r = render_of(items, threads);
-    char *bytes = r ? taken(scratch(), pt_checkpoint_save(scratch(), r, settings, NULL), size) : NULL;
+    char *bytes = r ? taken(scratch(), pt_checkpoint_save(scratch(), r, PT_IDENTITY(settings), NULL), size) : NULL;
     pt_render_destroy(r);
     base_threads_destroy(threads);
     return bytes;
@@ -278,7 +279,7 @@ static double read_checkpoint(char *bytes, size_t size, size_t items)
     double s = -1;
     if (r && f && fwrite(bytes, 1, size, f) == size && fflush(f) == 0) {
         double start_s = base_clock_thread_s();
-        int rc = pt_checkpoint_load(scratch(), r, settings, &err);
+        int rc = pt_checkpoint_load(scratch(), r, PT_IDENTITY(settings), &err);
         s = rc ? -1 : base_clock_thread_s() - start_s;
     }
     if (s < 0)

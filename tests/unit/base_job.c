@@ -246,8 +246,8 @@ static void who_differs_is_named_with_the_line(void **state)
     static const char *const cases[][3] = {
         {"a=1\nb=2\nc=4\n", "a=1\nb=3\nc=5\n",
          "rank 2 on host here has b=3, but rank 0 has b=2: give all hosts the same files"},
-        {"a=1\nb=3", "a=1\nbc=3", "rank 2 on host here has bc=3, but rank 0 has b=3: give all hosts the same files"},
-        {"a=1\n", "a=1\nb=3\n", "rank 2 on host here has other settings than rank 0"}};
+        {"a=1\nb=3", "a=1\nbc=3", "rank 2 on host here has bc=3, but rank 0 has no bc: give all hosts the same files"},
+        {"a=1\n", "a=1\nb=3\n", "rank 2 on host here has b=3, but rank 0 has no b: give all hosts the same files"}};
     struct seat seats[3];
     for (int i = 0; i < 3; i++) {
         settings_of[0] = cases[i][0];

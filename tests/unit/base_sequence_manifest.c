@@ -168,7 +168,6 @@ static void manifests_word_for_word(void **state)
         "\t\t\t\"bytes\":\t5,\n\t\t\t\"crc32\":\t\"fedcba98\",\n\t\t\t\"seconds\":\t1.5,\n\t\t\t\"dropped\":\t17\n\t\t}]\n}"
         "\n");
     assert_int_equal(seq_manifest_read(made_dir, &back, &err), 0);
-    assert_null(seq_manifest_difference(&m, &back));
     assert_string_equal(back.source, "a/s.pbrt");
     assert_true(back.n_blocks == 2 && same_block(&back.blocks[0], &list[0]) && same_block(&back.blocks[1], &list[1]));
     seq_manifest_release(&back);

@@ -13,6 +13,7 @@
 #include "base/files.h"
 #include "render/checkpoint.h"
 #include "support/pt_fake.h"
+#include "support/pt_identity.h"
 
 /* --- time, interrupt, checkpoint ------------------------------------------------------------------------------------ */
 
@@ -33,7 +34,7 @@ static int count_down(void *data, struct pt_render *r, struct base_err *err)
 static int save(void *data, struct pt_render *r, struct base_err *err)
 {
     const struct stop_after *s = data;
-    return pt_checkpoint_save(s->checkpoint, r, "a=1\nb=2\n", err);
+    return pt_checkpoint_save(s->checkpoint, r, PT_IDENTITY("a=1\nb=2\n"), err);
 }
 
 /* Interrupted after each of the first slices, saved, loaded into a new render and finished: the same bytes. */
@@ -57,7 +58,7 @@ static void resumed_render_is_identical(void **state)
             assert_int_equal(pt_criterion_create(pt_fake_criterion(), &pair, 1, r.pool, NULL, &r.criterion, &err), 0);
             assert_int_equal(pt_render_create(&config, NULL, pt_fake_nan, r.pool, r.criterion, &r.render, &err), 0);
             if (part == 1)
-                assert_int_equal(pt_checkpoint_load(path, r.render, "a=1\nb=2\n", &err), 0);
+                assert_int_equal(pt_checkpoint_load(path, r.render, PT_IDENTITY("a=1\nb=2\n"), &err), 0);
             assert_int_equal(pt_render_run(r.render, part == 0 ? &hooks : &none, &outcome, &err), 0);
             assert_int_equal(outcome, part == 0 ? PT_RENDER_INTERRUPTED : PT_RENDER_DONE);
             if (part == 0) {
@@ -89,7 +90,7 @@ static int keep(void *data, struct pt_render *r, struct base_err *err)
 {
     struct keeper *k = data;
     k->saved++;
-    return pt_checkpoint_save(k->path, r, k->text, err);
+    return pt_checkpoint_save(k->path, r, PT_IDENTITY(k->text), err);
 }
 
 /* To its end by these settings, from path if `resume`, kept there; pilot_spp ends it before, 0: does not. */
@@ -115,11 +116,11 @@ static struct pt_fake_run go_on(const struct settings *s, const char *path, int 
     if (s->at)
         assert_int_equal(pt_criterion_create(pt_fake_criterion(), &pair, 1, r.pool, NULL, &r.criterion, &err), 0);
     assert_int_equal(pt_render_create(&config, NULL, pt_fake_nan, r.pool, r.criterion, &r.render, &err), 0);
-    if (resume && pt_checkpoint_load(path, r.render, text, &err) != 0)
+    if (resume && pt_checkpoint_load(path, r.render, PT_IDENTITY(text), &err) != 0)
         fail_msg("%s", err.text);
     assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), 0);
     if (outcome == PT_RENDER_PILOT)
-        assert_int_equal(pt_checkpoint_save(path, r.render, text, &err), 0);
+        assert_int_equal(pt_checkpoint_save(path, r.render, PT_IDENTITY(text), &err), 0);
     else
         assert_true(keeper.saved == 1 || (s->max_seam > 0 && keeper.saved > 0));
     return r;
@@ -224,8 +225,8 @@ static void bad_checkpoints_are_refused(void **state)
     struct pt_render_config config = pt_fake_config();
     struct pt_fake_run r = pt_fake_render(&config, pt_fake_noise, 1, "16");
     struct base_err err = {0};
-    assert_int_equal(pt_checkpoint_save(path, r.render, "seed=1\n", &err), 0);
-    assert_int_equal(pt_checkpoint_load(path, r.render, "seed=2\n", &err), BASE_EINVAL);
+    assert_int_equal(pt_checkpoint_save(path, r.render, PT_IDENTITY("seed=1\n"), &err), 0);
+    assert_int_equal(pt_checkpoint_load(path, r.render, PT_IDENTITY("seed=2\n"), &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "made with seed=1, but this render has seed=2"));
     FILE *f = fopen(path, "rb");
     static unsigned char data[1 << 20];
@@ -235,14 +236,14 @@ static void bad_checkpoints_are_refused(void **state)
         f = fopen(path, "wb");
         fwrite(data, 1, cut, f);
         fclose(f);
-        assert_int_equal(pt_checkpoint_load(path, r.render, "seed=1\n", &err), BASE_EINVAL);
+        assert_int_equal(pt_checkpoint_load(path, r.render, PT_IDENTITY("seed=1\n"), &err), BASE_EINVAL);
     }
     for (size_t at = 0; at < n; at += n / 13 + 1) {
         data[at] ^= 0x10;
         f = fopen(path, "wb");
         fwrite(data, 1, n, f);
         fclose(f);
-        assert_int_equal(pt_checkpoint_load(path, r.render, "seed=1\n", &err), BASE_EINVAL);
+        assert_int_equal(pt_checkpoint_load(path, r.render, PT_IDENTITY("seed=1\n"), &err), BASE_EINVAL);
         data[at] ^= 0x10;
     }
     pt_fake_release(&r);
@@ -276,7 +277,7 @@ static void expect_answer(const char *path, unsigned char *data, size_t n, struc
     memcpy(data + n - 4, &crc, 4);
     FILE *f = fopen(path, "wb");
     assert_true(f && fwrite(data, 1, n, f) == n && fclose(f) == 0);
-    int rc = pt_checkpoint_load(path, r, settings, &err);
+    int rc = pt_checkpoint_load(path, r, PT_IDENTITY(settings), &err);
     snprintf(line, sizeof line, "%s: %s", path, words ? words : "");
     if (rc != (words ? BASE_EINVAL : 0) || (words && strcmp(err.text, line) != 0))
         fail_msg("%d \"%s\", expected \"%s\"", rc, err.text, line);
@@ -298,7 +299,7 @@ static void checkpoints_have_a_layout(void **state)
     uint32_t kept;
     const struct lull_host_sample *dropped = lull_host_dropped(r.render->frame, &kept);
     assert_true(kept > 0 && kept <= LULL_HOST_DROPPED_KEPT);
-    assert_int_equal(pt_checkpoint_save(path, r.render, "a=1\nb=2\n", &err), 0);
+    assert_int_equal(pt_checkpoint_save(path, r.render, PT_IDENTITY("a=1\nb=2\n"), &err), 0);
     assert_int_equal(base_file_read(path, 1 << 24, &bytes, &size, &err), 0);
     unsigned char *data = (unsigned char *)bytes;
     const unsigned char *at = piece(word(piece(data, "LULLCKP1", 8), 8), "a=1\nb=2\n", 8), *film = at, *list, *drops,

@@ -21,6 +21,7 @@
 #include "support/pt_fake.h"
 #include "support/pt_heard.h"
 #include "support/base_transport.h"
+#include "support/pt_identity.h"
 
 /* LIES: what it says of its rows is wrong. */
 enum behaviour { WORKS, SILENT, BABBLES, FAILS, LIES, OTHER_SETTINGS, ABSENT };
@@ -333,7 +334,7 @@ struct watch {
 static int save(void *data, struct pt_render *r, struct base_err *err)
 {
     const struct watch *w = data;
-    return pt_checkpoint_save(w->checkpoint, r, "settings\n", err);
+    return pt_checkpoint_save(w->checkpoint, r, PT_IDENTITY("settings\n"), err);
 }
 
 /* Renders with workers until one is lost or it is interrupted after so many calls; the checkpoint then goes on alone to the
@@ -362,7 +363,7 @@ static void ends_well(enum behaviour last, int interrupt_after, const char *word
     assert_int_equal(pt_render_run(lost.render, &hooks, &outcome, &err), 0);
     assert_int_equal(outcome, words ? PT_RENDER_LOST : PT_RENDER_INTERRUPTED);
     part(&stage, last == SILENT);
-    assert_int_equal(pt_checkpoint_load(watch.checkpoint, rest.render, "settings\n", &err), 0);
+    assert_int_equal(pt_checkpoint_load(watch.checkpoint, rest.render, PT_IDENTITY("settings\n"), &err), 0);
     finish(&rest);
     if (words)
         assert_non_null(strstr(heard.text, words));

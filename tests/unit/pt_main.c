@@ -221,7 +221,8 @@ static void print_settings(FILE *out, char *text)
 
 static char *make_render(struct approve_case *c)
 {
-    char *argv[128], *text = NULL, at[4096], job[PT_AGREE_JOB];
+    char *argv[128], *text = NULL, at[4096];
+    struct base_identity all = {0};
     size_t size;
     struct base_err err = {0};
     static struct pt_cli cli;
@@ -238,9 +239,10 @@ static char *make_render(struct approve_case *c)
     if (!rc)
         print_render(out, &cli, &open);
     if (!rc && cli.checkpoint.path)
-        rc = pt_agree_job(&open, job, sizeof job, &err);
+        rc = pt_agree_identity(&open, &all, &err);
     if (!rc && cli.checkpoint.path)
-        print_settings(out, job);
+        print_settings(out, all.text);
+    base_identity_release(&all);
     if (rc)
         fprintf(out, "%d: %s\n", rc, err.text);
     pt_open_release(&open);
