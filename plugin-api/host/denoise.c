@@ -5,9 +5,8 @@
 
 #include <lull/criterion_kit.h>
 
-#include "base/colour.h"
 #include "denoise/blend.h"
-#include "denoise/oidn.h"
+#include "denoise/pair.h"
 #include "host/frame.h"
 
 /* The picture in the making, over the pixels of the view. */
@@ -15,31 +14,28 @@ struct picture {
     const struct lull_host_frame *frame;
     const struct lull_host_denoising *how;
     struct lull_view view;
-    int32_t width, height;
-    size_t pixels;
+    int32_t width;
     double exposure, luminance[3];
-    struct lull_oidn *oidn;
-    int albedo, normal;         /* whether the view has these */
-    float *aux[2];              /* own; [n][3], NULL: not in the view */
-    float *color[2], *clean[2]; /* own; [n][3]: both halves, later the mean of all samples alone */
-    struct lull_estimate error; /* owns, [n] each */
+    int albedo, normal;             /* whether the view has these */
+    struct lull_denoised_pair pair; /* owns; of the whole view */
+    float *mean;                    /* owns; [pixels][3]: of all samples */
 };
 
-static int32_t no_memory(struct lull_error *err) { return lull_host_no_memory(err, "the denoised picture"); }
+static int is_full(const struct picture *p) { return (p->how->flags & LULL_DENOISE_FULL) != 0; }
 
-static float *picture_alloc(const struct picture *p) { return calloc(p->pixels, 3 * sizeof(float)); }
-
-static void picture_release(struct picture *p)
+static int32_t open_pair(struct picture *p, int32_t height, struct lull_error *err)
 {
-    for (int i = 0; i < 2; i++) {
-        free(p->aux[i]);
-        free(p->color[i]);
-        free(p->clean[i]);
-    }
-    free(p->error.denoised);
-    free(p->error.agreed);
-    free(p->error.noisy);
-    lull_oidn_close(p->oidn);
+    const struct lull_host_denoising *how = p->how;
+    struct base_err why = {0};
+    const struct lull_denoised_form form = {.picture = {.width = p->width,
+                                                        .height = height,
+                                                        .albedo = p->albedo,
+                                                        .normal = p->normal,
+                                                        .quality = LULL_OIDN_HIGH,
+                                                        .threads = (int32_t)how->threads,
+                                                        .margin = LULL_OIDN_MARGIN,
+                                                        .exposure = (float)p->exposure}};
+    return lull_denoised_open(&p->pair, how->library, &form, &why) ? lull_host_translate(&why, err) : LULL_OK;
 }
 
 /* --- reading ----------------------------------------------------------------------------------------------------------- */
@@ -60,49 +56,30 @@ static void each_span(struct picture *p, uint32_t planes, visit *fn)
     }
 }
 
-static int has_halves(const struct lull_block *b) { return b->half_spp > 0 && b->half_spp < b->spp; }
-
-/* Half A, and of the mean the rest; the mean twice where there is no second half. */
 static void read_halves(struct picture *p, const struct lull_kit_span *s, size_t at)
 {
-    const double n = (double)s->block->spp, h = (double)s->block->half_spp;
-    const int split = has_halves(s->block);
     for (size_t i = 0; i < (size_t)s->count; i++)
-        for (size_t c = 0; c < 3; c++) {
-            const double m = s->value[LULL_PLANE_COLOR][i][c], half = s->value[LULL_PLANE_HALF][i][c];
-            p->color[0][3 * (at + i) + c] = (float)(split ? half : m);
-            p->color[1][3 * (at + i) + c] = (float)(split ? (n * m - h * half) / (n - h) : m);
-        }
+        lull_denoised_put(&p->pair, at + i, s->value[LULL_PLANE_COLOR][i], s->value[LULL_PLANE_HALF][i],
+                          (double)s->block->spp, (double)s->block->half_spp);
 }
 
 static void read_mean(struct picture *p, const struct lull_kit_span *s, size_t at)
 {
     for (size_t i = 0; i < (size_t)s->count; i++)
         for (size_t c = 0; c < 3; c++)
-            p->color[0][3 * (at + i) + c] = (float)s->value[LULL_PLANE_COLOR][i][c];
+            p->mean[3 * (at + i) + c] = (float)s->value[LULL_PLANE_COLOR][i][c];
 }
 
 static void read_auxiliary(struct picture *p, const struct lull_kit_span *s, size_t at)
 {
+    float *const to[2] = {p->pair.albedo, p->pair.normal};
     for (int k = 0; k < 2; k++)
-        for (size_t i = 0; p->aux[k] && i < (size_t)s->count; i++)
+        for (size_t i = 0; to[k] && i < (size_t)s->count; i++)
             for (size_t c = 0; c < 3; c++)
-                p->aux[k][3 * (at + i) + c] = (float)s->value[LULL_PLANE_ALBEDO + k][i][c];
+                to[k][3 * (at + i) + c] = (float)s->value[LULL_PLANE_ALBEDO + k][i][c];
 }
 
 /* --- denoising --------------------------------------------------------------------------------------------------------- */
-
-/* Denoises color[0 … count). */
-static int32_t run(struct picture *p, int count, struct lull_error *err)
-{
-    const struct lull_host_denoising *how = p->how;
-    struct base_err why = {0};
-    const struct lull_oidn_pictures pictures = {.color = {p->color[0], count > 1 ? p->color[1] : NULL},
-                                                .albedo = p->aux[0],
-                                                .normal = p->aux[1],
-                                                .out = {p->clean[0], count > 1 ? p->clean[1] : NULL}};
-    return lull_oidn_run(p->oidn, &pictures, how->cancelled, how->context, &why) ? lull_host_translate(&why, err) : LULL_OK;
-}
 
 /* Luminance as a display shows it, 1 is its white. */
 static float shown(const struct picture *p, const float *rgb)
@@ -114,63 +91,46 @@ static float shown(const struct picture *p, const float *rgb)
     return (float)(y > 0.0 ? fmin(y, 1.0) : 0.0);
 }
 
+/* Where there are no halves it stays 0: the denoised picture is kept. */
 static void estimate(struct picture *p, const struct lull_kit_span *s, size_t at)
 {
+    const struct lull_denoised_part *part = &p->pair.part;
+    const double share = (double)s->block->half_spp / (double)s->block->spp;
     float light[4][LULL_KIT_SPAN_MAX];
-    const struct lull_estimate part = {p->error.denoised + at, p->error.agreed + at, p->error.noisy + at};
-    if (!has_halves(s->block))
+    if (s->block->half_spp == 0 || s->block->half_spp >= s->block->spp)
         return;
     for (size_t i = 0; i < (size_t)s->count; i++)
         for (int k = 0; k < 2; k++) {
-            light[k][i] = shown(p, p->color[k] + 3 * (at + i));
-            light[2 + k][i] = shown(p, p->clean[k] + 3 * (at + i));
+            light[k][i] = shown(p, part->half[k] + 3 * (at + i));
+            light[2 + k][i] = shown(p, part->denoised[k] + 3 * (at + i));
         }
-    const struct lull_estimate_in in = {light[0], light[1], light[2], light[3],
-                                        (double)s->block->half_spp / (double)s->block->spp};
-    lull_estimate_pixels(&in, (size_t)s->count, &part);
+    const struct lull_estimate_in in = {light[0], light[1], light[2], light[3], share};
+    lull_denoised_estimate(&p->pair, at, (size_t)s->count, &in);
 }
 
-/* How much of the noisy picture each pixel takes; the denoised halves lose their specks. weight: [n]; scratch: [2][n]. */
-static int32_t weigh(struct picture *p, float *weight, float *scratch, struct lull_error *err)
+/* The mean of the denoised halves, and how much of the noisy picture each pixel takes. */
+static int32_t denoise_halves(struct picture *p, float *denoised, struct lull_error *err)
 {
-    float **const maps[] = {&p->error.denoised, &p->error.agreed, &p->error.noisy};
-    for (int i = 0; i < 3; i++)
-        if (!(*maps[i] = calloc(p->pixels, sizeof(float))))
-            return no_memory(err);
-    each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF), read_halves);
-    int32_t code = run(p, 2, err);
-    if (code != LULL_OK)
-        return code;
-    each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), estimate);
-    lull_blend_weights(&p->error, p->width, p->height, scratch, weight, scratch + p->pixels);
-    lull_blend_despeckle(scratch + p->pixels, p->pixels, p->clean[0], p->clean[1]);
-    return LULL_OK;
-}
-
-static int32_t prepare(struct picture *p, struct lull_error *err)
-{
-    const struct lull_host_denoising *how = p->how;
+    const struct lull_denoised_part *part = &p->pair.part;
     struct base_err why = {0};
-    const struct lull_oidn_form form = {.width = p->width,
-                                        .height = p->height,
-                                        .albedo = p->albedo,
-                                        .normal = p->normal,
-                                        .quality = LULL_OIDN_HIGH,
-                                        .threads = (int32_t)how->threads,
-                                        .margin = LULL_OIDN_MARGIN,
-                                        .exposure = (float)p->exposure};
-    if (lull_oidn_open(how->library, &p->oidn, &why) || lull_oidn_prepare(p->oidn, &form, &why))
+    each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF), read_halves);
+    if (lull_denoised_run(&p->pair, p->how->cancelled, p->how->context, &why))
         return lull_host_translate(&why, err);
-    for (int k = 0; k < 2; k++) {
-        if (k ? p->normal : p->albedo)
-            p->aux[k] = picture_alloc(p);
-        p->color[k] = picture_alloc(p);
-        p->clean[k] = picture_alloc(p);
-        if (((k ? p->normal : p->albedo) && !p->aux[k]) || !p->color[k] || !p->clean[k])
-            return no_memory(err);
-    }
-    each_span(p, LULL_PLANE_BIT(LULL_PLANE_ALBEDO) | LULL_PLANE_BIT(LULL_PLANE_NORMAL), read_auxiliary);
+    each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), estimate);
+    lull_denoised_weigh(&p->pair);
+    for (size_t i = 0; i < 3 * part->pixels; i++)
+        denoised[i] = 0.5f * part->denoised[0][i] + 0.5f * part->denoised[1][i];
     return LULL_OK;
+}
+
+/* All samples at once; weight stays 0. */
+static int32_t denoise_mean(struct picture *p, float *denoised, struct lull_error *err)
+{
+    const struct lull_oidn_pictures pictures = {
+        .color = {p->mean}, .albedo = p->pair.albedo, .normal = p->pair.normal, .out = {denoised}};
+    struct base_err why = {0};
+    return lull_oidn_run(p->pair.oidn, &pictures, p->how->cancelled, p->how->context, &why) ? lull_host_translate(&why, err)
+                                                                                            : LULL_OK;
 }
 
 /* The denoiser also paints where there are no samples yet. */
@@ -185,29 +145,26 @@ static void black_out(const struct picture *p, float *rgb)
     }
 }
 
-static int32_t make(struct picture *p, const struct lull_host_picture *out, struct lull_error *err)
+static int32_t make(struct picture *p, int32_t height, const struct lull_host_picture *out, struct lull_error *err)
 {
-    const int full = (p->how->flags & LULL_DENOISE_FULL) != 0;
-    float *weight = calloc(3 * p->pixels, sizeof(float));
-    int32_t code = weight ? prepare(p, err) : no_memory(err);
-    if (code == LULL_OK && !full)
-        code = weigh(p, weight, weight + p->pixels, err);
-    if (code == LULL_OK) {
-        each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), read_mean);
-        code = full ? run(p, 1, err) : LULL_OK;
-    }
-    if (code == LULL_OK) {
-        for (size_t i = 0; !full && i < 3 * p->pixels; i++)
-            p->clean[0][i] = 0.5f * p->clean[0][i] + 0.5f * p->clean[1][i];
-        black_out(p, p->clean[0]);
-        lull_blend(p->color[0], p->clean[0], weight, p->pixels, out->rgb);
-        if (out->denoised)
-            memcpy(out->denoised, p->clean[0], 3 * p->pixels * sizeof(float));
-        if (out->weight)
-            memcpy(out->weight, weight, p->pixels * sizeof(float));
-    }
-    free(weight);
-    return code;
+    const struct lull_denoised_part *part = &p->pair.part;
+    int32_t code = open_pair(p, height, err);
+    if (code != LULL_OK)
+        return code;
+    p->mean = calloc(3 * part->pixels, sizeof *p->mean);
+    if (!p->mean)
+        return lull_host_no_memory(err, "the denoised picture");
+    float *denoised = out->denoised ? out->denoised : part->denoised[0];
+    each_span(p, LULL_PLANE_BIT(LULL_PLANE_ALBEDO) | LULL_PLANE_BIT(LULL_PLANE_NORMAL), read_auxiliary);
+    each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), read_mean);
+    code = is_full(p) ? denoise_mean(p, denoised, err) : denoise_halves(p, denoised, err);
+    if (code != LULL_OK)
+        return code;
+    black_out(p, denoised);
+    lull_blend(p->mean, denoised, part->weight, part->pixels, out->rgb);
+    if (out->weight)
+        memcpy(out->weight, part->weight, part->pixels * sizeof *out->weight);
+    return LULL_OK;
 }
 
 int32_t lull_host_denoise(const struct lull_host_frame *frame, const struct lull_host_view *view,
@@ -226,17 +183,16 @@ int32_t lull_host_denoise(const struct lull_host_frame *frame, const struct lull
                         .how = how,
                         .view = lull_host_seen(view, &s),
                         .width = view->x1 - view->x0,
-                        .height = view->y1 - view->y0,
                         .exposure = frame->config.exposure > 0.0 ? frame->config.exposure : 1.0,
                         .albedo = s.planes[LULL_PLANE_ALBEDO].data != NULL};
     p.normal = p.albedo && s.planes[LULL_PLANE_NORMAL].data;
-    p.pixels = (size_t)p.width * (size_t)p.height;
     lull_host_luminance(frame, p.luminance);
-    if (!s.planes[LULL_PLANE_COLOR].data || (!(how->flags & LULL_DENOISE_FULL) && !s.planes[LULL_PLANE_HALF].data))
+    if (!s.planes[LULL_PLANE_COLOR].data || (!is_full(&p) && !s.planes[LULL_PLANE_HALF].data))
         code = lull_error_set(err, LULL_E_INVALID, "a denoised picture needs the plane COLOR, a blend HALF besides");
     else
-        code = make(&p, out, err);
-    picture_release(&p);
+        code = make(&p, view->y1 - view->y0, out, err);
+    lull_denoised_close(&p.pair);
+    free(p.mean);
     lull_host_hide(&s);
     return code;
 }

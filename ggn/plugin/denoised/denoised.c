@@ -65,14 +65,14 @@ static double error_of(struct lull_instance *in, struct gd_block_view *seen, con
                        const struct lull_block *b, struct lull_kit_tally *tally, struct past *now)
 {
     const size_t pixels = (size_t)lull_kit_pixels(b);
-    struct gd_errors e;
+    struct ggn_kept_errors e;
     if (!gd_block_view_read(seen, &in->form, &in->kit, view, b, tally))
         return now->halves = now->crossed =
-                   gp_error_of_same(&in->kit, gd_block_view_structure(seen, &in->form, b), &in->warned,
+                   gp_error_of_same(&in->kit, gd_block_view_structure(seen, b), &in->warned,
                                     "denoised: COLOR and HALF are the same in a block that is not of one colour: HALF must "
                                     "hold a fixed half of the samples",
                                     tally);
-    if (gd_block_view_errors(seen, &in->form, &in->kit, b, in->kit.value[P_PICTURE] == 0,
+    if (gd_block_view_errors(seen, &in->kit, b, in->kit.value[P_PICTURE] == 0,
                              gp_is_moving(&in->kit, P_FPS) ? &in->temporal : NULL, &e))
         return (double)NAN; /* evaluate finds it in seen->err */
     now->halves = ggn_observer_error(&in->observer, e.halves, pixels);

@@ -1,0 +1,160 @@
+#include "denoise/pair.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "denoise/blend.h"
+
+/* Points each of `count` buffers to `size` floats of the memory at *next. */
+static void lay_out(float **const buffers[], size_t count, size_t size, float **next)
+{
+    for (size_t i = 0; i < count; i++, *next += size)
+        *buffers[i] = *next;
+}
+
+static int allocate(struct lull_denoised_pair *pair, struct base_err *err)
+{
+    const struct lull_oidn_form *picture = &pair->form.picture;
+    struct lull_denoised_part *part = &pair->part;
+    const int cuts = pair->form.part_pixels > 0;
+    float **const pictures[] = {&pair->half[0],     &pair->half[1], &pair->denoised[0],
+                                &pair->denoised[1], &pair->albedo,  &pair->normal};
+    float **const cut_out[] = {&part->half[0], &part->half[1], &part->denoised[0], &part->denoised[1]};
+    float **const maps[] = {&part->error.denoised, &part->error.agreed, &part->error.noisy,
+                            &part->weight,         &part->apart,        &pair->scratch};
+    const size_t count = 4u + (picture->albedo != 0) + (picture->normal != 0);
+    const size_t most = SIZE_MAX / sizeof(float) / 64, width = (size_t)picture->width, height = (size_t)picture->height;
+    pair->pixels = height > most / width ? most : width * height;
+    const size_t part_pixels = cuts ? pair->form.part_pixels : pair->pixels;
+    if (pair->pixels < most && part_pixels < most)
+        pair->memory = calloc(3 * count * pair->pixels + (cuts ? 12u + 6u : 6u) * part_pixels, sizeof(float));
+    if (!pair->memory)
+        return base_fail_nomem(err, "pictures to denoise");
+    float *next = pair->memory;
+    lay_out(pictures, count, 3 * pair->pixels, &next);
+    lay_out(cut_out, cuts ? 4 : 0, 3 * part_pixels, &next);
+    lay_out(maps, 6, part_pixels, &next);
+    for (int k = 0; k < 2 && !cuts; k++) {
+        part->half[k] = pair->half[k];
+        part->denoised[k] = pair->denoised[k];
+    }
+    part->width = picture->width;
+    part->height = picture->height;
+    part->pixels = part_pixels;
+    return 0;
+}
+
+int lull_denoised_open(struct lull_denoised_pair *pair, const char *library, const struct lull_denoised_form *form,
+                       struct base_err *err)
+{
+    *pair = (struct lull_denoised_pair){.form = *form};
+    int rc = lull_oidn_open(library, &pair->oidn, err);
+    if (!rc)
+        rc = lull_oidn_prepare(pair->oidn, &form->picture, err);
+    if (!rc)
+        rc = allocate(pair, err);
+    if (rc)
+        lull_denoised_close(pair);
+    return rc;
+}
+
+void lull_denoised_close(struct lull_denoised_pair *pair)
+{
+    lull_oidn_close(pair->oidn);
+    free(pair->memory);
+    *pair = (struct lull_denoised_pair){0};
+}
+
+/* --- reading ----------------------------------------------------------------------------------------------------------- */
+
+void lull_denoised_clear(struct lull_denoised_pair *pair)
+{
+    float *const pictures[] = {pair->half[0], pair->half[1], pair->albedo, pair->normal};
+    for (int i = 0; i < 4; i++)
+        if (pictures[i])
+            memset(pictures[i], 0, 3 * pair->pixels * sizeof(float));
+}
+
+int lull_denoised_put(struct lull_denoised_pair *pair, size_t at, const double mean[3], const double half[3], double n,
+                      double h)
+{
+    float *a = pair->half[0] + 3 * at, *b = pair->half[1] + 3 * at;
+    const int split = h > 0.0 && h < n;
+    int finite = 1;
+    for (int c = 0; c < 3; c++) {
+        a[c] = (float)(split ? half[c] : mean[c]);
+        b[c] = (float)(split ? (n * mean[c] - h * half[c]) / (n - h) : mean[c]);
+        finite &= isfinite(a[c]) && isfinite(b[c]);
+    }
+    return finite;
+}
+
+static void mirror(float *picture, int32_t width, int32_t height, struct lull_denoised_rect known)
+{
+    for (int32_t y = 0; y < height; y++)
+        for (int32_t x = 0; x < width; x++) {
+            const int32_t u = known.x0 + lull_oidn_mirrored(x - known.x0, known.x1 - known.x0);
+            const int32_t v = known.y0 + lull_oidn_mirrored(y - known.y0, known.y1 - known.y0);
+            if (u != x || v != y)
+                memcpy(picture + 3 * ((size_t)y * (size_t)width + (size_t)x),
+                       picture + 3 * ((size_t)v * (size_t)width + (size_t)u), 3 * sizeof *picture);
+        }
+}
+
+void lull_denoised_mirror(struct lull_denoised_pair *pair, struct lull_denoised_rect known)
+{
+    float *const pictures[] = {pair->half[0], pair->half[1], pair->albedo, pair->normal};
+    for (int i = 0; i < 4; i++)
+        if (pictures[i])
+            mirror(pictures[i], pair->form.picture.width, pair->form.picture.height, known);
+}
+
+/* --- what becomes of it ------------------------------------------------------------------------------------------------ */
+
+int lull_denoised_run(struct lull_denoised_pair *pair, int (*cancelled)(void *data), void *data, struct base_err *err)
+{
+    const struct lull_oidn_pictures pictures = {.color = {pair->half[0], pair->half[1]},
+                                                .albedo = pair->albedo,
+                                                .normal = pair->normal,
+                                                .out = {pair->denoised[0], pair->denoised[1]}};
+    return lull_oidn_run(pair->oidn, &pictures, cancelled, data, err);
+}
+
+void lull_denoised_cut(struct lull_denoised_pair *pair, struct lull_denoised_rect rect)
+{
+    struct lull_denoised_part *part = &pair->part;
+    const size_t row = (size_t)pair->form.picture.width;
+    part->width = rect.x1 - rect.x0;
+    part->height = rect.y1 - rect.y0;
+    part->pixels = (size_t)part->width * (size_t)part->height;
+    for (int k = 0; k < 2; k++)
+        for (int32_t y = 0; y < part->height; y++) {
+            const size_t from = 3 * ((size_t)(rect.y0 + y) * row + (size_t)rect.x0), count = 3 * (size_t)part->width;
+            const size_t to = (size_t)y * count;
+            memcpy(part->half[k] + to, pair->half[k] + from, count * sizeof(float));
+            memcpy(part->denoised[k] + to, pair->denoised[k] + from, count * sizeof(float));
+        }
+}
+
+void lull_denoised_estimate(struct lull_denoised_pair *pair, size_t first, size_t n, const struct lull_estimate_in *in)
+{
+    const struct lull_estimate *error = &pair->part.error;
+    lull_estimate_pixels(in, n,
+                         &(struct lull_estimate){error->denoised + first, error->agreed + first, error->noisy + first});
+}
+
+void lull_denoised_weigh(struct lull_denoised_pair *pair)
+{
+    struct lull_denoised_part *part = &pair->part;
+    lull_blend_weights(&part->error, part->width, part->height, pair->scratch, part->weight, part->apart);
+    lull_blend_despeckle(part->apart, part->pixels, part->denoised[0], part->denoised[1]);
+}
+
+void lull_denoised_blend(const struct lull_denoised_pair *pair, const float *weight, float *const kept[2])
+{
+    const struct lull_denoised_part *part = &pair->part;
+    for (int k = 0; k < 2; k++)
+        lull_blend(part->half[k], part->denoised[k], weight, part->pixels, kept[k]);
+}
