@@ -364,7 +364,7 @@ host-model: $(BIN)/lull-render $(CRITERIA) ## 1,000 runs that are interrupted, k
 HEADERS := $(shell find pathtracer ggn plugin-api tests -name '*.h' 2>/dev/null)
 LOOK := -fsyntax-only
 C_LOOK = $(CC) -std=c17 -D_POSIX_C_SOURCE=200809L $(WARNC) -Wno-unused-const-variable
-PUBLIC := $(addprefix plugin-api/include/lull/,criterion.h criterion_kit.h host.h)
+PUBLIC := $(addprefix plugin-api/include/lull/,criterion.h criterion_kit.h host.h host_draft.h)
 hdr-check: ## each header compiles alone, no include goes up, no long function or line, layout by clang-format 14
 	@scripts/check-floors
 	@$(foreach h,$(HEADERS), \

@@ -5,7 +5,7 @@
 #ifndef PT_RENDER_HOST_H
 #define PT_RENDER_HOST_H
 
-#include <lull/host.h>
+#include <lull/host_draft.h>
 
 #include "base/err.h"
 #include "base/log.h"

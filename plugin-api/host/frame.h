@@ -2,7 +2,7 @@
 #ifndef LULL_HOST_FRAME_H
 #define LULL_HOST_FRAME_H
 
-#include <lull/host.h>
+#include <lull/host_draft.h>
 
 #include <stdatomic.h>
 
@@ -74,6 +74,14 @@ struct lull_host_frame {
     uint32_t *answer_count;           /* owns; [blocks] */
     uint32_t answer_room;             /* 0: none are kept */
     int told_halves;                  /* that half_spp is never written */
+};
+
+/* What a criterion said about a block last. */
+struct lull_host_said {
+    uint64_t spp;     /* samples when it was asked; 0: it never was */
+    double predicted; /* samples at which it expects to stop; NaN: it does not say */
+    int32_t stopped;  /* it said stop: `predicted` is where, at most spp */
+    int32_t unmet;    /* its noise sits in few pixels or grows: light that most of its pixels have not met yet */
 };
 
 /* What a row of a quote asks, and what it was told. */
@@ -163,9 +171,39 @@ struct lull_view lull_host_seen(const struct lull_host_view *view, const struct 
 
 /* --- ask.c ---------------------------------------------------------------------------------------------------------- */
 
+/* The decision where no criterion was asked: go on. */
+struct lull_decision lull_host_undecided(void);
+
 /* A block as a criterion gets it, of the view's halves if it has some. */
 struct lull_block lull_host_state_of(const struct lull_host_block *block, uint32_t index, int has_half);
 
+/* --- schedule.c ------------------------------------------------------------------------------------------------------ */
+
+/* The sample count of the check after one at spp: `asked` when the criterion named one, else a geometric step. */
+uint64_t lull_host_next_check(const struct lull_host_blocks *blocks, uint64_t spp, uint64_t asked);
+
+/* --- forecast.c ------------------------------------------------------------------------------------------------------ */
+
+/* Predictions are taken as they are: from a hundred samples on they were neither low nor high (docs/quote.md). The interval
+ * widens with the octaves from the samples at hand to the predicted ones, and to an octave either way for a block that is
+ * `unmet`. It does not stop before `spp`: samples that it has or gets in any case, 0 … spp_max. */
+struct lull_host_stop_at lull_host_expect(const struct lull_host_said *said, uint64_t spp, uint64_t spp_max);
+/* Of a block of a render that is going on. A stopped block: where it did. */
+struct lull_host_stop_at lull_host_expect_block(const struct lull_host_blocks *blocks, const struct lull_host_block *block);
+/* More checks of a block that stops at `spp`: as many per octave as the criterion asks for now. */
+double lull_host_expect_checks(const struct lull_host_block *block, double spp);
+
+/* Work that is left in one block, whose samples all cost the same. */
+struct lull_host_work {
+    double spp;      /* more samples per pixel, >= 0 */
+    double thread_s; /* for all of them */
+    int64_t rows;    /* of pixels: what threads share a block by */
+};
+
+/* Wall seconds of `count` blocks sampled side by side, each until it has its samples: a block's rows are all that can be
+ * done at once, so the last blocks leave threads idle. Sorts `work`. threads >= 1; as many processors are taken to be
+ * free. */
+double lull_host_wall_s(struct lull_host_work *work, uint32_t count, int32_t threads);
 /* --- stop_map.c ----------------------------------------------------------------------------------------------------- */
 
 /* The picture of lull_host_value_map; the caller frees out->rgb. */

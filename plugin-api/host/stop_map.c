@@ -14,8 +14,6 @@
 enum { VIEW_NAME = 256 }; /* bytes; no file system has longer names */
 enum { LEGEND_HEIGHT = 44, MIN_BLOCK_PX = 48, MAX_ENLARGE = 16, MIN_WIDTH = 160 };
 
-void lull_host_viridis(double t, uint8_t rgb[3]) { pic_colour(PIC_VIRIDIS, t, rgb); }
-
 /* Nothing has no place on a logarithmic scale. */
 static double positive(double value) { return value > 0.0 ? value : 1.0; }
 
@@ -45,7 +43,7 @@ static void put(const struct pic_canvas *c, int x, int y, const uint8_t rgb[3])
 static void paint_block(const struct pic_canvas *canvas, int x0, int y0, int x1, int y1, double value, double t, int digits)
 {
     uint8_t colour[3], edge[3];
-    lull_host_viridis(t, colour);
+    pic_colour(PIC_VIRIDIS, t, colour);
     for (int c = 0; c < 3; c++)
         edge[c] = (uint8_t)(colour[c] * 3 / 4);
     for (int y = y0; y < y1; y++)
@@ -71,7 +69,7 @@ static void paint_legend(const struct pic_canvas *canvas, int top, double low, d
             put(canvas, x, y, paper);
     for (int x = left; x < right; x++) {
         uint8_t colour[3];
-        lull_host_viridis(high > low ? (double)(x - left) / (double)(right - left - 1) : 0.5, colour);
+        pic_colour(PIC_VIRIDIS, high > low ? (double)(x - left) / (double)(right - left - 1) : 0.5, colour);
         for (int y = top + 6; y < top + 20; y++)
             put(canvas, x, y, colour);
     }

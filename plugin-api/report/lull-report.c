@@ -4,7 +4,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include <lull/host.h>
+#include <lull/host_draft.h>
 
 #include "base/files.h"
 #include "base/interrupt.h"

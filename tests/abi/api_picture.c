@@ -15,7 +15,7 @@
 
 #include <cmocka.h>
 
-#include <lull/host.h>
+#include <lull/host_draft.h>
 
 #include "support/api_folders.h"
 #include "support/splitmix.h"

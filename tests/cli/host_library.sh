@@ -3,22 +3,25 @@
 . "$(dirname "$0")/tap_setup"
 build=${BUILD:-build}
 lib=$build/lib/liblull-host.so.1
-header=plugin-api/include/lull/host.h
+header=plugin-api/include/lull/host.h draft=plugin-api/include/lull/host_draft.h
 flags="-Wall -Wextra -Wpedantic -Wshadow -Wundef -Wconversion -Werror -fsyntax-only -Iplugin-api/include"
 for cc in gcc clang; do
     command -v $cc >/dev/null 2>&1 || continue
     # shellcheck disable=SC2086
     t "$cc, C99, no padding" $cc -std=c99 $flags -Wpadded -xc $header
+    t "  …and the draft" $cc -std=c99 $flags -Wpadded -xc $draft
 done
 for cxx in g++ clang++; do
     command -v $cxx >/dev/null 2>&1 || continue
     # shellcheck disable=SC2086
     t "$cxx, C++11, no padding" $cxx -std=c++11 $flags -Wold-style-cast -Wpadded -xc++ $header
+    t "  …and the draft" $cxx -std=c++11 $flags -Wold-style-cast -Wpadded -xc++ $draft
 done
 # What the header and the loader's declare, what the version script lists and what the library exports are one list.
-sed -n -e "s/^LULL_EXPORT .*[ *]\(lull_[a-z_]*\)(.*/\1/p" -e "s/^\(lull_[a-z_]*\)(.*/\1/p" $header plugin-api/include/lull/loader.h | sort >"$tmp/declared"
+sed -n -e "s/^LULL_EXPORT .*[ *]\(lull_[a-z_]*\)(.*/\1/p" -e "s/^\(lull_[a-z_]*\)(.*/\1/p" $header $draft plugin-api/include/lull/loader.h | sort >"$tmp/declared"
 sed -n 's/^ *\(lull_[a-z_]*\);$/\1/p' plugin-api/host.map | sort >"$tmp/listed"
 nm -D --defined-only "$lib" | awk '$2 != "A" { sub("@.*", "", $3); print $3 }' | sort >"$tmp/exported"
+t "the frozen core has at most 30 functions, and a renderer needs no more" sh -c "[ \$(grep -c ^LULL_EXPORT $header) -le 30 ] && ! grep -q draft plugin-api/examples/host.cpp"
 t "exports what the headers declare" diff "$tmp/declared" "$tmp/exported"
 t "and what the version script lists" diff "$tmp/listed" "$tmp/exported"
 t "each with its version" sh -c "! nm -D --defined-only $lib | awk '\$2 != \"A\"' | grep -v '@@LULL_HOST_1\$'"

@@ -13,6 +13,7 @@
 
 #include "host/frame.h"
 #include "image/exr.h"
+#include "picture/colour_map.h"
 #include "picture/read.h"
 #include "support/approve.h"
 
@@ -243,7 +244,7 @@ static size_t colours(const char *words, char *out)
     char *end;
     for (double t = strtod(words, &end); end != words; t = strtod(words, &end)) {
         uint8_t rgb[3];
-        lull_host_viridis(t, rgb);
+        pic_colour(PIC_VIRIDIS, t, rgb);
         n += (size_t)sprintf(out + n, " #%02x%02x%02x", rgb[0], rgb[1], rgb[2]);
         words = end;
     }

@@ -19,6 +19,7 @@
 #include "base/files.h"
 #include "base/version.h"
 #include "host/frame.h"
+#include "picture/colour_map.h"
 #include "picture/read.h"
 #include "render/output.h"
 #include "render/progress.h"
@@ -285,8 +286,8 @@ static void stop_map_picture(void **state)
     assert_int_equal(lull_host_paint(&blocks, values, "spp", &map, NULL), 0);
     assert_int_equal(map.width, 400);
     assert_true(map.height > 100);
-    lull_host_viridis(0.0, low);
-    lull_host_viridis(1.0, high);
+    pic_colour(PIC_VIRIDIS, 0.0, low);
+    pic_colour(PIC_VIRIDIS, 1.0, high);
     assert_memory_equal(map.rgb + 3 * (5 * 400 + 5), low, 3);
     assert_memory_equal(map.rgb + 3 * (5 * 400 + 205), high, 3);
     int ink = 0;
