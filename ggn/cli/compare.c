@@ -1,9 +1,7 @@
 /* `ggn compare REFERENCE MODEL`: stop maps against (human) thresholds. */
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "base/files.h"
 #include "base/options.h"
@@ -35,9 +33,9 @@ static int write_outputs(const struct options *o, const struct ggn_pairing *p, c
 {
     char path[4096];
     struct base_file_out out;
-    if (mkdir(o->dir, 0777) != 0 && errno != EEXIST)
-        return base_fail(err, BASE_EIO, "%s: %s", o->dir, strerror(errno));
-    int rc = base_file_join(path, o->dir, "blocks.csv", err);
+    int rc = base_make_folder(o->dir, err);
+    if (!rc)
+        rc = base_file_join(path, o->dir, "blocks.csv", err);
     if (!rc)
         rc = ggn_compare_write_blocks(path, p, err);
     if (!rc)

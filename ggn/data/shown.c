@@ -1,21 +1,12 @@
 #include "data/shown.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/files.h"
 #include "data/shown_source.h"
-
-static int make_dir(const char *path, struct base_err *err)
-{
-    if (mkdir(path, 0777) != 0 && errno != EEXIST)
-        return base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
-    return 0;
-}
 
 static int is_named(const struct ggn_shown *s, int index)
 {
@@ -48,7 +39,7 @@ static int make_folder(const struct ggn_shown_request *q, const struct ggn_shown
     snprintf(folder, sizeof folder, "v%d", index);
     if (!rc)
         rc = base_file_join(path, q->dir, folder, err);
-    return !rc ? make_dir(path, err) : rc;
+    return !rc ? base_make_folder(path, err) : rc;
 }
 
 static int make_view(const struct ggn_shown_request *q, const char *text, int index, struct ggn_shown *s,
@@ -87,7 +78,7 @@ int ggn_shown_make(const struct ggn_shown_request *q, struct ggn_shown *s, struc
     int kinds = q->n_kinds > 0 ? q->n_kinds : 1, n = q->n_views * kinds;
     if (n > GGN_SHOWN_MAX_VIEWS)
         return base_fail(err, BASE_EINVAL, "at most %d views, each kind counted", GGN_SHOWN_MAX_VIEWS);
-    int rc = make_dir(q->dir, err);
+    int rc = base_make_folder(q->dir, err);
     if (rc)
         return rc;
     s->views = calloc((size_t)n, sizeof *s->views);

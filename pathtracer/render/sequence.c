@@ -381,9 +381,9 @@ static int prepare(struct recorder *r, struct base_err *err)
     else if ((rc = pt_sequence_choose(r->config->blocks, r->chosen, r->grid->count, err)) != 0)
         return rc;
     describe(r);
-    if (mkdir(r->config->directory, 0777) != 0 && errno != EEXIST)
-        return base_fail(err, BASE_EINVAL, "%s: %s", r->config->directory, strerror(errno));
-    rc = base_lock_folder(&r->lock, r->config->directory, err);
+    rc = base_make_folder(r->config->directory, err);
+    if (!rc)
+        rc = base_lock_folder(&r->lock, r->config->directory, err);
     return rc ? rc : resume(r, err);
 }
 

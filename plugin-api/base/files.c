@@ -250,6 +250,11 @@ static int put_in_place(const char *tmp_path, const char *path, struct base_err 
     return rc;
 }
 
+int base_make_folder(const char *path, struct base_err *err)
+{
+    return mkdir(path, 0777) == 0 || errno == EEXIST ? 0 : base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
+}
+
 int base_file_join(char *path, const char *dir, const char *name, struct base_err *err)
 {
     int n = snprintf(path, 4096, "%s/%s", dir, name);

@@ -144,6 +144,10 @@ static void what_cannot_be_written(void **state)
     says(base_file_join(path, "abcde", name, &err), BASE_EINVAL, &err, "abcde...: the path is too long");
     assert_int_equal(base_file_join(path, "a/b", "c", &err), 0);
     assert_string_equal(path, "a/b/c");
+    for (int i = 0; i < 2; i++) /* one that is there is as good */
+        assert_int_equal(base_make_folder("folder/made", &err), 0);
+    assert_int_equal(rmdir("folder/made"), 0);
+    says(base_make_folder("folder/none/made", &err), BASE_EIO, &err, "folder/none/made: No such file or directory");
 }
 
 static void outputs_appear_when_they_are_whole(void **state)
