@@ -9,19 +9,20 @@
 #include "base/files.h"
 #include "base/json.h"
 #include "base/options.h"
-#include "baselines/learned.h"
+#include "baselines/baseline.h"
 #include "cli/commands.h"
+#include "cli/replay.h"
 #include "eval/cost.h"
-#include "eval/trained.h"
 #include "observer/curve.h"
 #include "observer/observer.h"
 
-enum { MAX_FILES = 16 };
+enum { LEAST_WINDOW = 6 }; /* images */
 
 struct options {
-    const char *data, *out, *observer, *models[MAX_FILES], *baselines[MAX_FILES], *thresholds[MAX_FILES];
-    int n_models, n_baselines, n_thresholds, split, threads, no_quality, recorded, sizes, scores, precision, no_noise_maps;
-    double ratio, cadence;
+    struct ggn_replay_options replay;
+    const char *out;
+    int split, sizes, scores, precision;
+    double cadence;
 };
 
 static const char *const precisions[] = {"f32", "f64", NULL}; /* enum ggn_precision */
@@ -29,33 +30,33 @@ static const char *const split_words[] = {"train", "validation", "test", "people
 
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
-    {"data", 'd', "DATA", TO(data), .input = BASE_FOLDER, .needed = 1, .help = "labelled data set (needed)"},
+    {"data", 'd', "DATA", TO(replay.data), .input = BASE_FOLDER, .needed = 1, .help = "labelled data set (needed)"},
     {"split", 0, NULL, TO(split), .words = split_words, .help = "which of its views (test)"},
-    {"model", 'm', "FILE", BASE_TO_LIST(struct options, models, n_models, "files"), .input = BASE_FILE,
+    {"model", 'm', "FILE", BASE_TO_LIST(struct options, replay.models, replay.n_models, "files"), .input = BASE_FILE,
      .help = "trained network (.ggn); may be repeated"},
-    {"baseline", 0, "FILE", BASE_TO_LIST(struct options, baselines, n_baselines, "files"), .input = BASE_FILE,
+    {"baseline", 0, "FILE", BASE_TO_LIST(struct options, replay.baselines, replay.n_baselines, "files"), .input = BASE_FILE,
      .help = "what ggn baseline wrote; may be repeated"},
-    {"thresholds", 0, "CSV", BASE_TO_LIST(struct options, thresholds, n_thresholds, "files"), .input = BASE_FILE,
-     .help = "stop where this file says (published thresholds); may be repeated"},
-    {"observer", 'O', "FILE", TO(observer), .input = BASE_FILE,
+    {"thresholds", 0, "CSV", BASE_TO_LIST(struct options, replay.thresholds, replay.n_thresholds, "files"),
+     .input = BASE_FILE, .help = "stop where this file says (published thresholds); may be repeated"},
+    {"observer", 'O', "FILE", TO(replay.observer), .input = BASE_FILE,
      .help = "the observer's parameters, each view without itself"},
     {"output", 'o', "FILE", TO(out), .output = BASE_FILE, .help = "write there instead of printing"},
-    {"ratio", 0, "R", TO(ratio), 1, 16, .help = "thin the levels, and the checks, to this ratio of samples"},
+    {"ratio", 0, "R", TO(replay.ratio), 1, 16, .help = "thin the levels, and the checks, to this ratio of samples"},
     {"cadence", 0, "R", TO(cadence), 1.02, 16,
      .help = "simulate all levels, this far apart, and ask networks and baselines as often"},
     {"precision", 0, NULL, TO(precision), .words = precisions, .help = "of the networks' arithmetic (f32)"},
     {"scores", 0, NULL, TO(scores), .help = "of the networks' own settings only: p of every window, and the stops"},
-    {"recorded", 0, NULL, TO(recorded), .help = "recorded levels only; blocks that show noise in the last one are left out"},
-    {"no-pictures", 0, NULL, TO(no_noise_maps), .help = "networks as in a host without half buffers"},
-    {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP"},
+    {"recorded", 0, NULL, TO(replay.recorded),
+     .help = "recorded levels only; blocks that show noise in the last one are left out"},
+    {"no-pictures", 0, NULL, TO(replay.no_halves), .help = "networks as in a host without half buffers"},
+    {"no-quality", 0, NULL, TO(replay.no_quality), .help = "skip FLIP"},
     {"sizes", 0, NULL, TO(sizes), .help = "also thresholds of the blocks' parts, as of smaller blocks"},
-    {"threads", 't', "N", TO(threads), 1, 1024, .help = "worker threads (all processors)"},
+    {"threads", 't', "N", TO(replay.threads), 1, 1024, .help = "worker threads (all processors)"},
     {0}};
 
-struct job {
+struct costing {
     const struct options *o;
-    struct ggn_eval_set set;
-    cJSON *learned[MAX_FILES]; /* own; the data that each model was made with */
+    struct ggn_replay r;
     enum ggn_split split;
     double *checks, *stop; /* [blocks] */
     cJSON *points;
@@ -87,45 +88,45 @@ static void put_cost(cJSON *to, const struct ggn_cost *c, int *failed)
 }
 
 /* One setting of one criterion: a point for each scene and one for all together (scene null). */
-static void put_setting(struct job *j, const char *criterion, const char *parameter, double value, const double *stop,
+static void put_setting(struct costing *j, const char *criterion, const char *parameter, double value, const double *stop,
                         const double *checks)
 {
-    const struct ggn_dataset *d = &j->set.images.data;
+    const struct ggn_dataset *d = &j->r.set.images.data;
     cJSON *o = base_json_object(j->points, NULL, &j->failed);
     base_json_text(o, "criterion", criterion, &j->failed);
     base_json_text(o, "dial", parameter, &j->failed);
     base_json_number(o, "value", value, &j->failed);
     cJSON *stops = base_json_array(o, "stops", &j->failed);
-    for (int b = 0; b < j->set.n_blocks; b++)
-        if (j->set.blocks[b].split == j->split)
+    for (int b = 0; b < j->r.set.n_blocks; b++)
+        if (j->r.set.blocks[b].split == j->split)
             base_json_number(stops, NULL, floor(stop[b] + 0.5), &j->failed);
     cJSON *scenes = base_json_object(o, "scenes", &j->failed);
-    for (int scene = 0; scene < j->set.n_scenes; scene++) {
+    for (int scene = 0; scene < j->r.set.n_scenes; scene++) {
         struct ggn_cost c;
-        ggn_cost_of(&j->set, j->split, scene, stop, checks, &c);
+        ggn_cost_of(&j->r.set, j->split, scene, stop, checks, &c);
         if (c.blocks > 0)
             put_cost(base_json_object(scenes, d->views[scene].manifest.scene, &j->failed), &c, &j->failed);
     }
 }
 
-static void put_method(struct job *j, const char *parameter, double value, const struct ggn_method *m)
+static void put_method(struct costing *j, const char *parameter, double value, const struct ggn_method *m)
 {
-    ggn_cost_checks(m, &j->set, j->checks);
+    ggn_cost_checks(m, &j->r.set, j->checks);
     put_setting(j, m->name, parameter, value, m->stop, j->checks);
 }
 
 /* Where a block is in the lists of stops. */
-static int place_of(const struct job *j, int b)
+static int place_of(const struct costing *j, int b)
 {
     int n = 0;
     for (int k = 0; k < b; k++)
-        n += j->set.blocks[k].split == j->split;
+        n += j->r.set.blocks[k].split == j->split;
     return n;
 }
 
-static void put_scenes(struct job *j, cJSON *root)
+static void put_scenes(struct costing *j, cJSON *root)
 {
-    const struct ggn_eval_set *s = &j->set;
+    const struct ggn_eval_set *s = &j->r.set;
     cJSON *to = base_json_object(root, "scenes", &j->failed);
     for (int scene = 0; scene < s->n_scenes; scene++) {
         cJSON *o = NULL, *blocks = NULL;
@@ -152,14 +153,14 @@ static void put_scenes(struct job *j, cJSON *root)
     }
 }
 
-static void put_threshold(struct job *j, cJSON *to, const struct ggn_curve *c)
+static void put_threshold(struct costing *j, cJSON *to, const struct ggn_curve *c)
 {
     int censored;
     base_json_number(to, NULL, ggn_curve_threshold(c, ggn_observer_default.level, &censored), &j->failed);
 }
 
 /* The list of a scene's parts of `side` pixels, empty when nothing has been put into it. */
-static cJSON *parts_of(struct job *j, cJSON *to, const char *scene, int side)
+static cJSON *parts_of(struct costing *j, cJSON *to, const char *scene, int side)
 {
     char key[16];
     snprintf(key, sizeof key, "%d", side);
@@ -170,7 +171,7 @@ static cJSON *parts_of(struct job *j, cJSON *to, const char *scene, int side)
 }
 
 /* Thresholds of every square of `side` pixels that a block divides into. */
-static int put_parts(struct job *j, cJSON *to, const struct seq_block *p, int side, struct base_err *err)
+static int put_parts(struct costing *j, cJSON *to, const struct seq_block *p, int side, struct base_err *err)
 {
     for (int k = 0; k < (int)(p->width / (uint32_t)side * (p->height / (uint32_t)side)); k++) {
         struct ggn_curve c;
@@ -199,9 +200,9 @@ static int four_at(const struct seq_manifest *m, int x, int y, int side, uint32_
 }
 
 /* Thresholds of every square of four neighbours, of twice a block's side. */
-static int put_joined(struct job *j, cJSON *to, const struct ggn_dataset_view *v, struct base_err *err)
+static int put_joined(struct costing *j, cJSON *to, const struct ggn_dataset_view *v, struct base_err *err)
 {
-    const int side = j->set.images.width;
+    const int side = j->r.set.images.width;
     for (int y = 0; y + 2 * side <= (int)v->manifest.height; y += 2 * side)
         for (int x = 0; x + 2 * side <= (int)v->manifest.width; x += 2 * side) {
             struct seq_block four[4];
@@ -225,10 +226,10 @@ static int put_joined(struct job *j, cJSON *to, const struct ggn_dataset_view *v
 }
 
 /* For each scene and side all thresholds of such parts, by the observer from the halves. */
-static int put_sizes(struct job *j, cJSON *root, struct base_err *err)
+static int put_sizes(struct costing *j, cJSON *root, struct base_err *err)
 {
     static const int sides[] = {25, 50, 100, 200};
-    const struct ggn_eval_set *s = &j->set;
+    const struct ggn_eval_set *s = &j->r.set;
     cJSON *to = base_json_object(root, "parts", &j->failed);
     int rc = 0;
     for (int b = 0; b < s->n_blocks && !rc; b++) {
@@ -252,45 +253,45 @@ static int put_sizes(struct job *j, cJSON *root, struct base_err *err)
 
 /* --- quality parameters --- */
 
-static void vary(struct job *j, struct ggn_method *m, const char *parameter, const double *values, size_t n)
+static void vary(struct costing *j, struct ggn_method *m, const char *parameter, const double *values, size_t n)
 {
     double own = m->cut;
     for (size_t i = 0; i < n; i++) {
         m->cut = values[i];
-        ggn_method_run(m, &j->set);
+        ggn_method_run(m, &j->r.set);
         put_method(j, parameter, values[i], m);
     }
     m->cut = own;
-    ggn_method_run(m, &j->set);
+    ggn_method_run(m, &j->r.set);
 }
 
 #define COUNT(a) (sizeof(a) / sizeof(a)[0])
 static const double shares[] = {0.9, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05, 0.02, 0.01, 0.004};
 
 /* The same samples everywhere: as the host's own limit, and as the criterion `fixed`, which is asked once. */
-static void cost_uniform(struct job *j)
+static void cost_uniform(struct costing *j)
 {
     for (double spp = 16; spp <= 16384; spp *= 2) {
-        for (int b = 0; b < j->set.n_blocks; b++) {
+        for (int b = 0; b < j->r.set.n_blocks; b++) {
             j->stop[b] = spp;
             j->checks[b] = 1;
         }
         put_setting(j, "uniform", "spp", spp, j->stop, NULL);
         put_setting(j, "fixed", "spp", spp, j->stop, j->checks);
     }
-    for (int b = 0; b < j->set.n_blocks; b++)
-        j->stop[b] = j->set.blocks[b].label.threshold;
+    for (int b = 0; b < j->r.set.n_blocks; b++)
+        j->stop[b] = j->r.set.blocks[b].label.threshold;
     put_setting(j, "limit", "none", 0, j->stop, NULL);
 }
 
-static int cost_errors(struct job *j, struct base_err *err)
+static int cost_errors(struct costing *j, struct base_err *err)
 {
     static const double variance[] = {0.64, 0.45, 0.32, 0.23, 0.16, 0.113, 0.08, 0.057, 0.04, 0.03, 0.02, 0.014, 0.01};
     static const double halfbuf[] = {0.03, 0.021, 0.015, 0.011, 0.0075, 0.0053, 0.004, 0.0028, 0.002, 0.0014, 0.001};
     for (int k = 0; k < 2; k++) {
         struct ggn_method m;
-        int available,
-            rc = k ? ggn_method_halfbuf(&m, &j->set, &available, err) : ggn_method_variance(&m, &j->set, &available, err);
+        int available, rc = k ? ggn_method_halfbuf(&m, &j->r.set, &available, err)
+                              : ggn_method_variance(&m, &j->r.set, &available, err);
         if (rc)
             return rc;
         const double *thresholds = k ? halfbuf : variance, own = k ? 0.004 : 0.03; /* the criteria's defaults */
@@ -306,11 +307,11 @@ static int cost_errors(struct job *j, struct base_err *err)
     return 0;
 }
 
-static int put_observer(struct job *j, int halves, const char *parameter, double visible, double growth,
+static int put_observer(struct costing *j, int halves, const char *parameter, double visible, double growth,
                         struct base_err *err)
 {
     struct ggn_method m;
-    int available, rc = ggn_method_observer(&m, &j->set, j->o->observer, halves, visible, growth, &available, err);
+    int available, rc = ggn_method_observer(&m, &j->r.set, j->o->replay.observer, halves, visible, growth, &available, err);
     if (rc)
         return rc;
     if (available)
@@ -319,7 +320,7 @@ static int put_observer(struct job *j, int halves, const char *parameter, double
     return 0;
 }
 
-static int cost_observer(struct job *j, struct base_err *err)
+static int cost_observer(struct costing *j, struct base_err *err)
 {
     static const double growths[] = {1.05, 1.1, 1.25, 1.5, 2.0};
     int rc = 0;
@@ -334,18 +335,18 @@ static int cost_observer(struct job *j, struct base_err *err)
 }
 
 /* How many checks in a row must pass. */
-static void turn_passes(struct job *j, struct ggn_method *m)
+static void turn_passes(struct costing *j, struct ggn_method *m)
 {
     const int own = m->passes;
     for (m->passes = 1; m->passes <= 4; m->passes++) {
-        ggn_method_run(m, &j->set);
+        ggn_method_run(m, &j->r.set);
         put_method(j, "passes", m->passes, m);
     }
     m->passes = own;
-    ggn_method_run(m, &j->set);
+    ggn_method_run(m, &j->r.set);
 }
 
-static void cost_network(struct job *j, struct ggn_method *m)
+static void cost_network(struct costing *j, struct ggn_method *m)
 {
     put_method(j, "own", m->cut, m);
     if (j->o->cadence > 0 || j->o->scores)
@@ -354,13 +355,13 @@ static void cost_network(struct job *j, struct ggn_method *m)
 }
 
 /* Where the law knows the noise between levels a residual model stops there, too. */
-static int cost_residual(struct job *j, struct ggn_method *m, const struct ggn_policy *policy, struct base_err *err)
+static int cost_residual(struct costing *j, struct ggn_method *m, const struct ggn_policy *policy, struct base_err *err)
 {
     int rc = 0;
     put_method(j, "own", m->cut, m);
     for (size_t i = 0; i < COUNT(shares) && !rc && !(j->o->cadence > 0 || j->o->scores); i++) {
         m->cut = shares[i];
-        rc = ggn_eval_trained_stop(m, &j->set, policy, j->o->observer, err);
+        rc = ggn_eval_trained_stop(m, &j->r.set, policy, j->o->replay.observer, err);
         if (!rc)
             put_method(j, "visible", shares[i], m);
     }
@@ -369,118 +370,85 @@ static int cost_residual(struct job *j, struct ggn_method *m, const struct ggn_p
 }
 
 /* Beside the point that was just put: p of every window of the split, null where none was judged. */
-static void put_scores(struct job *j, const struct ggn_method *m)
+static void put_scores(struct costing *j, const struct ggn_method *m)
 {
     cJSON *point = cJSON_GetArrayItem(j->points, cJSON_GetArraySize(j->points) - 1);
     cJSON *scores = j->o->scores ? base_json_array(point, "scores", &j->failed) : NULL;
-    for (int b = 0; b < j->set.n_blocks && scores; b++)
-        for (size_t i = j->set.blocks[b].first; i < j->set.blocks[b].end && j->set.blocks[b].split == j->split; i++)
+    for (int b = 0; b < j->r.set.n_blocks && scores; b++)
+        for (size_t i = j->r.set.blocks[b].first; i < j->r.set.blocks[b].end && j->r.set.blocks[b].split == j->split; i++)
             base_json_number(scores, NULL, m->score[i], &j->failed);
     if (scores)
         base_json_number(point, "cut", m->cut, &j->failed);
 }
 
-static int cost_models(struct job *j, struct base_threads *threads, struct base_err *err)
+static int cost_models(struct costing *j, struct base_err *err)
 {
     int rc = 0;
-    for (int i = 0; i < j->o->n_models && !rc; i++) {
-        struct ggn_model *model = NULL;
+    for (int i = 0; i < j->o->replay.n_models && !rc; i++) {
         struct ggn_policy policy;
         struct ggn_method m;
         char name[GGN_METHOD_NAME];
-        snprintf(name, sizeof name, "%.32s%s%s%s", base_file_name(j->o->models[i]), j->o->precision ? " " : "",
-                 j->o->precision ? precisions[j->o->precision] : "", j->o->no_noise_maps ? ", no halves" : "");
-        rc = ggn_model_load(j->o->models[i], &model, err);
+        snprintf(name, sizeof name, "%.32s%s%s%s", base_file_name(j->o->replay.models[i]), j->o->precision ? " " : "",
+                 j->o->precision ? precisions[j->o->precision] : "", j->o->replay.no_halves ? ", no halves" : "");
+        rc = ggn_replay_policy(&j->r, i, &policy, err);
         if (!rc)
-            rc = ggn_policy_of(model, &policy, err);
-        if (j->o->cadence > 0)
-            policy.ratio = j->o->cadence, policy.n_levels = 0;
-        if (!rc)
-            rc = ggn_eval_trained(&m, &j->set, model, &policy, name, (enum ggn_precision)j->o->precision, j->o->observer,
-                                  threads, err);
-        if (!rc) {
-            if (m.correction)
-                rc = cost_residual(j, &m, &policy, err);
-            else
-                cost_network(j, &m);
-            put_scores(j, &m);
-            ggn_method_release(&m);
-        }
-        ggn_model_destroy(model);
-    }
-    return rc;
-}
-
-static int cost_baselines(struct job *j, struct base_threads *threads, struct base_err *err)
-{
-    int rc = 0;
-    for (int i = 0; i < j->o->n_baselines && !rc; i++) {
-        struct ggn_baseline b;
-        struct ggn_feature_set features = {0};
-        struct ggn_method m;
-        rc = ggn_baseline_load(&b, j->o->baselines[i], GGN_BASELINES, err);
+            rc = ggn_replay_model(&j->r, i, name, (enum ggn_precision)j->o->precision, &m, err);
         if (rc)
-            return rc;
-        if (j->o->cadence > 0)
-            b.policy.ratio = j->o->cadence, b.policy.n_levels = 0;
-        rc = b.window > j->set.window ? base_fail(err, BASE_EINVAL, "%s: it judges %d images, windows here have %d",
-                                                  j->o->baselines[i], b.window, j->set.window)
-                                      : ggn_feature_set_make(&features, &b, &j->set, threads, err);
-        if (!rc && !(rc = ggn_method_baseline(&m, &j->set, &b, &features, threads, err))) {
-            snprintf(m.name, sizeof m.name, "%s", ggn_baseline_names[b.kind]);
-            put_method(j, "own", m.cut, &m);
-            if (!(j->o->cadence > 0)) {
-                vary(j, &m, "visible", shares, COUNT(shares));
-                turn_passes(j, &m);
-            }
-            ggn_method_release(&m);
-        }
-        ggn_feature_set_release(&features);
-        ggn_baseline_release(&b);
-    }
-    return rc;
-}
-
-static int cost_thresholds(struct job *j, struct base_err *err)
-{
-    int rc = 0, available;
-    for (int i = 0; i < j->o->n_thresholds && !rc; i++) {
-        struct ggn_method m;
-        rc = ggn_method_thresholds(&m, &j->set, j->o->thresholds[i], j->split, &available, err);
-        if (rc)
-            return rc;
-        if (available)
-            put_setting(j, m.name, "own", 0, m.stop, NULL);
+            break;
+        if (m.correction)
+            rc = cost_residual(j, &m, &policy, err);
         else
-            rc = base_fail(err, BASE_EINVAL, "%s: not all views of the split '%s' are in it", j->o->thresholds[i],
-                           ggn_split_names[j->split]);
+            cost_network(j, &m);
+        put_scores(j, &m);
         ggn_method_release(&m);
     }
     return rc;
 }
 
-/* What the models take, the longest window, and the scenes that they know. */
-static int read_models(struct job *j, struct ggn_eval_options *eo, struct base_err *err)
+static int cost_baselines(struct costing *j, struct base_err *err)
 {
-    const struct options *o = j->o;
-    int rc = 0;
-    for (int i = 0; i < o->n_models && !rc; i++) {
-        struct ggn_model *model = NULL;
-        rc = ggn_model_load(o->models[i], &model, err);
-        if (!rc) {
-            eo->noise_maps |= model->hyper.noise_map && (model->hyper.reach > 0 || !o->no_noise_maps);
-            eo->measures |= model->hyper.reach > 0;
-            j->learned[i] = cJSON_Duplicate(cJSON_GetObjectItemCaseSensitive(model->provenance, "data"), 1);
-            eo->window = model->hyper.window > eo->window ? model->hyper.window : eo->window;
+    int rc = 0, kind;
+    for (int i = 0; i < j->o->replay.n_baselines && !rc; i++) {
+        struct ggn_method m;
+        rc = ggn_replay_baseline(&j->r, i, &m, &kind, err);
+        if (rc)
+            break;
+        snprintf(m.name, sizeof m.name, "%s", ggn_baseline_names[kind]);
+        put_method(j, "own", m.cut, &m);
+        if (!(j->o->cadence > 0)) {
+            vary(j, &m, "visible", shares, COUNT(shares));
+            turn_passes(j, &m);
         }
-        ggn_model_destroy(model);
+        ggn_method_release(&m);
     }
     return rc;
 }
 
-static int cost(struct job *j, struct base_threads *threads, struct base_err *err)
+static int cost_thresholds(struct costing *j, struct base_err *err)
 {
-    size_t n = (size_t)j->set.n_blocks;
+    int rc = 0;
+    for (int i = 0; i < j->o->replay.n_thresholds && !rc; i++) {
+        struct ggn_method m;
+        rc = ggn_replay_thresholds(&j->r, i, j->split, &m, err);
+        if (rc)
+            break;
+        put_setting(j, m.name, "own", 0, m.stop, NULL);
+        ggn_method_release(&m);
+    }
+    return rc;
+}
+
+/* Networks and baselines are asked as often as the levels are simulated. */
+static void adjust(const void *command, struct ggn_policy *policy)
+{
+    const struct options *o = command;
+    if (o->cadence > 0)
+        policy->ratio = o->cadence, policy->n_levels = 0;
+}
+
+static int cost(struct costing *j, struct base_err *err)
+{
+    size_t n = (size_t)j->r.set.n_blocks;
     cJSON *root = cJSON_CreateObject();
     int rc = 0;
     j->checks = calloc(n, sizeof *j->checks);
@@ -488,8 +456,8 @@ static int cost(struct job *j, struct base_threads *threads, struct base_err *er
     if (!root || !j->checks || !j->stop)
         rc = base_fail_nomem(err, "cost");
     base_json_text(root, "split", ggn_split_names[j->split], &j->failed);
-    base_json_text(root, "labels", ggn_dataset_label_source(&j->set.images.data), &j->failed);
-    base_json_number(root, "ratio", j->set.images.ratio, &j->failed);
+    base_json_text(root, "labels", ggn_dataset_label_source(&j->r.set.images.data), &j->failed);
+    base_json_number(root, "ratio", j->r.set.images.ratio, &j->failed);
     put_scenes(j, root);
     if (!rc && j->o->sizes)
         rc = put_sizes(j, root, err);
@@ -501,9 +469,9 @@ static int cost(struct job *j, struct base_threads *threads, struct base_err *er
             rc = cost_observer(j, err);
     }
     if (!rc)
-        rc = cost_models(j, threads, err);
+        rc = cost_models(j, err);
     if (!rc && !j->o->scores)
-        rc = cost_baselines(j, threads, err);
+        rc = cost_baselines(j, err);
     if (!rc && !j->o->scores)
         rc = cost_thresholds(j, err);
     if (!rc)
@@ -522,39 +490,23 @@ int ggn_cmd_cost(int argc, char **argv)
                "by scene, "
                "what was spent until the blocks stop and how good the picture is then, as JSON. scripts/lab cost puts "
                "measured prices on the checks and draws it."};
-    struct options o = {.split = GGN_SPLIT_TEST, .threads = base_threads_available()};
-    struct job j = {.o = &o};
-    struct base_threads *threads = NULL;
+    struct options o = {.split = GGN_SPLIT_TEST, .replay.threads = base_threads_available()};
+    struct costing j = {.o = &o, .r = {.o = &o.replay, .adjust = adjust, .command = &o}};
     struct base_err err = {0};
-    struct ggn_eval_options eo = {.window = 6, .no_ssim = 1, .seed = 1};
-    int skipped;
 
     int rc = base_options_parse(&options, argc, argv, &o, &err);
+    struct ggn_eval_options eo = {.window = LEAST_WINDOW, .no_ssim = 1, .cadence = o.cadence};
     j.split = (enum ggn_split)o.split;
-    if (!rc && !(threads = base_threads_create(o.threads, &err)))
-        rc = err.code;
-    eo.dir = o.data;
-    eo.split.learned = (const cJSON *const *)j.learned;
-    eo.split.n_learned = o.n_models;
-    eo.quality = !o.no_quality;
-    eo.recorded = o.recorded;
-    eo.without_halves = o.no_noise_maps;
-    eo.ratio = o.ratio;
-    eo.cadence = o.cadence;
     if (!rc)
-        rc = read_models(&j, &eo, &err);
+        rc = ggn_replay_open(&j.r, &eo, LEAST_WINDOW, &err);
+    for (int b = 0; o.replay.recorded && b < j.r.set.n_blocks; b++) /* whose thresholds lie beyond: nothing is known there */
+        if (j.r.set.blocks[b].label.censored)
+            j.r.set.blocks[b].split = GGN_SPLITS;
+    if (!rc && ggn_eval_count(&j.r.set, j.split) == 0)
+        rc =
+            base_fail(&err, BASE_EINVAL, "%s: no labelled block in the split '%s'", o.replay.data, ggn_split_names[j.split]);
     if (!rc)
-        rc = ggn_eval_set_load(&j.set, &eo, threads, &skipped, &err);
-    for (int b = 0; o.recorded && b < j.set.n_blocks; b++) /* whose thresholds lie beyond: nothing is known there */
-        if (j.set.blocks[b].label.censored)
-            j.set.blocks[b].split = GGN_SPLITS;
-    if (!rc && ggn_eval_count(&j.set, j.split) == 0)
-        rc = base_fail(&err, BASE_EINVAL, "%s: no labelled block in the split '%s'", o.data, ggn_split_names[j.split]);
-    if (!rc)
-        rc = cost(&j, threads, &err);
-    for (int i = 0; i < o.n_models; i++)
-        cJSON_Delete(j.learned[i]);
-    ggn_eval_set_release(&j.set);
-    base_threads_destroy(threads);
+        rc = cost(&j, &err);
+    ggn_replay_close(&j.r);
     return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
 }

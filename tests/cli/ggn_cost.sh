@@ -53,6 +53,8 @@ assert len(p["scores"]) == windows and 0 < p["cut"] < 1 and all(x is None or 0 <
 assert any(x is not None for x in p["scores"])
 P
 check "scores of a network's windows, nothing else" $?
+fails "a network with the other noise picture beside a residual one" "old.ggn: it takes another noise picture than residual models" \
+    "$ggn" cost -d $data --split train -m "$tmp/old.ggn" -m ggn/models/lull-3.ggn
 halves() { run -d tests/data/recorded --split train --recorded --no-quality -m tests/data/tiny.ggn "$@"; }
 halves --no-pictures -o "$tmp/blind.json"
 halves -o "$tmp/seeing.json" && python3 - "$tmp/blind.json" "$tmp/seeing.json" >"$tmp/err" 2>&1 <<'P'

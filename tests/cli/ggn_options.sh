@@ -132,8 +132,8 @@ check "evaluate --baselines: three methods more" $?
 based() { $ggn baseline "$1" -d $data --epochs 1 --ratio 1.3 --threads 1 -o "$tmp/$2" $3 >"$tmp/out" 2>"$tmp/err"; }
 based svd-entropy b.ggn "" && based svd-entropy c.ggn "--window 7" && ! cmp -s "$tmp/b.ggn" "$tmp/c.ggn"
 check "baseline --window" $?
-fails "evaluate: a baseline of longer windows" 'c.ggn: it judges 7 images, windows here have 6 (--window)$' $ggn evaluate -d $data --baseline "$tmp/c.ggn"
-fails "cost: a baseline of longer windows" 'c.ggn: it judges 7 images, windows here have 6$' $ggn cost -d $data --split train --baseline "$tmp/c.ggn"
+fails "evaluate: a baseline of longer windows" 'c.ggn: it judges 7 images, windows here have 6 (ggn evaluate --window)$' $ggn evaluate -d $data --baseline "$tmp/c.ggn"
+fails "cost: a baseline of longer windows" 'c.ggn: it judges 7 images, windows here have 6 (ggn evaluate --window)$' $ggn cost -d $data --split train --baseline "$tmp/c.ggn"
 based attributes b.ggn "" && based attributes c.ggn "--early 0.9" && ! cmp -s "$tmp/b.ggn" "$tmp/c.ggn"
 check "baseline --early" $?
 based attributes b.ggn "" && based attributes c.ggn "--ratio 1.5" && ! cmp -s "$tmp/b.ggn" "$tmp/c.ggn"

@@ -47,11 +47,10 @@ cost split precision ratio cadence threads
 END
 for value in passes=1 =1 passes passes=x none=1 visible=1.5 sixteen-letters-.=1; do says bounds evaluate -d none -p "$value"; done
 says bounds evaluate -d none $(printf -- '-p passes=1 %.0s' 1 2 3 4 5 6 7 8 9)
-says bounds evaluate -d none $(printf -- '-m m %.0s' 1 2 3 4 5 6 7 8 9)
-says bounds evaluate -d none $(printf -- '--thresholds m %.0s' 1 2 3 4 5 6 7 8 9)
-says bounds evaluate -d none $(printf -- '--baseline m %.0s' 1 2 3 4 5 6 7 8 9)
 for option in model baseline thresholds; do # shellcheck disable=SC2046
-    says bounds cost -d none $(printf -- "--$option m %.0s" 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17)
+    for command in cost evaluate; do
+        says bounds $command -d none $(printf -- "--$option m %.0s" 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17)
+    done
 done
 for word in "" frobnicate import-sin3d import_ -x; do says bounds $word; done
 
