@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "baselines/blas.h"
+#include "nn/hash.h"
 
 enum { LAYERS = 3, BATCH = 64 };
 static const int widths[LAYERS] = {512, 128, 32};
@@ -33,17 +34,7 @@ struct ggn_lstm {
     struct layer layers[LAYERS];
 };
 
-static uint32_t hash(uint32_t k, uint32_t s)
-{
-    uint32_t h = k + s * 0x9E3779B9u;
-    h ^= h >> 16;
-    h *= 0x7feb352du;
-    h ^= h >> 15;
-    h *= 0x846ca68bu;
-    return h ^ h >> 16;
-}
-
-static float uniform(uint32_t k, uint32_t s) { return (float)hash(k, s) / 4294967296.0f; }
+static float uniform(uint32_t k, uint32_t s) { return (float)ggn_hash(k, s) / 4294967296.0f; }
 
 static float sigmoid(float x) { return 1.0f / (1.0f + expf(-x)); }
 
@@ -339,7 +330,7 @@ double ggn_lstm_epoch(struct ggn_lstm *l, const double *const *sequences, const 
         order[i] = i;
     }
     for (size_t i = n; i > 1; i--) { /* Fisher-Yates */
-        size_t j = hash((uint32_t)i, l->seed + 77 + epoch) % i, keep = order[i - 1];
+        size_t j = ggn_hash((uint32_t)i, l->seed + 77 + epoch) % i, keep = order[i - 1];
         order[i - 1] = order[j];
         order[j] = keep;
     }

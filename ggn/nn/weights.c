@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/pi.h"
 #include "nn/hash.h"
 #include "nn/real.h"
 #include "nn/winograd.h"
@@ -59,7 +60,7 @@ void ggn_weights_destroy(struct ggn_weights *w)
 static double normal(uint32_t k, uint32_t seed)
 {
     double u = 1 - ggn_hash_unit(2 * k, seed), v = ggn_hash_unit(2 * k + 1, seed);
-    return sqrt(-2 * log(u)) * cos(6.283185307179586 * v);
+    return sqrt(-2 * log(u)) * cos(2 * BASE_PI * v);
 }
 
 static double initial(const struct ggn_tensor *t, enum ggn_init init, double fan_in, uint32_t k, uint32_t seed)

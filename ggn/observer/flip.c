@@ -5,8 +5,7 @@
 #include <string.h>
 
 #include "base/colour.h"
-
-static const double pi = 3.14159265358979323846;
+#include "base/pi.h"
 
 /* Linear sRGB to XYZ in rationals (primaries and white of Rec. 709), rows X, Y, Z; the FLIP authors' matrix. */
 static const double rgb_to_xyz[3][3] = {
@@ -84,7 +83,7 @@ static void csf_taps(double b, double ppd, int radius, float *w, double *sum)
     *sum = 0.0;
     for (int i = -radius; i <= radius; i++) {
         double x = i / ppd;
-        double v = exp(-pi * pi * x * x / b);
+        double v = exp(-BASE_PI * BASE_PI * x * x / b);
         w[i + radius] = (float)v;
         *sum += v;
     }
@@ -148,7 +147,7 @@ struct csf {
 
 static int csf_init(struct csf *f, double ppd, struct base_err *err)
 {
-    f->radius = (int)ceil(3.0 * sqrt(0.04 / (2.0 * pi * pi)) * ppd);
+    f->radius = (int)ceil(3.0 * sqrt(0.04 / (2.0 * BASE_PI * BASE_PI)) * ppd);
     size_t n = 2 * (size_t)f->radius + 1;
     float *all = malloc(4 * n * sizeof *all);
     if (!all)
@@ -162,7 +161,7 @@ static int csf_init(struct csf *f, double ppd, struct base_err *err)
     csf_taps(0.0053, ppd, f->radius, f->rg, &sr);
     csf_taps(0.04, ppd, f->radius, f->by1, &s1);
     csf_taps(0.025, ppd, f->radius, f->by2, &s2);
-    double k1 = 34.1 * sqrt(pi / 0.04), k2 = 13.5 * sqrt(pi / 0.025), total = k1 * s1 * s1 + k2 * s2 * s2;
+    double k1 = 34.1 * sqrt(BASE_PI / 0.04), k2 = 13.5 * sqrt(BASE_PI / 0.025), total = k1 * s1 * s1 + k2 * s2 * s2;
     for (size_t i = 0; i < n; i++) {
         f->a[i] = (float)((double)f->a[i] / sa);
         f->rg[i] = (float)((double)f->rg[i] / sr);

@@ -108,7 +108,7 @@ static int32_t load(struct lull_instance *in, int kind, const char *path, struct
     if (!b)
         return lull_kit_fail(err, LULL_E_MEMORY, "create: out of memory");
     if (ggn_baseline_load(b, path, (enum ggn_baseline_kind)kind, &error))
-        return gp_fail_from(err, "model", &error);
+        return gp_fail_from(err, LULL_E_IO, "model", &error);
     in->rule = (struct ggn_stop_rule){.policy = b->policy, .window = b->window};
     hash_model(in, b);
     gp_windowed_ready(in, params, P_COUNT, b->width, b->height);

@@ -243,7 +243,7 @@ static int32_t load(struct lull_instance *in, int kind, const char *path, struct
     int rc = ggn_model_load(path, &model, &error);
     in->model = model;
     if (rc || ggn_policy_of(model, &in->rule.policy, &error))
-        return gp_fail_from(err, "model", &error);
+        return gp_fail_from(err, LULL_E_IO, "model", &error);
     in->rule.window = model->hyper.window;
     in->rule.reach = model->hyper.reach;
     if (in->rule.window < 2 || in->rule.window > GGN_WINDOW_MAX)

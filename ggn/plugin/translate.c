@@ -2,10 +2,11 @@
 
 #include "base/colour.h"
 
-int32_t gp_fail_from(struct lull_error *err, const char *what, const struct base_err *from)
+int32_t gp_fail_from(struct lull_error *err, int32_t otherwise, const char *what, const struct base_err *from)
 {
-    int32_t code = from->code == BASE_ENOMEM ? LULL_E_MEMORY : LULL_E_IO;
-
+    const int32_t code = from->code == BASE_ENOMEM       ? LULL_E_MEMORY
+                         : from->code == BASE_ECANCELLED ? LULL_E_CANCELLED
+                                                         : otherwise;
     return lull_kit_fail(err, code, "%s: %.400s", what, from->text);
 }
 

@@ -9,8 +9,9 @@
 #include "base/err.h"
 #include "model/preprocess.h"
 
-/* Fills *err (may be NULL) from an error of ggn's own functions, `what` before its text; returns the LULL_E_ code. */
-int32_t gp_fail_from(struct lull_error *err, const char *what, const struct base_err *from);
+/* Fills *err (may be NULL) from an error of ggn's own functions, `what` before its text; returns the LULL_E_ code: that of
+ * no memory, of a cancelled call, or `otherwise`. */
+int32_t gp_fail_from(struct lull_error *err, int32_t otherwise, const char *what, const struct base_err *from);
 
 /* Says it to a host that listens. */
 void gp_log(const struct lull_kit *kit, int32_t level, const char *text);

@@ -106,7 +106,7 @@ static int32_t workers_create(const struct lull_instance *in, uint32_t count, si
     if (good)
         return LULL_OK;
     workers_release(in->ops, worker, count);
-    return gp_fail_from(err, "begin_frame", &error);
+    return gp_fail_from(err, LULL_E_IO, "begin_frame", &error);
 }
 
 static void frame_release(struct lull_instance *in)

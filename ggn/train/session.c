@@ -4,16 +4,17 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/pi.h"
 #include "data/agree.h"
 #include "nn/hash.h"
 #include "observer/observer.h"
 
 double ggn_session_lr(const struct ggn_session *s, double lr, uint64_t step, uint64_t steps)
 {
-    static const double LOWEST = 0.02, PI = 3.14159265358979323846;
+    static const double LOWEST = 0.02;
     double t = steps ? (double)step / (double)steps : 0, warm = fmin(1, ((double)step + 1) / fmax(20, 0.02 * (double)steps));
 
-    return lr * warm * (LOWEST + (1 - LOWEST) * 0.5 * (1 + cos(PI * t))) * ldexp(1, -s->progress.divergences);
+    return lr * warm * (LOWEST + (1 - LOWEST) * 0.5 * (1 + cos(BASE_PI * t))) * ldexp(1, -s->progress.divergences);
 }
 
 uint32_t ggn_session_seed(const struct ggn_session *s)

@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "base/pi.h"
+
 /* Bounds are widened by this share of their size, so that rounding of the transform never cuts the surface. */
 #define BOUNDS_SLACK 4e-7f
 /* Rounding of a float transform of a point that was computed in double: γ(4) of the terms (Higham 2002, §3.1). */
@@ -22,7 +24,7 @@ static struct dvec transform(const float m[12], pt_vec3 p, double w)
 static double angle_of(double x, double y)
 {
     double phi = atan2(y, x);
-    return phi < 0.0 ? phi + 2.0 * 3.14159265358979323846 : phi;
+    return phi < 0.0 ? phi + 2.0 * BASE_PI : phi;
 }
 
 /* Roots of a t² + 2 b t + c, stable; 0 when none. */

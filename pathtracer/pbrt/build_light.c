@@ -3,9 +3,8 @@
 #include <string.h>
 
 #include "base/colour.h"
+#include "base/pi.h"
 #include "pbrt/build.h"
-
-static const double pi = 3.14159265358979323846;
 
 /* "L" or "I" with both kinds of scale (v4: float, v3: colour), as RGB. */
 static pt_vec3 scaled_colour(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name)
@@ -60,7 +59,7 @@ static void make_point(struct context *c)
     c->light->kind = PT_LIGHT_POINT;
     c->light->emission = scaled_colour(c->b, c->s, c->p, "I");
     if (power > 0)
-        c->light->emission = v3_scale(c->light->emission, (float)(power / (4 * pi)));
+        c->light->emission = v3_scale(c->light->emission, (float)(power / (4 * BASE_PI)));
     pt_params_point(c->p, "from", from);
     place(c->b, &c->ctm, from, &c->light->position);
     pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
@@ -71,12 +70,12 @@ static void make_spot(struct context *c)
     double from[3] = {0, 0, 0}, to[3] = {0, 0, 1}, power = pt_params_float(c->p, "power", -1);
     double cone = pt_params_float_in(c->p, "coneangle", 30, 1e-3, 180),
            delta = pt_params_float_in(c->p, "conedeltaangle", 5, 0, 180);
-    double cos_total = cos(cone * pi / 180), cos_start = cos(fmax(cone - delta, 0) * pi / 180);
+    double cos_total = cos(cone * BASE_PI / 180), cos_start = cos(fmax(cone - delta, 0) * BASE_PI / 180);
     c->light->kind = PT_LIGHT_SPOT;
     c->light->emission = scaled_colour(c->b, c->s, c->p, "I");
     if (power > 0) /* flux of the smooth fall-off: 2π ((1 - cos start) + (cos start - cos total) / 2) */
         c->light->emission =
-            v3_scale(c->light->emission, (float)(power / (2 * pi * ((1 - cos_start) + (cos_start - cos_total) / 2))));
+            v3_scale(c->light->emission, (float)(power / (2 * BASE_PI * ((1 - cos_start) + (cos_start - cos_total) / 2))));
     pt_params_point(c->p, "from", from);
     pt_params_point(c->p, "to", to);
     place(c->b, &c->ctm, from, &c->light->position);
@@ -181,7 +180,8 @@ static void make_infinite(struct context *c)
     pt_builder_effect(c->b, PT_FX_ENVIRONMENT, p->loc);
     if (file[0] == '\0') {
         if (illuminance > 0) /* of an upward patch under the whole sky: π L */
-            c->light->emission = v3_scale(c->light->emission, (float)(illuminance / pi / luminance(c->light->emission)));
+            c->light->emission =
+                v3_scale(c->light->emission, (float)(illuminance / BASE_PI / luminance(c->light->emission)));
         return;
     }
     struct pt_loc loc = pt_params_find(p, key)->loc;
@@ -280,6 +280,6 @@ int32_t pt_build_shape_light(struct pt_builder *b, const struct pt_area_light *s
         .kind = PT_LIGHT_AREA, .two_sided = source->two_sided, .image = -1, .emission = source->emission};
     light.shape = (int32_t)b->world_shapes.count;
     if (source->power > 0 && area > 0)
-        light.emission = v3_scale(light.emission, (float)(source->power / ((source->two_sided ? 2 : 1) * area * pi)));
+        light.emission = v3_scale(light.emission, (float)(source->power / ((source->two_sided ? 2 : 1) * area * BASE_PI)));
     return add_light(b, &light, source->loc);
 }

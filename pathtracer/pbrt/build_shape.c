@@ -5,10 +5,9 @@
 #include <string.h>
 
 #include "pbrt/build.h"
+#include "base/pi.h"
 #include "pbrt/ply.h"
 #include "shade/light_area.h"
-
-static const double pi = 3.14159265358979323846;
 
 /* Coordinates beyond this lose visible precision in float: an object defined out there gets an origin of its own. */
 static const double far_away = 1e4;
@@ -320,7 +319,7 @@ static int add_quadric(struct pt_builder *b, const struct pt_state *s, struct pt
     struct pt_shape shape = common(b, s, p);
     if (!pt_xform_invert(&pl.xform, &inverse))
         return pt_diag_fail(&b->diag, p->loc, "singular transform of a shape");
-    q->phi_max = (float)(pt_params_float_in(p, "phimax", 360, 1e-3, 360) * pi / 180);
+    q->phi_max = (float)(pt_params_float_in(p, "phimax", 360, 1e-3, 360) * BASE_PI / 180);
     q->to_render = pt_xform_to_mat34(&pl.xform);
     q->from_render = pt_xform_to_mat34(&inverse);
     if (b->diag.rc)

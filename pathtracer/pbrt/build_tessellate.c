@@ -3,9 +3,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "pbrt/build.h"
+#include "base/pi.h"
 
-static const double pi = 3.14159265358979323846;
+#include "pbrt/build.h"
 
 /* Vertices and triangles under construction. */
 struct grower {
@@ -195,7 +195,7 @@ static int add_ring(struct grower *g, const double p[3], const double d[3], doub
         axis = v3(0, 0, 1);
     struct pt_frame f = pt_frame_from_normal(axis);
     for (int i = 0; i < CURVE_SIDES; i++) {
-        double a = 2 * pi * i / CURVE_SIDES;
+        double a = 2 * BASE_PI * i / CURVE_SIDES;
         pt_vec3 out = v3_add(v3_scale(f.s, (float)cos(a)), v3_scale(f.t, (float)sin(a)));
         const double n[3] = {(double)out.x, (double)out.y, (double)out.z};
         const double q[3] = {p[0] + width / 2 * n[0], p[1] + width / 2 * n[1], p[2] + width / 2 * n[2]};
@@ -274,7 +274,7 @@ int pt_build_revolved(struct pt_builder *b, const struct pt_state *s, struct pt_
 {
     const char *kind = pt_params_kind(p);
     double radius = pt_params_float_in(p, "radius", 1, 1e-30, 1e30),
-           phi = pt_params_float_in(p, "phimax", 360, 1e-3, 360) * pi / 180;
+           phi = pt_params_float_in(p, "phimax", 360, 1e-3, 360) * BASE_PI / 180;
     double height = pt_params_float(p, "height", 1), z0 = pt_params_float(p, "zmin", 0), z1 = pt_params_float(p, "zmax", 1);
     double p1[3] = {0, 0, 0}, p2[3] = {1, 1, 1};
     struct grower g = {0};

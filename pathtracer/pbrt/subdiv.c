@@ -3,9 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/pi.h"
+
 #include "pbrt/build.h"
 
-static const double pi = 3.14159265358979323846;
 enum { MAX_LEVELS = 8 };
 static const size_t max_triangles = (size_t)1 << 22;
 
@@ -191,8 +192,8 @@ static void limit_normal(const struct mesh *m, const uint32_t *ring, int count, 
     for (size_t k = 0; k < 3; k++) {
         if (!boundary) {
             for (int i = 0; i < count; i++) {
-                s[k] += cos(2 * pi * i / count) * m->p[3 * (size_t)ring[i] + k];
-                t[k] += sin(2 * pi * i / count) * m->p[3 * (size_t)ring[i] + k];
+                s[k] += cos(2 * BASE_PI * i / count) * m->p[3 * (size_t)ring[i] + k];
+                t[k] += sin(2 * BASE_PI * i / count) * m->p[3 * (size_t)ring[i] + k];
             }
             continue;
         }

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/pi.h"
+
 struct pt_xform pt_xform_identity(void) { return (struct pt_xform){{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}}; }
 
 struct pt_xform pt_xform_mul(const struct pt_xform *a, const struct pt_xform *b)
@@ -28,7 +30,7 @@ struct pt_xform pt_xform_scale(double x, double y, double z)
 struct pt_xform pt_xform_rotate(double angle_deg, double x, double y, double z)
 {
     double len = sqrt(x * x + y * y + z * z);
-    double s = sin(angle_deg * (3.14159265358979323846 / 180)), c = cos(angle_deg * (3.14159265358979323846 / 180));
+    double s = sin(angle_deg * (BASE_PI / 180)), c = cos(angle_deg * (BASE_PI / 180));
     x /= len;
     y /= len;
     z /= len;

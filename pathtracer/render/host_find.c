@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+#include "render/host.h"
+
 struct teller {
     struct base_log *log;
     int32_t level; /* of what is passed on, LULL_LOG_ */
@@ -25,7 +27,7 @@ int pt_criterion_find(const char *spec, struct base_inputs *inputs, struct base_
     struct lull_found found;
     int32_t code = lull_open(&search, spec, &found, &e);
     if (code != LULL_OK)
-        return base_fail(err, code == LULL_E_MEMORY ? BASE_ENOMEM : BASE_EINVAL, "%s", e.message);
+        return pt_host_fail(code, &e, err);
     int rc = inputs ? base_inputs_add(inputs, found.path, err) : 0;
     if (!rc)
         *out = found.criterion;

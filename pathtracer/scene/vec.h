@@ -8,8 +8,9 @@
 #include <math.h>
 
 #include "base/colour.h"
+#include "base/pi.h"
 
-#define PT_PI 3.14159265358979323846f
+#define PT_PI ((float)BASE_PI)
 #define PT_INV_PI 0.31830988618379067154f
 
 typedef struct pt_vec3 {

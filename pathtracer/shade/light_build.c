@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/pi.h"
 #include "geom/quadric.h"
 #include "sample/rng.h"
 #include "scene/settings.h"
@@ -65,18 +66,18 @@ static double triangle_emitter(const struct pt_scene *scene, const struct pt_sha
 /* Radiant power up to a common factor (luminance). */
 static double power_of(const struct pt_scene *scene, const struct pt_light *light, double area)
 {
-    double pi = 3.14159265358979323846, l = (double)v3_luminance(light->emission);
+    double l = (double)v3_luminance(light->emission);
     /* a bad value must still be selected, so that it is met and counted */
     l = !isfinite(l) ? 1.0 : l > 0.0 ? l : 0.0;
     pt_vec3 d = v3_sub(scene->bounds_max, scene->bounds_min);
-    double disk = pi * 0.25 * (double)v3_dot(d, d);
+    double disk = BASE_PI * 0.25 * (double)v3_dot(d, d);
     switch (light->kind) {
-    case PT_LIGHT_AREA: return pi * area * l * (light->two_sided ? 2.0 : 1.0);
+    case PT_LIGHT_AREA: return BASE_PI * area * l * (light->two_sided ? 2.0 : 1.0);
     case PT_LIGHT_ENV_IMAGE:
-    case PT_LIGHT_ENV_CONSTANT: return 4.0 * pi * disk * (double)pt_light_env_mean(scene, light);
+    case PT_LIGHT_ENV_CONSTANT: return 4.0 * BASE_PI * disk * (double)pt_light_env_mean(scene, light);
     case PT_LIGHT_DISTANT: return disk * l;
-    case PT_LIGHT_SPOT: return 2.0 * pi * l * (1.0 - 0.5 * (double)(light->cos_total + light->cos_start));
-    case PT_LIGHT_POINT: return 4.0 * pi * l;
+    case PT_LIGHT_SPOT: return 2.0 * BASE_PI * l * (1.0 - 0.5 * (double)(light->cos_total + light->cos_start));
+    case PT_LIGHT_POINT: return 4.0 * BASE_PI * l;
     default: return 0.0;
     }
 }

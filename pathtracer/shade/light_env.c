@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/pi.h"
 #include "shade/light_portal.h"
 #include "shade/warp.h"
 
@@ -70,7 +71,7 @@ static float to_solid(const struct pt_light *light, float pdf_square, float sin_
 
 static double row_weight(const struct pt_light *light, int32_t y, int32_t height)
 {
-    return light->mapping == PT_ENV_EQUAL_AREA ? 1.0 : sin(((double)y + 0.5) / (double)height * 3.14159265358979323846);
+    return light->mapping == PT_ENV_EQUAL_AREA ? 1.0 : sin(((double)y + 0.5) / (double)height * BASE_PI);
 }
 
 static double luminance_of(const float *px)

@@ -1,12 +1,12 @@
 /* The report as a page: page.html, which is compiled in, with the report and the pictures in its places. */
 #include <math.h>
-#include <png.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/files.h"
 #include "base/json.h"
 #include "host/frame.h"
+#include "picture/png.h"
 
 /* Bytes of JSON up to which the checks of each block are kept. */
 enum { HISTORY_LIMIT = 1900000 };
@@ -117,15 +117,11 @@ static void put_escaped(FILE *file, const char *text)
 static int32_t put_layer(FILE *file, const struct lull_host_layer *layer, uint32_t width, uint32_t height,
                          struct lull_error *err)
 {
-    png_image image = {.version = PNG_IMAGE_VERSION, .width = width, .height = height, .format = PNG_FORMAT_RGB};
-    png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
-    uint8_t *bytes = malloc(size);
-    if (!bytes)
-        return lull_host_no_memory(err, "the page's pictures");
-    if (!png_image_write_to_memory(&image, bytes, &size, 0, layer->rgb, 0, NULL)) {
-        free(bytes);
-        return lull_error_set(err, LULL_E_INVALID, "the page's picture: %s", image.message);
-    }
+    struct base_err why = {0};
+    uint8_t *bytes;
+    size_t size;
+    if (pic_png_bytes((int32_t)width, (int32_t)height, layer->rgb, &bytes, &size, &why))
+        return lull_host_translate(&why, err);
     fputs("<img alt=\"\" data-layer=\"", file);
     put_escaped(file, layer->name);
     fputs("\" src=\"data:image/png;base64,", file);

@@ -1,9 +1,10 @@
 #include "picture/apng.h"
 
-#include <png.h>
 #include <stdlib.h>
 #include <string.h>
 #include <zlib.h>
+
+#include "picture/png.h"
 
 enum { SIGNATURE = 8, AROUND = 12, WORD = 4 }; /* bytes: of a file's head, of a chunk's length, name and checksum */
 
@@ -83,19 +84,11 @@ int pic_apng_begin(struct pic_apng *a, const char *path, int32_t width, int32_t 
 
 int pic_apng_add(struct pic_apng *a, const uint8_t *rgb, struct base_err *err)
 {
-    png_image image = {.version = PNG_IMAGE_VERSION,
-                       .width = (png_uint_32)a->width,
-                       .height = (png_uint_32)a->height,
-                       .format = PNG_FORMAT_RGB};
-    png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
-    uint8_t *png = malloc(size);
-    int is_open = 0;
-    if (!png)
-        return base_fail_nomem(err, "frame");
-    if (!png_image_write_to_memory(&image, png, &size, 0, rgb, 0, NULL)) {
-        free(png);
-        return base_fail(err, BASE_EIO, "%s: %s", a->file.path, image.message);
-    }
+    uint8_t *png;
+    size_t size;
+    int is_open = 0, rc = pic_png_bytes(a->width, a->height, rgb, &png, &size, err);
+    if (rc)
+        return rc;
     if (a->frame == 0)
         fwrite(png, 1, SIGNATURE, a->file.file);
     for (size_t at = SIGNATURE; at + AROUND <= size;) {

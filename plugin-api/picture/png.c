@@ -1,6 +1,7 @@
 #include "picture/png.h"
 
 #include <png.h>
+#include <stdlib.h>
 
 #include "base/files.h"
 
@@ -22,4 +23,21 @@ int pic_write_png(const char *path, int32_t width, int32_t height, int channels,
         return base_file_commit(&file, err); /* which says why a write failed */
     base_file_abort(&file);
     return base_fail(err, BASE_EIO, "%s: %s", path, image.message);
+}
+
+int pic_png_bytes(int32_t width, int32_t height, const uint8_t *rgb, uint8_t **bytes, size_t *size, struct base_err *err)
+{
+    png_image image = {
+        .version = PNG_IMAGE_VERSION, .width = (png_uint_32)width, .height = (png_uint_32)height, .format = PNG_FORMAT_RGB};
+    png_alloc_size_t most = PNG_IMAGE_PNG_SIZE_MAX(image);
+    uint8_t *png = malloc(most);
+    if (!png)
+        return base_fail_nomem(err, "a picture as PNG");
+    if (!png_image_write_to_memory(&image, png, &most, 0, rgb, 0, NULL)) {
+        free(png);
+        return base_fail(err, BASE_EINVAL, "%s", image.message);
+    }
+    *bytes = png;
+    *size = most;
+    return 0;
 }

@@ -4,6 +4,7 @@
 #ifndef PICTURE_PNG_H
 #define PICTURE_PNG_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "base/err.h"
@@ -13,5 +14,7 @@
  * BASE_EIO, BASE_ENOMEM. */
 int pic_write_png(const char *path, int32_t width, int32_t height, int channels, const uint8_t *pixels,
                   struct base_err *err);
+/* The bytes of such a picture of RGB; the caller frees *bytes. width and height > 0. BASE_EINVAL, BASE_ENOMEM. */
+int pic_png_bytes(int32_t width, int32_t height, const uint8_t *rgb, uint8_t **bytes, size_t *size, struct base_err *err);
 
 #endif

@@ -141,14 +141,6 @@ static void tell(const struct lull_instance *in, const struct lull_block *b, con
     gp_log(&in->kit, LULL_LOG_DEBUG, line);
 }
 
-static int32_t fail_of(const struct gd_block_view *seen, struct lull_error *err)
-{
-    int32_t code = seen->err.code == BASE_ENOMEM       ? LULL_E_MEMORY
-                   : seen->err.code == BASE_ECANCELLED ? LULL_E_CANCELLED
-                                                       : LULL_E_INTERNAL;
-    return lull_kit_fail(err, code, "evaluate: %.400s", seen->err.text);
-}
-
 /* As lull_kit_evaluate; fails when a block could not be denoised. A call that failed leaves no trace. */
 static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
                         uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
@@ -159,7 +151,7 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
     int32_t status = lull_kit_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
     for (uint32_t i = 0; !status && i < in->workers; i++)
         if (in->seen[i].err.code)
-            status = fail_of(&in->seen[i], err);
+            status = gp_fail_from(err, LULL_E_INTERNAL, "evaluate", &in->seen[i].err);
     for (uint32_t i = 0; i < count && !status; i++) {
         const struct lull_block *b = lull_kit_at(blocks, block_stride, i);
         const int again = in->past[b->id].spp == b->spp;
@@ -206,7 +198,7 @@ static int32_t frame_create(const struct lull_instance *in, const struct lull_fr
     if (!why.code)
         return LULL_OK;
     frame_release(fresh);
-    return lull_kit_fail(err, why.code == BASE_ENOMEM ? LULL_E_MEMORY : LULL_E_INTERNAL, "begin_frame: %.400s", why.text);
+    return gp_fail_from(err, LULL_E_INTERNAL, "begin_frame", &why);
 }
 
 static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
@@ -279,7 +271,7 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     if (text[P_LIBRARY] && !in->library)
         status = lull_kit_fail(err, LULL_E_MEMORY, "create: out of memory");
     else if (lull_oidn_open(in->library, &oidn, &why)) /* else only begin_frame would find that there is none */
-        status = lull_kit_fail(err, why.code == BASE_ENOMEM ? LULL_E_MEMORY : LULL_E_VALUE, "library: %.400s", why.text);
+        status = gp_fail_from(err, LULL_E_VALUE, "library", &why);
     lull_oidn_close(oidn);
     if (status) {
         destroy(in);
