@@ -82,7 +82,7 @@ static const struct base_option list[] = {
      .help = "tune the models' thresholds too, on the validation scenes, instead of taking the stored ones"},
     {"no-quality", 0, NULL, TO(replay.no_quality), .help = "skip FLIP and SSIM at the stop"},
     {"no-pictures", 0, NULL, TO(replay.no_halves),
-     .help = "judge as in a host without half buffers: models get no noise pictures"},
+     .help = "judge as in a host without half buffers"},
     {"baselines", 0, NULL, TO(baselines),
      .help = "train the published baselines on the training scenes and measure them too (minutes)"},
     {"epochs", 0, "N", TO(epochs), 1, 1024, .help = "epochs of the LSTM baseline (15)"},
@@ -363,12 +363,9 @@ static int warn_of_setting(const struct evaluation *j, int index, struct base_er
     struct ggn_policy policy;
     char text[200];
     double asked, nearest;
-    int halves = 1, rc = ggn_replay_policy(&j->r, index, &policy, err);
-    for (int b = 0; b < j->r.set.n_blocks && !j->o->replay.no_halves && !rc; b++)
-        halves &= !isnan(j->r.set.visible[j->r.set.blocks[b].end - 1]);
-    const struct ggn_setting learned = {model->hyper.width, model->hyper.height, GGN_TRANSFER_SRGB,
-                                        !j->o->replay.no_halves && model->hyper.noise_map};
-    const struct ggn_setting here = {s->width, s->height, GGN_TRANSFER_SRGB, halves};
+    int rc = ggn_replay_policy(&j->r, index, &policy, err);
+    const struct ggn_setting learned = {model->hyper.width, model->hyper.height, GGN_TRANSFER_SRGB};
+    const struct ggn_setting here = {s->width, s->height, GGN_TRANSFER_SRGB};
     if (!rc && ggn_setting_difference(&learned, &here, text, sizeof text))
         fprintf(stderr, "ggn evaluate: %s: the model is asked about what it has not learned: %s\n", path, text);
     for (int i = 0; i < s->n && !rc; i++)

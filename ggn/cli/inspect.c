@@ -38,7 +38,8 @@ static int print_model(const struct ggn_model *m, const struct ggn_container *c,
     printf("preset       %s\n", ggn_preset_names[h->preset]);
     printf("block        %d x %d pixels, window of %d images\n", h->width, h->height, h->window);
     printf("widths       denoiser %d, generator %d, discriminator %d\n", h->k_r, h->k_m, h->k_d);
-    printf("noise picture of half buffers: %s\n", h->noise_map ? "taken where the host has them" : "not taken");
+    printf("noise picture of half buffers: %s\n",
+           h->noise_map && h->reach > 0 ? "taken where the host has them" : "not taken");
     if (h->reach > 0)
         printf("residual     corrects the law of visible noise by up to %g octaves of noise; told %d scalars\n", h->reach,
                h->scalars);

@@ -14,15 +14,11 @@ static int load_models(struct ggn_replay *r, struct ggn_eval_options *o, int lea
         const struct ggn_hyper *h = &r->model[i]->hyper;
         r->learned[i] = cJSON_GetObjectItemCaseSensitive(r->model[i]->provenance, "data");
         longest = h->window > longest ? h->window : longest;
-        o->noise_maps |= h->noise_map && (h->reach > 0 || !o->without_halves);
+        o->noise_maps |= h->noise_map && h->reach > 0;
         o->measures |= h->reach > 0;
     }
     if (r->o->n_models > 0)
         o->window = longest;
-    for (int i = 0; i < r->o->n_models && !rc && o->measures; i++)
-        if (r->model[i]->hyper.noise_map && r->model[i]->hyper.reach <= 0)
-            rc = base_fail(err, BASE_EINVAL, "%s: it takes another noise picture than residual models; evaluate it apart",
-                           r->o->models[i]);
     return rc;
 }
 

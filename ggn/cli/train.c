@@ -55,8 +55,8 @@ static const struct base_option list[] = {
     {"lr", 0, "N", TO(plan.lr), 1e-9, 1, .role = BASE_DECIDES,
      .help = "learning rate of generator and discriminator (lull 1e-3, paper 2e-4)"},
     {"picture", 0, "SHARE", TO(plan.noise_map), 0, 1, .role = BASE_DECIDES,
-     .help = "share of windows that come with the noise picture of their half buffers, 0 = networks without that input; "
-             "preset lull only (0)"},
+     .help = "with --residual: share of windows that come with the picture of their visible noise, 0 = networks without "
+             "that input (0)"},
     {"residual", 0, "OCTAVES", TO(plan.reach), 0, GGN_REACH_MAX, .role = BASE_DECIDES,
      .help =
          "learn to correct what the observer measures by up to so many octaves of noise, 0 = judge without it; needs half "

@@ -83,17 +83,6 @@ int ggn_series_grow(const struct ggn_series_set *set, struct ggn_level_series *c
     return 0;
 }
 
-void ggn_series_write_noise_map(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const float *mean,
-                                const float *d, double scale)
-{
-    const size_t pixels = ggn_series_set_values(set) / 3;
-    uint8_t *out = set->noise_maps ? c->noise_map + pixels * (size_t)k : NULL;
-
-    c->has_noise_map[k] = set->noise_maps != 0;
-    for (size_t p = 0; out && p < pixels; p++)
-        out[p] = ggn_noise_map_code((double)mean[p], scale * (double)d[p], NULL);
-}
-
 void ggn_series_measure(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const float *mean,
                         const float *d, double scale, int keep_texture)
 {
@@ -106,9 +95,8 @@ void ggn_series_measure(const struct ggn_series_set *set, struct ggn_level_serie
     c->has_noise_map[k] = set->noise_maps != 0;
 }
 
-/* Scratch for noise maps of recorded levels: luminance of the mean and of D, [P] each; [3][P] where they are measured. */
+/* Scratch: the mean and D of a recorded level, [3][P] each. */
 struct halves {
-    const struct seq_record *full; /* NULL: no level has halves of all channels */
     float *mean, *d;
 };
 
@@ -116,33 +104,15 @@ struct halves {
 static int recorded_measure(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const struct seq_block *b,
                             const struct seq_record *r, const struct halves *h, struct base_err *err)
 {
+    c->has_noise_map[k] = 0;
+    if (!set->meter.memory)
+        return 0;
     c->measure[k] = (struct ggn_measure){.visible = (double)NAN};
     if (!seq_has_halves(r))
         return 0;
     int rc = seq_halves(b, r, h->mean, h->d, err);
     if (!rc)
         ggn_series_measure(set, c, k, h->mean, h->d, seq_half_scale(r->spp, r->half_spp), 0);
-    return rc;
-}
-
-/* From the level's own halves. Where none are recorded, from those of the full level: their noise has another draw, the
- * same strength in the mean, and bright paths spread out that few samples meet one by one. */
-static int recorded_noise_map(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const struct seq_block *b,
-                              const struct seq_record *r, const struct halves *h, struct base_err *err)
-{
-    const struct seq_record *from = seq_has_halves(r) ? r : h->full;
-    const double scale = from ? seq_half_scale(from->spp, from->half_spp) : 0;
-
-    c->has_noise_map[k] = 0;
-    if (set->meter.memory)
-        return recorded_measure(set, c, k, b, r, h, err);
-    if (!set->noise_maps || scale == 0)
-        return 0;
-    int rc = seq_mean_luminance(b, r, h->mean, err);
-    if (!rc)
-        rc = seq_half_luminance(b, from, h->d, err);
-    if (!rc)
-        ggn_series_write_noise_map(set, c, k, h->mean, h->d, scale * seq_noise_scale(from->spp, r->spp));
     return rc;
 }
 
@@ -160,7 +130,7 @@ static int fill_levels(const struct ggn_series_set *set, struct ggn_level_series
         c->spp[c->n_levels] = r->spp;
         rc = seq_display_planar(b, r, c->noisy + (size_t)c->n_levels * ggn_series_set_values(set), err);
         if (!rc)
-            rc = recorded_noise_map(set, c, c->n_levels, b, r, h, err);
+            rc = recorded_measure(set, c, c->n_levels, b, r, h, err);
         c->n_levels++;
     }
     return rc;
@@ -170,14 +140,12 @@ static int fill_series(const struct ggn_series_set *set, struct ggn_level_series
                        const struct ggn_series_set_options *o, struct base_err *err)
 {
     const size_t values = ggn_series_set_values(set);
-    struct halves h = {.full = seq_full_level(b)};
-    const struct seq_record *reference = b->reference || !o->mean_for_reference ? b->reference : h.full;
-    const int wanted = set->noise_maps || set->meter.memory;
+    const struct seq_record *reference = b->reference || !o->mean_for_reference ? b->reference : seq_full_level(b);
+    const int wanted = set->meter.memory != NULL;
     float *memory = wanted ? malloc(2 * values * sizeof *memory) : NULL;
+    const struct halves h = {memory, memory ? memory + values : NULL};
     int rc = wanted && !memory ? base_fail_nomem(err, "noise pictures") : ggn_series_grow(set, c, (int)b->n_levels, err);
 
-    h.mean = memory;
-    h.d = memory ? memory + values : NULL;
     if (!rc)
         rc = fill_levels(set, c, b, o->ratio, &h, err);
     free(memory);
@@ -283,7 +251,7 @@ static int check_training(const struct ggn_dataset *data, const char *dir, struc
 
 int ggn_series_set_load(struct ggn_series_set *set, const struct ggn_series_set_options *o, struct base_err *err)
 {
-    struct ggn_series_set made = {.noise_maps = o->noise_maps, .keep_recorded = o->keep_recorded};
+    struct ggn_series_set made = {.noise_maps = o->measures && o->noise_maps, .keep_recorded = o->keep_recorded};
     int rc = ggn_dataset_open(o->dir, &made.data, err);
 
     if (rc)

@@ -25,7 +25,7 @@ struct ggn_level_series {
     uint8_t *noisy;     /* [n_levels][3][H][W] display codes */
     uint16_t *denoised; /* the same, 16-bit fixed point; NULL until needed */
     uint8_t *reference; /* [3][H][W] display codes; NULL without; a synthetic series shares its original's */
-    /* with set->noise_maps: the noise maps (model/window.h; with set->meter of the visible noise, model/measure.h),
+    /* with set->noise_maps: the noise maps (of the visible noise, model/measure.h),
      * [n_levels][H][W], and whether a level has one */
     uint8_t *noise_map, *has_noise_map;
     struct ggn_measure *measure; /* [n_levels], with set->meter; visible is NaN where there are no halves */
@@ -52,7 +52,7 @@ struct ggn_series_set_options {
     const char *dir; /* a data set (data/dataset.h) */
     struct ggn_split_options split;
     double ratio;      /* thin the levels to at least this ratio; 0: keep all */
-    int noise_maps;    /* also make the noise maps */
+    int noise_maps;    /* with measures: also keep the noise maps */
     int measures;      /* also measure every level (model/measure.h) */
     int keep_recorded; /* ggn_series_set_extend makes what it simulates further series */
     /* where there is no reference, the mean of the full level stands for it: as noisy as that many samples are, which
@@ -96,11 +96,6 @@ size_t ggn_series_set_values(const struct ggn_series_set *set);
 
 /* Makes room for n levels, or for more. */
 int ggn_series_grow(const struct ggn_series_set *set, struct ggn_level_series *series, int n, struct base_err *err);
-/* With set->noise_maps: the noise map of level k, from the luminance of its mean and of a half difference D (linear,
- * [H][W]) whose noise is that of `scale`⁻² times fewer samples: scale = √(N/n) takes D from N samples to n. */
-void ggn_series_write_noise_map(const struct ggn_series_set *set, struct ggn_level_series *series, int k, const float *mean,
-                                const float *d, double scale);
-
 /* With set->meter: measures level k, whose two pictures are mean + and - scale * D (linear, [3][H][W]), and makes its noise
  * map. keep_texture: see ggn_measure. */
 void ggn_series_measure(const struct ggn_series_set *set, struct ggn_level_series *series, int k, const float *mean,

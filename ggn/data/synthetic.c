@@ -17,8 +17,7 @@ static const double CLEAN_END = 0.4;     /* a threshold below this share of the 
 
 /* One block's source. */
 struct source {
-    float *base, *d, *last;    /* [3][P] linear: the converged image, the half-buffer difference, the last recorded level */
-    float *d_luminance, *mean; /* [P]: of d; of the level that is being made */
+    float *base, *d, *last; /* [3][P] linear: the converged image, the half-buffer difference, the last recorded level */
     /* n_reference infinite: `base` is the mean of the full level and stands for the converged image */
     double n_full, n_reference;
 };
@@ -52,28 +51,21 @@ static void step_down(const struct source *s, size_t pixels, double n, double ab
     }
 }
 
-/* Level k of the series, whose mean is (a·(base + noise) + b·last)/(a + b), in display codes, and its noise map. The
- * noise map's D is that of the full level, whose signs the noise has not kept: noise of its own, as of other samples, but
+/* Level k of the series, whose mean is (a·(base + noise) + b·last)/(a + b), in display codes, and what is measured of it.
+ * The measure's D is that of the full level, whose signs the noise has not kept: noise of its own, as of other samples, but
  * large in the same pixels. */
 static void fill_level(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const struct source *s,
                        const float *noise, double a, double b)
 {
-    const size_t values = ggn_series_set_values(set), pixels = values / 3;
+    const size_t values = ggn_series_set_values(set);
     uint8_t *out = c->noisy + values * (size_t)k;
 
-    for (size_t p = 0; p < pixels; p++) {
-        double rgb[3];
-        for (size_t i = 0; i < 3; i++) {
-            const size_t v = i * pixels + p;
-            rgb[i] = (b * (double)s->last[v] + a * (double)(s->base[v] + noise[v])) / (a + b);
-            out[v] = ggn_preprocess(rgb[i], NULL, NULL);
-        }
-        s->mean[p] = (float)base_luminance(rgb[0], rgb[1], rgb[2]);
-    }
+    for (size_t v = 0; v < values; v++)
+        out[v] = ggn_preprocess((b * (double)s->last[v] + a * (double)(s->base[v] + noise[v])) / (a + b), NULL, NULL);
     if (set->meter.memory)
         ggn_series_measure(set, c, k, s->base, s->d, seq_noise_scale(s->n_full, c->spp[k]), 1);
     else
-        ggn_series_write_noise_map(set, c, k, s->mean, s->d_luminance, seq_noise_scale(s->n_full, c->spp[k]));
+        c->has_noise_map[k] = 0;
 }
 
 /* The texture of all levels to be measured is that of the recorded halves, as in the labels (observer/curve.h): `base` has
@@ -154,8 +146,6 @@ static int read_source(const struct ggn_series_set *set, const struct ggn_level_
             rc = seq_half(&b, full, s->d, err);
         if (!rc)
             rc = seq_mean(&b, &b.levels[b.n_levels - 1], s->last, err);
-        if (!rc)
-            rc = seq_half_luminance(&b, full, s->d_luminance, err);
         *usable = !rc;
     }
     seq_block_release(&b);
@@ -165,15 +155,11 @@ static int read_source(const struct ggn_series_set *set, const struct ggn_level_
 static int source_init(struct source *s, const struct ggn_series_set *set, struct base_err *err)
 {
     size_t values = ggn_series_set_values(set);
-    float *memory = malloc((3 * values + 2 * (values / 3)) * sizeof *memory);
+    float *memory = malloc(3 * values * sizeof *memory);
 
     if (!memory)
         return base_fail_nomem(err, "synthetic images");
-    *s = (struct source){.base = memory,
-                         .d = memory + values,
-                         .last = memory + 2 * values,
-                         .d_luminance = memory + 3 * values,
-                         .mean = memory + 3 * values + values / 3};
+    *s = (struct source){.base = memory, .d = memory + values, .last = memory + 2 * values};
     return 0;
 }
 
@@ -351,7 +337,6 @@ static void paint(struct source *s, int width, int height, uint32_t seed)
             s->base[c * pixels + p] *= factor;
             s->d[c * pixels + p] *= factor;
         }
-        s->d_luminance[p] = (float)base_luminance((double)s->d[p], (double)s->d[pixels + p], (double)s->d[2 * pixels + p]);
     }
 }
 

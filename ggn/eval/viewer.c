@@ -36,7 +36,9 @@ int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum gg
     size_t values = ggn_series_set_values(set);
     int levels = 1;
 
-    *v = (struct ggn_viewer){.set = set, .window = model->hyper.window};
+    *v = (struct ggn_viewer){.set = set,
+                             .window = model->hyper.window,
+                             .noise_maps = set->noise_maps && model->hyper.noise_map && model->hyper.reach > 0};
     for (int i = 0; i < set->n; i++)
         levels = set->series[i].n_levels > levels ? set->series[i].n_levels : levels;
     if (make_networks(v, model, precision, err))
@@ -122,7 +124,7 @@ double ggn_viewer_logit(void *viewer, const int *levels)
     const int last = levels[v->window - 1];
     const size_t pixels = ggn_series_set_values(v->set) / 3;
     const uint8_t *noise_map =
-        v->set->noise_maps && v->series->has_noise_map[last] ? v->series->noise_map + pixels * (size_t)last : NULL;
+        v->noise_maps && v->series->has_noise_map[last] ? v->series->noise_map + pixels * (size_t)last : NULL;
     float scalars[GGN_SCALARS] = {0};
     if (v->law)
         tell(v, levels, scalars);

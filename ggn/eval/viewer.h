@@ -18,10 +18,10 @@ struct ggn_viewer {
     const struct ggn_series_set *set;      /* borrows */
     const struct ggn_level_series *series; /* borrows; the block */
     const double *law;                     /* borrows; [levels] of a residual model: log2 of the law's error */
-    int window;
-    uint16_t *denoised[GGN_WINDOW_MAX]; /* [3][H][W] each; one allocation, owned */
-    int holds[GGN_WINDOW_MAX];          /* the level that is in it, -1: none */
-    struct ggn_viewed *known;           /* owns; [levels]: the last window that ended there */
+    int window, noise_maps;                /* images of a window; whether the model takes the noise maps of the set */
+    uint16_t *denoised[GGN_WINDOW_MAX];    /* [3][H][W] each; one allocation, owned */
+    int holds[GGN_WINDOW_MAX];             /* the level that is in it, -1: none */
+    struct ggn_viewed *known;              /* owns; [levels]: the last window that ended there */
 };
 
 int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision,

@@ -30,8 +30,6 @@ size_t ggn_setting_difference(const struct ggn_setting *learned, const struct gg
                    learned->height);
     if (here->transfer != learned->transfer)
         used = add(text, room, used, "%s instead of %s", transfers[here->transfer], transfers[learned->transfer]);
-    if (learned->halves && !here->halves)
-        used = add(text, room, used, "no half buffers");
     return used;
 }
 

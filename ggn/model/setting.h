@@ -1,5 +1,5 @@
 /*
- * What surrounds a picture that a model judges: size of the blocks, display, half buffers. A model knows those that it has
+ * What surrounds a picture that a model judges: size of the blocks, display. A model knows those that it has
  * learned with; others are none of its business unless somebody says so. Pure functions, any thread.
  *
  * Exposure is not among them: it is part of what is seen, as the lamps' strength is, and models learn with both.
@@ -15,11 +15,10 @@
 struct ggn_setting {
     int width, height; /* of a whole block */
     enum ggn_transfer transfer;
-    int halves; /* learned: judged by them; here: there are some */
 };
 
 /* Puts into `text` in which way `here` is another setting than the learned one, "blocks of 64x64 pixels instead of 200x200,
- * no half buffers", and returns the length: 0 where nothing is. */
+ * a gamma instead of sRGB", and returns the length: 0 where nothing is. */
 size_t ggn_setting_difference(const struct ggn_setting *learned, const struct ggn_setting *here, char *text, size_t room);
 
 /* Where levels, rising, are not those that a policy asks for: from the first image on, each next one is looked for, and the

@@ -3,14 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-uint8_t ggn_noise_map_code(double mean, double difference, const struct ggn_display *display)
-{
-    if (!isfinite(mean) || !isfinite(difference))
-        return 0;
-    int a = ggn_preprocess(mean, display, NULL), b = ggn_preprocess(mean + difference, display, NULL);
-    return (uint8_t)(a > b ? a - b : b - a);
-}
-
 int ggn_tile_count(int size, int tile) { return size <= tile ? 1 : (size + tile - 1) / tile; }
 
 int ggn_tile_start(int size, int tile, int index)

@@ -13,12 +13,7 @@
 
 #include "model/preprocess.h"
 
-/* The noise map of an image, one value per pixel: how many display codes apart the luminance of the mean and that of
- * mean + half difference are shown. It has the noise of the mean, whatever the samples. Both in linear light; difference: of
- * the half buffers, (A − B)/2, noise of the variance of the mean. Luminance alone, since more is not recorded at every level
- * (sequence/FORMAT.md). Values that are no number show nothing. */
-uint8_t ggn_noise_map_code(double mean, double difference, const struct ggn_display *display);
-/* Of a code, on its way into the network: noise at the threshold of sight is one to three codes. */
+/* Of a code of the noise map, on its way into the network: noise at the threshold of sight is one to three codes. */
 #define GGN_NOISE_MAP_GAIN (16.0F / 255)
 
 /* Tiles of size `tile` that cover `size` pixels, evenly spread, overlapping as needed: their number, and where one begins.

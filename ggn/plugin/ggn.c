@@ -3,8 +3,6 @@
  * answer is the probability that the newest image still looks noisy. A block stops after `passes` checks in a row below
  * `visible`.
  *
- * A model may also take the noise map that the half buffer shows; without half buffer it decides without.
- *
  * A *residual* model begins with what `observer` measures, from the half buffer or without one from how the mean changes:
  * the network only corrects it. `error` is then the visible noise over what is just visible.
  */
@@ -171,39 +169,13 @@ static void scalars_of(struct gp_block_view *seen, float scalars[GGN_SCALARS])
     ggn_measure_scalars(window, spp, (int)s->used, law(seen), scalars);
 }
 
-/* *split takes A − I, of n samples, the first h of them in A, to noise of the variance of the mean. 0: the view has no half
- * buffer with part of the samples. */
-static int has_half(const struct gp_block_view *seen, double *split)
+/* Of the visible noise, already measured; NULL: the model takes none. */
+static const uint8_t *noise_map_of(const struct gp_block_view *seen)
 {
-    if (!lull_kit_plane(seen->view, LULL_PLANE_HALF) || !gp_has_halves(seen->block))
-        return 0;
-    *split = seq_means_scale((double)seen->block->half_spp, (double)seen->block->spp);
-    return 1;
-}
-
-static const uint32_t HALVES = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF);
-
-/* The noise map of the block as it is now, NULL: it has none. */
-static const uint8_t *read_noise_map(const struct gp_block_view *seen)
-{
-    const struct lull_kit *kit = &seen->in->kit;
     const struct ggn_model *model = seen->in->model;
     const struct worker *worker = seen->worker;
-    uint8_t *to = worker->noise_map;
-    struct lull_kit_span s;
-    double split;
 
-    if (model->hyper.noise_map && seen->in->rule.reach > 0)
-        return worker->noise_map; /* of the visible noise, already measured */
-    if (!model->hyper.noise_map || !has_half(seen, &split))
-        return NULL;
-    for (lull_kit_span_begin(&s, seen->view, seen->block, HALVES); lull_kit_span_next(&s);)
-        for (int32_t i = 0; i < s.count; i++) {
-            double mean = lull_kit_luminance(kit, s.value[LULL_PLANE_COLOR][i]);
-            double half = lull_kit_luminance(kit, s.value[LULL_PLANE_HALF][i]);
-            *to++ = ggn_noise_map_code(mean, split * (half - mean), &seen->in->display);
-        }
-    return worker->noise_map;
+    return model->hyper.noise_map && seen->in->rule.reach > 0 ? worker->noise_map : NULL;
 }
 
 /* Denoises the images that have not been denoised yet. */
@@ -229,7 +201,7 @@ static double window_logit(void *data)
             ggn_inference_denoise(worker->inference, noisy[i], to, w, h);
         seen->head->made |= UINT32_C(1) << slot;
     }
-    return ggn_inference_logit(worker->inference, noisy, denoised, read_noise_map(seen), scalars, w, h);
+    return ggn_inference_logit(worker->inference, noisy, denoised, noise_map_of(seen), scalars, w, h);
 }
 
 /* --- instance ---------------------------------------------------------------------------------------------------------- */
@@ -248,8 +220,6 @@ static int32_t load(struct lull_instance *in, int kind, const char *path, struct
     in->rule.reach = model->hyper.reach;
     if (in->rule.window < 2 || in->rule.window > GGN_WINDOW_MAX)
         return lull_kit_fail(err, LULL_E_IO, "model: %.200s: windows of %d images", path, in->rule.window);
-    if (model->hyper.noise_map)
-        in->kit.need.planes_used |= LULL_PLANE_BIT(LULL_PLANE_HALF);
     for (int net = 0; net < GGN_NETS; net++)
         gp_windowed_hash(in, model->weights[net]->params, model->graph[net].n_params * sizeof(float));
     gp_windowed_ready(in, params, P_COUNT, model->hyper.width, model->hyper.height);

@@ -116,15 +116,12 @@ static void frame_release(struct lull_instance *in)
     workers_release(in->ops, in->worker, in->workers);
 }
 
-/* What the model has not learned with. A residual model begins with what the observer measures here, whatever it is: with
- * halves or without, which is told anyway. */
+/* What the model has not learned with. */
 static void tell_setting(const struct lull_instance *in, const struct lull_frame *frame)
 {
     const struct lull_requirements *need = &in->kit.need;
-    const uint32_t half = LULL_PLANE_BIT(LULL_PLANE_HALF);
-    const struct ggn_setting learned = {(int)need->block_width, (int)need->block_height, GGN_TRANSFER_SRGB,
-                                        (need->planes_used & half) && !(in->rule.reach > 0)};
-    struct ggn_setting here = {0, 0, in->display.transfer, (frame->planes & half) != 0};
+    const struct ggn_setting learned = {(int)need->block_width, (int)need->block_height, GGN_TRANSFER_SRGB};
+    struct ggn_setting here = {0, 0, in->display.transfer};
     char difference[200], text[400];
 
     for (uint32_t i = 0; i < frame->block_count; i++) {
@@ -134,8 +131,7 @@ static void tell_setting(const struct lull_instance *in, const struct lull_frame
     }
     if (!ggn_setting_difference(&learned, &here, difference, sizeof difference))
         return;
-    snprintf(text, sizeof text, "the model is asked about what it has not learned: %s%s", difference,
-             learned.halves && !here.halves ? " (ggn evaluate --no-pictures says how well it decides)" : "");
+    snprintf(text, sizeof text, "the model is asked about what it has not learned: %s", difference);
     gp_log(&in->kit, in->rule.reach > 0 ? LULL_LOG_INFO : LULL_LOG_WARNING, text);
 }
 

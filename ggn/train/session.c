@@ -61,6 +61,8 @@ static int check_plan(const struct ggn_session *s, struct base_err *err)
         return base_fail(err, BASE_EINVAL, "crop %d is not in 16..%d, the side of the blocks", s->crop, side_of(s));
     if (paper && (p->noise_map > 0 || p->reach > 0))
         return base_fail(err, BASE_EINVAL, "preset paper has neither noise pictures, averaged weights nor a residual");
+    if (p->noise_map > 0 && !(p->reach > 0))
+        return base_fail(err, BASE_EINVAL, "a noise picture is of the visible noise: --picture goes with --residual");
     if (p->k_r < 3)
         return base_fail(err, BASE_EINVAL, "the denoiser needs a width of at least 3");
     if (!s->train.n)

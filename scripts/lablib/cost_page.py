@@ -278,7 +278,7 @@ def final(p):
 
 
 def without_halves(out):
-    """Settings for hosts without half buffers: `observer` looks twice there, a network judges without noise picture and guard."""
+    """Settings for hosts without half buffers: `observer` looks twice there, a network by how the mean changes."""
     takes_halves = {"observer", *out.get("networks", {})}
     return lambda p: not p[0].startswith("halfbuf") and p[0] not in takes_halves
 

@@ -32,7 +32,6 @@ while read -r option value; do changes "$option" "$value"; done <<'END'
 --epoch-steps 1
 --lr-denoiser 0.01
 --lr 0.01
---picture 1
 --synthetic 0
 --extend 0
 --ratio 1.5

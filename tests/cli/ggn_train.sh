@@ -37,7 +37,7 @@ done
 check "the epoch with the lowest validation loss is kept, not the last, not the one with the best AUC" $?
 
 # The changed stops that are counted are those in which the tables of stops differ from those of a model that was trained well.
-$ggn evaluate -d $data -m "$tmp/a.ggn" -m tests/data/tiny.ggn --no-quality -o "$tmp/report" >"$tmp/out" 2>"$tmp/err" &&
+$ggn evaluate -d $data -m "$tmp/a.ggn" -m tests/data/tiny.ggn --no-quality --visible 0.4 -o "$tmp/report" >"$tmp/out" 2>"$tmp/err" &&
     for m in a tiny; do cut -d';' -f1-5 "$tmp/report/train-stops-${m}ggn.csv" >"$tmp/stops-$m"; done &&
     changed=$(diff "$tmp/stops-a" "$tmp/stops-tiny" | grep -c '^>') && [ "$changed" -gt 0 ] &&
     grep -q "^tiny.ggn: [1-9][0-9]* of [0-9]* verdicts and $changed of 9 stops differ from a.ggn" "$tmp/out"
@@ -169,20 +169,20 @@ LULL_MODEL=$tmp/law.ggn $BUILD/bin/lull-check -q -L "${LIMIT_S:-3600}" "$BUILD/l
 check "   ...lull-check passes the criterion with it" $?
 
 # the noise picture, dropped at random: the same bytes after an interruption, and other bytes than without
-more="$tiny --picture 0.7"
+more=$(echo "$law" | sed "s/--picture 1/--picture 0.7/")
 $ggn train $more --out "$tmp/picture.ggn" -q 2>"$tmp/err" && $ggn inspect "$tmp/picture.ggn" 2>"$tmp/err" | grep -q "noise picture.*taken"
 check "a model with the noise picture" $?
 interrupted 4 "$tmp/resumed.ggn" $more -q &&
     $ggn train $more --out "$tmp/resumed.ggn" --resume --threads 1 -q 2>"$tmp/err" && cmp "$tmp/picture.ggn" "$tmp/resumed.ggn" 2>"$tmp/err"
 check "the same bytes when interrupted and resumed, with noise pictures" $?
-# half buffers at one level only: it lends the others theirs
 for no in "" --no-pictures; do
-    $ggn evaluate -d $data -m "$tmp/picture.ggn" --no-quality --json $no >"$tmp/figures$no" 2>"$tmp/err" || break
+    $ggn evaluate -d "$tmp/law" -m "$tmp/picture.ggn" --no-quality --json $no >"$tmp/figures$no" 2>"$tmp/err" || break
 done && ! cmp -s "$tmp/figures" "$tmp/figures--no-pictures"
 check "evaluate with and without noise pictures" $?
 LULL_MODEL=$tmp/picture.ggn $BUILD/bin/lull-check -q -L "${LIMIT_S:-3600}" "$BUILD/lib/lull/ggn.so:ggn" >"$tmp/err" 2>&1
 check "lull-check passes the criterion with this model" $?
 fails "a model of another input to start from" "another size, preset or input" $ggn train $tiny --init "$tmp/picture.ggn"
+fails "a noise picture without the law" "a noise picture is of the visible noise: --picture goes with --residual" $ggn train $tiny --picture 1
 fails "no noise picture in the published preset" "preset paper has neither noise pictures" $ggn train --data $data --preset paper --picture 1
 
 mkdir "$tmp/empty"

@@ -223,7 +223,6 @@ static struct ggn_train_plan full(const char *name)
 {
     struct ggn_train_plan p = small(name, GGN_PRESET_LULL);
 
-    p.noise_map = 0.7;
     p.validation_windows = 7;
     p.early_rate = 0.5;
     return p;
@@ -498,13 +497,13 @@ static void plans(void **state)
     TRY(good, data.split.validation = "scene9");
     TRY(good, data.split.validation = "scene0,scene1,scene2");
     TRY(paper, noise_map = 0.5);
+    TRY(good, noise_map = 0.5);
     TRY(paper, crop = 1);
     of_all.init = path_of("all", "");
     TRY(of_all, k_r = 4);
     TRY(of_all, k_m = 4);
     TRY(of_all, k_d = 3);
     TRY(of_all, window = 4);
-    TRY(of_all, noise_map = 0);
     TRY(of_all, init = path_of("paper", ""));
     TRY(of_all, init = "/nonexistent");
 }

@@ -534,14 +534,14 @@ static void print_series(FILE *f, const struct ggn_series_set *set)
 static void chains_are_as_they_were(void **state)
 {
     static const struct ggn_series_set_options options[] = {
-        {.dir = "tests/data/recorded", .with_test = 1, .noise_maps = 1},
+        {.dir = "tests/data/recorded", .with_test = 1, .noise_maps = 1, .measures = 1},
         {.dir = "tests/data/recorded", .ratio = 2, .mean_for_reference = 1},
         {.dir = "tests/data/recorded", .split = {.validation = "one", .test = "two,three"}, .with_test = 1},
         {.dir = "tests/data/recorded", .split = {.validation = "one,two", .test = "three"}},
         {.dir = "tests/data/recorded", .split = {.validation = "two,one", .test = "three,one"}},
         {.dir = "tests/data/recorded", .split = {.test = "one-view0"}},
         {.dir = "tests/data/recorded", .split.validation = "one,none"},
-        {.dir = "tests/data/train-demo", .split.validation = "scene1", .noise_maps = 1, .ratio = 3},
+        {.dir = "tests/data/train-demo", .split.validation = "scene1", .noise_maps = 1, .measures = 1, .ratio = 3},
         {.dir = "tests/data/recorded/train/one-view1"}};
     struct transcript t;
     FILE *f = transcript_begin(&t);
@@ -559,7 +559,8 @@ static void chains_are_as_they_were(void **state)
     }
     for (int how = 0; how < 4; how++) {
         struct ggn_series_set set;
-        const struct ggn_series_set_options o = {.dir = "tests/data/recorded", .with_test = 1, .noise_maps = how != 1};
+        const struct ggn_series_set_options o = {
+            .dir = "tests/data/recorded", .with_test = 1, .noise_maps = how != 1, .measures = 1};
         assert_int_equal(ggn_series_set_load(&set, &o, NULL), 0);
         fprintf(f, "> %s\n",
                 how == 0   ? "synthetic"
@@ -613,7 +614,7 @@ static void windows_are_as_they_were(void **state)
     enum { SIDE = 16, P = SIDE * SIDE };
     static float planes[3 * 4 * P], other[3 * P];
     static uint16_t denoised[64 * 3 * P];
-    const struct ggn_series_set_options o = {.dir = "tests/data/recorded", .noise_maps = 1};
+    const struct ggn_series_set_options o = {.dir = "tests/data/recorded", .noise_maps = 1, .measures = 1};
     struct ggn_series_set set;
     struct transcript t;
     FILE *f = transcript_begin(&t);

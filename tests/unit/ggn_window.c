@@ -1,4 +1,4 @@
-/* What trainer, evaluation and criterion share: noise maps, tiles, tail statistics, policy. */
+/* What trainer, evaluation and criterion share: tiles, tail statistics, policy. */
 #include <math.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,27 +17,8 @@
 #include "model/window.h"
 #include "nn/hash.h"
 
-/* The sRGB curve written out (IEC 61966-2-1). */
-static int shown(double linear)
+static void one_plane_is_cut_as_three(void **state)
 {
-    double v = linear > 0 ? linear < 1 ? linear : 1 : 0;
-    return (int)floor(255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055) + 0.5);
-}
-
-static void noise_pictures_are_differences_of_codes(void **state)
-{
-    const struct ggn_display exposed = {.transfer = GGN_TRANSFER_SRGB, .exposure = 2};
-
-    for (uint32_t k = 0; k < 20000; k++) {
-        double mean = exp2(-14 + 16 * ggn_hash_unit(k, 1)), d = mean * 0.5 * (ggn_hash_unit(k, 2) - 0.5);
-        assert_int_equal(ggn_noise_map_code(mean, d, NULL), abs(shown(mean + d) - shown(mean)));
-        assert_int_equal(ggn_noise_map_code(mean, d, &exposed), ggn_noise_map_code(2 * mean, 2 * d, NULL));
-    }
-    assert_int_equal(ggn_noise_map_code(5, 1, NULL), 0);
-    assert_int_equal(ggn_noise_map_code(1.1, -1.05, NULL), 255 - shown(0.05));
-    assert_int_equal(ggn_noise_map_code(0.2, (double)NAN, NULL), 0);
-    assert_int_equal(ggn_noise_map_code((double)NAN, 0.2, NULL), 0);
-    assert_int_equal(ggn_noise_map_code(0.2, (double)INFINITY, NULL), 0);
     uint8_t image[6] = {0, 1, 2, 3, 4, 5};
     float tile[5 * 8], three[3 * 5 * 8];
     uint8_t thrice[18];
@@ -361,16 +342,16 @@ static void policies_list_their_levels(void **state)
 static void settings_are_compared(void **state)
 {
     static const double even[] = {16, 32, 48, 64, 80, 96}, geometric[] = {16, 18, 20, 23, 26, 30};
-    const struct ggn_setting learned = {200, 200, GGN_TRANSFER_SRGB, 1};
+    const struct ggn_setting learned = {200, 200, GGN_TRANSFER_SRGB};
     struct ggn_setting here = learned;
     struct ggn_policy p = ggn_policy_default();
     char text[200];
     double asked = 0, nearest = 0;
 
     assert_true(ggn_setting_difference(&learned, &here, text, sizeof text) == 0 && text[0] == '\0');
-    here = (struct ggn_setting){64, 32, GGN_TRANSFER_LINEAR, 0};
+    here = (struct ggn_setting){64, 32, GGN_TRANSFER_LINEAR};
     assert_true(ggn_setting_difference(&learned, &here, text, sizeof text) == strlen(text));
-    assert_string_equal(text, "blocks of 64x32 pixels instead of 200x200, linear codes instead of sRGB, no half buffers");
+    assert_string_equal(text, "blocks of 64x32 pixels instead of 200x200, linear codes instead of sRGB");
     assert_true(ggn_setting_difference(&learned, &here, text, 20) == 19 && strlen(text) == 19);
     assert_true(ggn_setting_difference(&here, &learned, text, sizeof text) > 0); /* more than it needs is no difference */
     assert_string_equal(text, "blocks of 200x200 pixels instead of 64x32, sRGB instead of linear codes");
@@ -458,7 +439,7 @@ static void policies_of_models(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(noise_pictures_are_differences_of_codes),
+        cmocka_unit_test(one_plane_is_cut_as_three),
         cmocka_unit_test(tiles_cover_and_reflect),
         cmocka_unit_test(tail_statistics_match_their_definition),
         cmocka_unit_test(policy_travels_with_the_model),
