@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "model/stopper.h"
 
@@ -111,15 +110,6 @@ int ggn_method_halfbuf(struct ggn_method *m, const struct ggn_eval_set *s, int *
 int ggn_method_variance(struct ggn_method *m, const struct ggn_eval_set *s, int *available, struct base_err *err)
 {
     return from_columns(m, s, "variance", s->rse, s->rse_unsettled, available, err);
-}
-
-int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score,
-                      struct base_err *err)
-{
-    int rc = ggn_method_init(m, s, name, 1, err);
-    if (!rc)
-        memcpy(m->score, score, s->n * sizeof *score);
-    return rc;
 }
 
 double ggn_method_verdict(const struct ggn_method *m, size_t i) { return m->score ? m->score[i] : (double)NAN; }

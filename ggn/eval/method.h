@@ -62,9 +62,6 @@ int ggn_method_thresholds(struct ggn_method *m, const struct ggn_eval_set *s, co
 /* An empty method with room for stops and, if asked, scores. */
 int ggn_method_init(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, int with_scores,
                     struct base_err *err);
-/* Any other scores: copies score [cases]. */
-int ggn_method_scores(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, const double *score,
-                      struct base_err *err);
 
 /* Sets stop from score, guard, passes and cut, as the stopping rule ends (ggn_stopper_pass). */
 void ggn_method_run(struct ggn_method *m, const struct ggn_eval_set *s);
