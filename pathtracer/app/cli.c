@@ -283,7 +283,7 @@ const struct base_option pt_cli_options[] = {
     {"criterion", 'c', "NAME|PATH[:ID]", TO(criterion),
      .help = "Stopping criterion: a name (see --list-criteria) or a shared object; default observer"},
     {"visible", 0, "SHARE", .set = set_visible,
-     .help = "Stop a block when at most this share of viewers would still see noise, of criteria that can tell (observer: "
+     .help = "Stop a block when at most this share of viewers would still see noise, of criteria that can tell (observer "
              "and denoised: default 0.35, ggn: the model's own)"},
     {"mask", 0, "FILE.png", TO(mask), .input = BASE_FILE, .words = png,
      .help = "A grey picture of the image's size: lighter regions are rendered better. White takes a quarter of the quality "
