@@ -520,7 +520,7 @@ static void going_on(void **state)
     assert_non_null(strstr(err.text, "max depth 3, clamp inf; use another folder"));
     config = make_config();
     config.directory = "/proc/nope/deep";
-    assert_int_equal(record(&config, NULL, &err), BASE_EINVAL);
+    assert_int_equal(record(&config, NULL, &err), BASE_EIO);
 }
 
 int main(void)
