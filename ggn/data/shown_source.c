@@ -4,26 +4,28 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The next A or A-B of a list of them. 0: there is none, or it is not well formed; then **at is what is left. */
-static int next_item(const char **at, unsigned long *lo, unsigned long *hi)
+/* The next A or A-B of a list of them: returns what follows, or NULL where there is none or it is not well formed. Without a pointer to
+ * the caller's pointer: GCC 14.2 compiles that wrongly (-ftree-pre), so that `0` was no list of block 0. */
+static const char *next_item(const char *at, unsigned long *lo, unsigned long *hi)
 {
     char *end;
-    if (**at < '0' || **at > '9')
-        return 0;
-    *lo = *hi = strtoul(*at, &end, 10);
+    if (*at < '0' || *at > '9')
+        return NULL;
+    *lo = *hi = strtoul(at, &end, 10);
     if (*end == '-' && end[1] >= '0' && end[1] <= '9')
         *hi = strtoul(end + 1, &end, 10);
-    *at = *end == ',' && end[1] != '\0' ? end + 1 : end;
-    return 1;
+    if (*end == ',' && end[1] != '\0')
+        return end + 1;
+    return *end == '\0' ? end : NULL;
 }
 
-static int is_list(const char *text)
+static int is_list(const char *at)
 {
     unsigned long lo, hi;
-    int items = 0;
-    while (next_item(&text, &lo, &hi))
-        items++;
-    return items > 0 && *text == '\0';
+    do
+        at = next_item(at, &lo, &hi);
+    while (at && *at != '\0');
+    return at != NULL;
 }
 
 int ggn_shown_source_parse(const char *text, struct ggn_shown_source *s, struct base_err *err)
@@ -46,10 +48,9 @@ int ggn_shown_source_parse(const char *text, struct ggn_shown_source *s, struct 
 
 int ggn_shown_source_has(const struct ggn_shown_source *s, uint32_t id)
 {
-    const char *at = s->blocks;
     unsigned long lo, hi;
-    while (at && next_item(&at, &lo, &hi))
-        if (id >= lo && id <= hi)
+    for (const char *at = s->blocks; at && *at != '\0';)
+        if ((at = next_item(at, &lo, &hi)) && id >= lo && id <= hi)
             return 1;
     return !s->blocks;
 }
@@ -64,10 +65,9 @@ static int has_block(const struct ggn_shown_view *view, unsigned long id)
 
 int ggn_shown_source_check(const struct ggn_shown_source *s, const struct ggn_shown_view *view, struct base_err *err)
 {
-    const char *at = s->blocks;
     unsigned long lo, hi;
-    while (at && next_item(&at, &lo, &hi))
-        if (!has_block(view, lo) || !has_block(view, hi))
+    for (const char *at = s->blocks; at && *at != '\0';)
+        if ((at = next_item(at, &lo, &hi)) && (!has_block(view, lo) || !has_block(view, hi)))
             return base_fail(err, BASE_EINVAL, "%s: has no block %lu", s->folder, has_block(view, lo) ? hi : lo);
     return 0;
 }

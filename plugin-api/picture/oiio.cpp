@@ -69,6 +69,14 @@ std::vector<ImageSpec> list_parts(ImageInput &input)
     return parts;
 }
 
+/* As they stand in the file: OpenImageIO 2.5 shows luminance and chroma of an EXR as R, G and B. */
+std::vector<std::string> channel_names(const ImageSpec &spec)
+{
+    if (spec.get_int_attribute("openexr:luminancechroma") != 0)
+        return {"Y", "RY", "BY"};
+    return spec.channelnames;
+}
+
 /* The first three, else the first one, and alpha: of other formats than EXR, whose names may say nothing. */
 pic_choice choose_by_place(const ImageSpec &spec)
 {
@@ -83,14 +91,16 @@ int choose_picture(ImageInput &input, const char *name, pic_choice *out, base_er
     const bool is_exr = std::strcmp(input.format_name(), "openexr") == 0;
     const std::vector<ImageSpec> parts = is_exr ? list_parts(input) : std::vector<ImageSpec>{input.spec()};
     std::vector<std::string> part_names;
+    std::vector<std::vector<std::string>> names;
     std::vector<pic_channel> list;
-    for (const ImageSpec &spec : parts)
+    for (const ImageSpec &spec : parts) {
         part_names.push_back(parts.size() > 1 ? spec.get_string_attribute("oiio:subimagename").c_str() : "");
+        names.push_back(channel_names(spec));
+    }
     for (size_t part = 0; part < parts.size(); part++)
-        for (size_t c = 0; c < parts[part].channelnames.size(); c++)
-            list.push_back({parts[part].channelnames[c].c_str(),
-                            part_names[part].empty() ? nullptr : part_names[part].c_str(), static_cast<int>(part),
-                            static_cast<int>(c)});
+        for (size_t c = 0; c < names[part].size(); c++)
+            list.push_back({names[part][c].c_str(), part_names[part].empty() ? nullptr : part_names[part].c_str(),
+                            static_cast<int>(part), static_cast<int>(c)});
     if (list.size() > PIC_MAX_CHANNELS)
         return base_fail(err, BASE_EINVAL, "%s: %zu channels (expected at most %d)", name, list.size(), PIC_MAX_CHANNELS);
     base_err why = {};
