@@ -282,7 +282,7 @@ def share_table(scenes, ways):
         errors = [e for w in found for e in w["errors"]]
         if errors:
             body.append([way.replace(" denoised", ""), str(len(errors)), tables.percent(sum(e > VISIBLE for e in errors) / len(errors)),
-                         "%.2f" % max(errors), "%.2f" % statistics.median(max(w["errors"]) for w in found), "%.1f" % sum(w["s"] for w in found)])
+                         "%.2f" % max(errors), "%.2f" % statistics.median(max(w["errors"]) for w in found), "%.1f" % math.fsum(w["s"] for w in found)])
     return tables.table(("way", "blocks", "visibly off", "worst", "worst block of a picture, median", "processor s, all"), body)
 
 

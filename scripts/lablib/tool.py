@@ -4,6 +4,7 @@ import datetime
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 
@@ -75,6 +76,8 @@ def save(data, *names, **layout):
 
 
 def commit(*of):
+    if not shutil.which("git"):  # as where there is no repository: a release has neither
+        return ""
     done = subprocess.run(["git", "-C", ROOT, "log", "-1", "--format=%h", *of], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     return done.stdout.strip()
 
