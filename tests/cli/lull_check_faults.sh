@@ -36,7 +36,7 @@ fault 6 batch "depends on the order of the batch"
 fault 7 repeat "asking twice leaves a trace"
 fault 8 restart "RESTART does not forget"
 fault 9 two-instances "instances share state"
-mask='s/ error [^ ]* / error X /g' # of memory that is none of the image
+mask='s/ action [^ ]* error [^ ]* / action X error X /g' # of memory that is none of the image
 fault 10 strides "ignores strides"
 fault 11 types "reads every type as f32"
 mask=
