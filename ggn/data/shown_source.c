@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The next A or A-B of a list of them: returns what follows, or NULL where there is none or it is not well formed. It moves no
- * pointer of the caller: GCC 14.2 compiles that wrongly (-ftree-pre), and `0` would be no list of block 0. */
+/* The next A or A-B of a list of them: returns what follows, or NULL where there is none or it is not well formed. It moves
+ * no pointer of the caller: GCC 14.2 compiles that wrongly (-ftree-pre), and `0` would be no list of block 0. */
 static const char *next_item(const char *at, unsigned long *lo, unsigned long *hi)
 {
     char *end;
