@@ -50,11 +50,12 @@ int lull_denoised_open(struct lull_denoised_pair *pair, const char *library, con
                        struct base_err *err)
 {
     *pair = (struct lull_denoised_pair){.form = *form};
-    int rc = lull_oidn_open(library, &pair->oidn, err);
+    /* First, since of what is too large this fails at once, but shared memory takes all that the machine has. */
+    int rc = allocate(pair, err);
+    if (!rc)
+        rc = lull_oidn_open(library, &pair->oidn, err);
     if (!rc)
         rc = lull_oidn_prepare(pair->oidn, &form->picture, err);
-    if (!rc)
-        rc = allocate(pair, err);
     if (rc)
         lull_denoised_close(pair);
     return rc;
