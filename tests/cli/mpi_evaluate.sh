@@ -6,7 +6,7 @@ G=${P%/*}/ggn
 says='ggn [a-z]*'
 data=$here/../data/train-demo
 same() { cmp "$1" "$2"; }
-t "a model" "$G" train --data "$data" --kr 3 --km 3 --kd 4 --crop 32 --ratio 0 --batch 5 --batch-denoiser 4 --picture 0.5 \
+t "a model" "$G" train --data "$data" --kr 3 --km 3 --kd 4 --crop 32 --ratio 0 --batch 5 --batch-denoiser 4 \
     --steps-denoiser 3 --steps 4 --epoch-steps 2 --out one.ggn -q
 
 t "tables by one process" sh -c "$G evaluate -d $data -m one.ggn -o one-figures >one.txt"

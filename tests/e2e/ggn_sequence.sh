@@ -44,7 +44,7 @@ fails "thresholds for another size" 'has 3 thresholds' "$bin/ggn" label --human 
 fails "published thresholds for another size" 'has 3 thresholds' "$bin/ggn" evaluate -d "$tmp/judged" -w 3 --no-quality -O "$tmp/o.json" \
     --thresholds "$tmp/size.csv"
 printf 'two;500;800;\n' >"$tmp/few.csv"
-fails "published thresholds without a view" "not all of people's views" "$bin/ggn" evaluate -d "$tmp/judged" -w 3 --no-quality \
+fails "published thresholds without a view" "not all views of the split .people. are in it" "$bin/ggn" evaluate -d "$tmp/judged" -w 3 --no-quality \
     -O "$tmp/o.json" --thresholds "$tmp/few.csv"
 fails "calibration without thresholds" "no thresholds for 'one'" "$bin/ggn" label --calibrate "$tmp/few.csv" "$tmp/judged/people"
 
