@@ -80,7 +80,7 @@ def test_layout():
 
 def test_numbers():
     """every constant is the headers'"""
-    headers = "".join(Path(f"plugin-api/include/lull/{name}.h").read_text() for name in ("criterion", "loader", "host"))
+    headers = "".join(Path(f"plugin-api/include/lull/{name}.h").read_text() for name in ("criterion", "loader", "host", "host_draft"))
     found = dict(re.findall(r"#define LULL_(\w+) \(?(?:UINT32_C\()?(-?(?:0x)?[0-9a-f]+)\)?", headers))
     plane = {n[6:]: v for n, v in found.items() if n.startswith("PLANE_") and n != "PLANE_COUNT"}
     names = {n: v for n, v in {**found, **plane}.items() if hasattr(abi, n)}
