@@ -7,7 +7,7 @@ import sys
 from typing import Any, Optional, Sequence
 
 from ..study.files import Refused, check_output
-from ..study.options import Command, Option, parse, word
+from ..study.options import Command, Option, finish, parse, word
 from .sources import Wanted, read
 
 NAMES = ("curves", "roc", "scatter", "histogram", "maps", "scores", "strips", "frontier")
@@ -51,23 +51,5 @@ def _run(arguments: Sequence[str]) -> None:
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:
     """The exit status: 0 done, 1 out of memory, 2 bad usage, bad input, or the picture could not be written."""
-    status, why = 0, ""
-    try:
-        _run(sys.argv[1:] if arguments is None else arguments)
-    except Refused as error:
-        status, why = 2, str(error)
-    except ImportError as error:
-        status, why = 2, f"{error.name} is needed: apt-get install python3-matplotlib, or pip install 'lull[plot]'"
-    except MemoryError:
-        status, why = 1, "out of memory"
-    except (SystemExit, BrokenPipeError):  # --help was answered; nobody listens, which the flush below finds again
-        pass
-    if status:
-        print(f"lull-plot: {why}", file=sys.stderr)
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more is tried at the end
-        print("lull-plot: cannot write standard output", file=sys.stderr)
-        return status or 2
-    return status
+    words = sys.argv[1:] if arguments is None else arguments
+    return finish("lull-plot", lambda: _run(words), "apt-get install python3-matplotlib, or pip install 'lull[plot]'")

@@ -10,7 +10,7 @@ from typing import Any, Callable, Sequence
 from . import prepare
 from .definition import MAX_VIEWS, read_study
 from .files import Refused, check_output, protect
-from .options import Command, Option, parse
+from .options import Command, Option, finish, parse
 from .store import Store
 
 Work = Callable[[Sequence[str], dict[str, Any]], None]  # arguments, options
@@ -131,25 +131,7 @@ def _run(arguments: Sequence[str]) -> None:
 
 def main() -> int:
     """The exit status: 0 done, 1 out of memory, 2 bad usage, bad input, or an output could not be written."""
-    status, why, arguments = 0, "", sys.argv[1:]
-    try:
-        _run(arguments)
-    except Refused as error:
-        status, why = 2, str(error)
-    except ImportError as error:
-        status, why = 2, (f"{error.name} is needed: apt-get install python3-aiohttp python3-scipy python3-matplotlib, or "
-                          "pip install 'lull[study]'")
-    except MemoryError:
-        status, why = 1, "out of memory"
-    except (SystemExit, BrokenPipeError):  # --help was answered; nobody listens, which the flush below finds again
-        pass
-    if status:
-        verb = f" {arguments[0]}" if arguments and arguments[0] in VERBS else ""
-        print(f"lull-study{verb}: {why}", file=sys.stderr)
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more is tried at the end
-        print("lull-study: cannot write standard output", file=sys.stderr)
-        return status or 2
-    return status
+    arguments = sys.argv[1:]
+    verb = f" {arguments[0]}" if arguments and arguments[0] in VERBS else ""
+    return finish("lull-study" + verb, lambda: _run(arguments), "apt-get install python3-aiohttp python3-scipy python3-matplotlib, "
+                  "or pip install 'lull[study]'")
