@@ -25,14 +25,16 @@ for scene in cornell-box soft-shadow; do head -n 1 "$tmp/labels" >"$tmp/data/$sc
 check "a model of evenly spaced levels keeps them" $?
 
 render="$BUILD/bin/lull-render -q scenes/cornell-box.pbrt --size 96x64 --block 32 --sampler independent --spp-max 256 -c ggn"
-# same SHARE: where blocks stop in a render, and where they do by the recording
+# same SHARE: where blocks stop in a render, and where they do by the recording. Beyond the last level that was learned (176, below the
+# thresholds) the renderer asks by the ratio of levels, where nothing was recorded: such a stop only lies beyond in both.
+learned() { awk '{ print ($1 > 176 ? "beyond" : $1) }' "$1"; }
 same() {
     $render -p model="$tmp/even.ggn" -p visible="$1" --stop-map "$tmp/stops.csv" </dev/null 2>"$tmp/err" &&
         $ggn evaluate --data "$tmp/data" --model "$tmp/even.ggn" -p visible="$1" --recorded --no-quality -o "$tmp/report" \
             >"$tmp/out" 2>"$tmp/err" && [ ! -s "$tmp/err" ] &&
         awk -F';' '$1 == "cornell-box" { print $5 }' "$tmp/report/train-stops-evenggn.csv" >"$tmp/replayed" &&
         head -n 1 "$tmp/stops.csv" | tr ';' '\n' | sed -n 2,7p >"$tmp/rendered" && [ "$(wc -l <"$tmp/replayed")" -eq 6 ] &&
-        paste "$tmp/rendered" "$tmp/replayed" >"$tmp/err" && cmp -s "$tmp/rendered" "$tmp/replayed"
+        paste "$tmp/rendered" "$tmp/replayed" >"$tmp/err" && [ "$(learned "$tmp/rendered")" = "$(learned "$tmp/replayed")" ]
     check "visible $1: a render stops where evaluate says" $?
     cat "$tmp/rendered" >>"$tmp/all"
 }
