@@ -112,7 +112,7 @@ TEST_SRC    := $(wildcard $(TEST_FOLDERS:%=tests/%/*.c))
 SANE_SRC    := $(wildcard tests/unit/*.c tests/abi/*.c tests/oom/*.c)
 # Hosts that are not installed are skipped; `make test-hosts` installs them first.
 HOST_TEST   := $(wildcard tests/hosts/*.sh)
-SCRIPT_TEST := $(wildcard tests/cli/*.sh tests/e2e/*.sh) $(HOST_TEST)
+SCRIPT_TEST := $(wildcard tests/cli/*.sh tests/e2e/*.sh tests/lab/*.sh) $(HOST_TEST)
 FUZZ_SRC    := $(filter-out tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
 
 o = $(addprefix $(OBJ)/,$(addsuffix .o,$(1)) $(addsuffix .double.o,$(filter $(GGN_TWICE),$(1))))
@@ -380,9 +380,9 @@ abi-check: $(OUT)/tests/abi/api_layout ## the layouts of the ABI and the host li
 demo: setup ## install what is missing, build, render a scene with per-block stopping
 	@$(build) all
 	@scripts/demo
-bench: all $(BENCHES) ## measure speed as ratios, interleaved, against the peers that are installed (docs/speed.md)
+bench: all $(BENCHES) ## measure speed as ratios, interleaved, against the peers that are installed (docs/results/speed.md)
 	@scripts/lab bench --write
-cost: all ## measure what accuracy costs each criterion, from recordings in data/ (docs/cost.md)
+cost: all ## measure what accuracy costs each criterion, from recordings in data/ (docs/results/cost.md)
 	@scripts/lab cost
 train-demo: all ## train a tiny model on a tiny bundled data set and show that it learns
 	@scripts/train-demo

@@ -21,7 +21,7 @@
 /* A hierarchy needs this many lights that are somewhere. */
 enum { TREE_LIGHTS = 2 };
 /* With so few emitters it is looked, at so many places, whether the hierarchy is worth its time: below WORTH (see advantage)
- * scenes measured worse with it than by power, above it better (docs/speed.md). */
+ * scenes measured worse with it than by power, above it better (docs/results/speed.md). */
 enum { FEW = 64, PROBES = 512 };
 static const double WORTH = 1.06;
 /* Least radius of a node relative to the scene: importance is finite in a point light. */

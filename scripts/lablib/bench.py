@@ -29,7 +29,7 @@ def options(parser):
     parser.add_argument("--rounds", type=int, default=3, help="figures are medians over so many (3)")
     parser.add_argument("--quick", action="store_true", help="fewer samples: rougher figures")
     parser.add_argument("--only", metavar="PARTS", help="some of " + ",".join(NEEDS))
-    tool.writes(parser, "; the part reading draws DIR/reading-time.png, too")
+    tool.writes(parser, "; the part reading draws DIR/results/reading-time.png, too")
 
 
 def cpu_seconds(command, **how):
@@ -377,7 +377,7 @@ def bench_reading(docs):
     for name, points in kinds.items():
         row("reading %s: time grows with the size to the power" % name, reading.exponent(points), 1.45, most=True)
     if docs:
-        reading.draw(kinds, docs, "reading-time.png")
+        reading.draw(kinds, os.path.join(docs, "results"), "reading-time.png")
 
 
 def bench_limits():

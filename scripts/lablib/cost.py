@@ -32,7 +32,7 @@ def options(parser):
     parser.add_argument("--threads", type=int, default=tool.THREADS)
     parser.add_argument("--rounds", type=int, default=2, help="of price (2)")
     parser.add_argument("--real-scenes", type=int, default=3, help="of real (3)")
-    parser.add_argument("--out", type=tool.path, default=tool.DOCS, help="for results/cost.json, cost.md and cost-*.png (docs)")
+    parser.add_argument("--out", type=tool.path, default=tool.DOCS, help="for results/cost.json, cost.md and cost-*.png of results/ (docs)")
 
 
 def shipped(o):
@@ -188,7 +188,7 @@ def early(o, out):
         out["early"].append({"scene": block["scene"], "view": block["view"], "block": block["id"], "criterion": criterion,
                              "threshold": block["threshold"], "stop": stops[place], "observer": observer[place], "last": last, "at": [x, y]})
     if panels:
-        run("oiiotool", *panels, "--mosaic:pad=4", "3x%d" % (len(panels) // 3), "-o", os.path.join(o.out, "cost-early.png"))
+        run("oiiotool", *panels, "--mosaic:pad=4", "3x%d" % (len(panels) // 3), "-o", os.path.join(o.out, "results", "cost-early.png"))
 
 
 def few_views(o):
@@ -488,6 +488,6 @@ def main(o):
     if "draw" in steps:
         plots.charts()  # which says what is missing
         from lablib import cost_pictures
-        cost_pictures.draw(o.out, out)
+        cost_pictures.draw(os.path.join(o.out, "results"), out)
         from lablib import pages
         pages.fill(o.out)

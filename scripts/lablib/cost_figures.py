@@ -1,4 +1,4 @@
-"""Figures of docs/cost.md from what `lab cost` measured (docs/results/cost.json)."""
+"""Figures of docs/results/cost.md from what `lab cost` measured (docs/results/cost.json)."""
 import math
 import statistics
 

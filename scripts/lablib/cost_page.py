@@ -1,4 +1,4 @@
-"""Tables and figures of docs/cost.md from what `lab cost` measured; the words are templates/cost.md."""
+"""Tables and figures of docs/results/cost.md from what `lab cost` measured; the words are templates/results/cost.md."""
 import math
 
 from lablib import tool

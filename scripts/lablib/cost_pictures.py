@@ -1,4 +1,4 @@
-"""Pictures of docs/cost.md from what `lab cost` measured (docs/results/cost.json)."""
+"""Pictures of docs/results/cost.md from what `lab cost` measured (docs/results/cost.json)."""
 import re
 
 from lull.plot.charts import Chart, Rule, Series

@@ -1,4 +1,4 @@
-"""Holds what the criterion `denoised` believes against two references: a table for docs/denoised.md.
+"""Holds what the criterion `denoised` believes against two references: a table for docs/results/denoised.md.
 
 Of every scene of the plan two independent references are rendered, and one render is looked at again and again as its samples grow
 (tests/bench/pt_looks.c): what is believed of each block, and the noisy, the denoised and the blended picture. Their visible errors

@@ -1,6 +1,6 @@
 """Fills the pages of docs/ from the figures in docs/results/.
 
-scripts/lablib/templates/NAME.md makes the whole page NAME.md, where that or results/NAME.json is. In every other page, what stands
+scripts/lablib/templates/NAME.md makes the whole page NAME.md, where that or its figures (results/NAME.json) are. In every other page, what stands
 between `<!-- lab: EXPRESSION -->` and `<!-- lab: end -->` is the value of the expression (`bench.page()`: the text that the job bench
 makes of its figures)."""
 import glob
@@ -13,6 +13,7 @@ from lablib import (agreement, ablation, bench, cost_page, denoised, peers, prof
 
 TEMPLATES = os.path.join(tool.ROOT, "scripts", "lablib", "templates")
 OTHERS = ("ggn/README.md", "ggn/models/README.md", "ggn/observer/README.md")  # pages outside docs/ that show figures
+RESULTS = ("results.md", "results/decisions.md")
 PLACE = re.compile(r"(<!-- lab: (?!end -->)(.*?) -->\n).*?(<!-- lab: end -->)", re.S)
 
 
@@ -53,14 +54,14 @@ def made(docs):
 
     value = lambda found: found[1] + env.compile_expression(found[2], undefined_to_none=False)(**jobs) + found[3]
     pages = []
-    for name in sorted(glob.glob(os.path.join(docs, "*.md"))) + [os.path.join(docs, "..", other) for other in OTHERS]:
+    for name in sorted(glob.glob(os.path.join(docs, "**", "*.md"), recursive=True)) + [os.path.join(docs, "..", other) for other in OTHERS]:
         if os.path.exists(name):
             with open(name, encoding="utf-8") as file:
                 text = file.read()
             pages.append((name, of_figures(name, lambda: PLACE.sub(value, text))))
-    whole = {name: env.get_template(name) for name in sorted(os.listdir(TEMPLATES))}
+    whole = {name: env.get_template(name) for name in sorted(env.list_templates())}
     return pages + [(os.path.join(docs, name), of_figures(name, lambda: template.render(jobs))) for name, template in whole.items()
-                    if any(os.path.exists(os.path.join(docs, *there)) for there in ((name,), ("results", name[:-3] + ".json")))]
+                    if any(os.path.exists(os.path.join(docs, *there)) for there in ((name,), ("results", os.path.basename(name)[:-3] + ".json")))]
 
 
 def fill(docs):
@@ -71,10 +72,12 @@ def fill(docs):
 
 
 def by_hand(docs):
-    """Figures of the tables of results.md that README.md tells too; defaults of options are no such figures."""
+    """Figures of the tables of RESULTS that README.md tells too; defaults of options are no such figures."""
     decimals = lambda text: re.findall(r"(?<![\w.`-])\d+\.\d\d+(?![\w.])", text)
-    with open(os.path.join(docs, "results.md"), encoding="utf-8") as file:
-        figures = {x for line in file if line.startswith("| ") for x in decimals(line)}
+    figures = set()
+    for page in RESULTS:
+        with open(os.path.join(docs, page), encoding="utf-8") as file:
+            figures |= {x for line in file if line.startswith("| ") for x in decimals(line)}
     with open(os.path.join(docs, "..", "README.md"), encoding="utf-8") as file:
         text = re.sub(r"```.*?```|`[^`]*`", "", file.read(), flags=re.S)
     return sorted(figures & set(decimals(text)))
@@ -88,6 +91,6 @@ def main(o):
         with open(name, encoding="utf-8") as file:
             if file.read() != text:
                 wrong.append("%s is not what its template makes of the figures: scripts/lab pages" % os.path.relpath(name, tool.ROOT))
-    wrong += ["README.md tells %s, a figure of docs/results.md" % x for x in by_hand(o.docs)]
+    wrong += ["README.md tells %s, a figure of docs/results.md or docs/results/decisions.md" % x for x in by_hand(o.docs)]
     print("".join("lab pages: %s\n" % line for line in wrong), end="", file=sys.stderr)
     return 1 if wrong else 0

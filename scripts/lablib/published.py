@@ -99,7 +99,7 @@ def page(r):
     data, first = r["data"], r["runs"][0]
     text = "%s. %d blocks of %d scenes (%d windows) to train on, %d blocks of %d other scenes to validate; all with\n`%s`.\n\n" % (
         tables.told(r["measured"]), data["training_blocks"], len(data["train"]), data["training_windows"], data["validation_blocks"], len(data["validation"]), r["common"])
-    text += "![validation AUC against processor hours](../docs/published-curve.png)\n\n" + tables.table(
+    text += "![validation AUC against processor hours](published-curve.png)\n\n" + tables.table(
         ("network", "options", "processor hours", "windows", "passes", "s per window", "AUC", "early", "samples", "median \\|log2\\|"), rows)
     text += "\nAt %.2f s per window %d passes over the %d windows of `scripts/dataset.plan` would take %.0f processor hours, a tenth of them %.0f; " \
             "here it went to **%.2f**.\n" % (first["window_s"], PASSES, WINDOWS, *[share * first["window_s"] * PASSES * WINDOWS / 3600 for share in (1, 0.1)], first["hours"])
@@ -145,5 +145,5 @@ def main(o):
     print(page(results), end="")
     if o.write:
         results["step_ms"] = step_ms()
-        draw(o.write, results)
+        draw(os.path.join(o.write, "results"), results)
         tool.store(o.write, "published", results)

@@ -1,4 +1,4 @@
-"""Holds --quote and the progress line against real renders: a table and a picture for docs/quote.md.
+"""Holds --quote and the progress line against real renders: a table and a picture for docs/results/quote.md.
 
 Every scene is quoted from a pilot and then rendered to its end, at most 2,000 spp. Times are thread seconds, so that other programs do
 not count; of another size than 64 wall seconds too, with the threads that were at work."""
@@ -28,7 +28,7 @@ def options(parser):
     parser.add_argument("--program", default=tool.RENDER)
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--tell", action="store_true", help="measure nothing: the table of what is there already")
-    tool.writes(parser, ", draw DIR/quote.png")
+    tool.writes(parser, ", draw DIR/results/quote.png")
 
 
 def base(o, scene):
@@ -202,4 +202,4 @@ def main(o):
     if o.write:
         tool.store(o.write, "quote", {**tool.results(o.write, "quote"), "small" if small else "large": {"measured": tool.measured(), **run}})
         if small:
-            draw(rows, o.write)
+            draw(rows, os.path.join(o.write, "results"))

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Pages lead somewhere: every relative link of every page, with its section; every file that docs/tour.md names, and in it the functions
-# that the step names; the index of docs/ is whole.
+# that the step names; the index of docs/ is whole; the manual's pages are short.
 . "$(dirname "$0")/ggn_setup"
 command -v git >"$tmp/out" && git rev-parse -q --git-dir >"$tmp/out" 2>&1 || { echo "ok 1 # SKIP no repository"; echo "1..1"; exit 0; }
 cat >"$tmp/pages.py" <<'END'
@@ -27,8 +27,13 @@ def steps():
         yield from (f"docs/tour.md: {row.split('|')[1].strip()}: {n}" for n in missing)
 def index():
     listed = re.findall(r"\]\(([^)\s]+)\)", open("docs/README.md", encoding="utf-8").read())
-    yield from (f for f in FILES if re.fullmatch(r"docs/[^/]+\.md", f) and f != "docs/README.md" and f[5:] not in listed)
-bad = list({"links": links, "tour": steps, "index": index}[sys.argv[1]]())
+    listed += re.findall(r"\]\(([^)\s]+)\)", open("docs/results.md", encoding="utf-8").read())
+    yield from (f for f in FILES if re.fullmatch(r"docs/(results/)?[^/]+\.md", f) and f != "docs/README.md" and f[5:] not in listed)
+def length():
+    for f in FILES:
+        if re.fullmatch(r"docs/[^/]+\.md", f) and len(open(f, encoding="utf-8").readlines()) > 120:
+            yield f"{f}: more than 120 lines: what was measured belongs to docs/results/"
+bad = list({"links": links, "tour": steps, "index": index, "length": length}[sys.argv[1]]())
 print("\n".join(bad))
 sys.exit(bool(bad))
 END
@@ -37,6 +42,8 @@ check "every link of a page leads to a file and a section" $?
 python3 "$tmp/pages.py" tour >"$tmp/out" 2>"$tmp/err"
 check "every file and function of the tour is there" $?
 python3 "$tmp/pages.py" index >"$tmp/out" 2>"$tmp/err"
-check "docs/README.md lists every page of docs/" $?
+check "docs/README.md and docs/results.md list every page of docs/" $?
+python3 "$tmp/pages.py" length >"$tmp/out" 2>"$tmp/err"
+check "no page of the manual is longer than 120 lines" $?
 echo "1..$n"
 exit $bad

@@ -21,7 +21,7 @@ from tap import Skip
 BUILD = Path(os.environ.get("BUILD", "build")).resolve()
 ROOT = Path.cwd()
 os.environ["LULL_PLUGIN_PATH"] = f"{BUILD}/lib/lull"
-PAGES = ["README.md", *map(str, sorted(Path("docs").glob("*.md"))), "plugin-api/README.md", "plugin-api/python/README.md", "ggn/README.md"]
+PAGES = ["README.md", *map(str, sorted(Path("docs").rglob("*.md"))), "plugin-api/README.md", "plugin-api/python/README.md", "ggn/README.md"]
 VENV = ROOT / "build/hosts/venv/bin/python3"
 
 # Shell snippets, by page and place: what is run of them. A regular expression: lines that are not, and why.
@@ -29,14 +29,14 @@ NOT_HERE = r"tev|scripts/setup|lull-denoiser-setup|python3 -m lull\.blender"  # 
 RUN = {("docs/denoised.md", 1): NOT_HERE, ("docs/quote.md", 1): None, ("docs/shots.md", 1): None, ("docs/watching.md", 1): NOT_HERE,
        ("docs/watching.md", 3): NOT_HERE, ("plugin-api/README.md", 1): None}
 # Those of which only the words are checked, and where they are run, or why not.
-CHECKED = {("README.md", 1): "tests/packages/readme.sh", ("docs/hosting.md", 1): "tests/hosts/test_blender_command.py, tests/packages/wheel.sh",
-           ("docs/denoised.md", 2): "49 renders; tests/cli/lull_study.sh", ("docs/shots.md", 2): "days of samples; tests/cli/lull_study_views.sh",
-           ("docs/results.md", 1): "needs the recorded data set, hours", ("docs/scale.md", 1): "tests/cli/mpi.sh",
-           ("docs/scale.md", 2): "a measurement, minutes", ("docs/scale.md", 3): "a measurement, minutes",
-           ("docs/scale.md", 4): "a measurement, hours", ("docs/study.md", 1): "a server, a training; tests/cli/lull_study.sh, ggn_train.sh",
+CHECKED = {("README.md", 1): "tests/packages/readme.sh", ("docs/hosts.md", 1): "tests/hosts/test_blender_command.py, tests/packages/wheel.sh",
+           ("docs/results/denoised.md", 1): "49 renders; tests/cli/lull_study.sh", ("docs/shots.md", 2): "days of samples; tests/cli/lull_study_views.sh",
+           ("docs/results/decisions.md", 1): "needs the recorded data set, hours", ("docs/scale.md", 1): "tests/cli/mpi.sh",
+           ("docs/results/scale.md", 1): "a measurement, minutes", ("docs/results/scale.md", 2): "a measurement, minutes",
+           ("docs/results/scale.md", 3): "a measurement, hours", ("docs/study.md", 1): "a server, a training; tests/cli/lull_study.sh, ggn_train.sh",
            ("docs/watching.md", 2): "a server; tests/cli/watch.sh",
            ("plugin-api/python/README.md", 1): "tests/packages/wheel.sh"}
-CODE = {("docs/denoised.md", "python", 1), ("docs/hosting.md", "python", 1), ("docs/hosting.md", "cpp", 1), ("plugin-api/README.md", "c", 1),
+CODE = {("docs/denoised.md", "python", 1), ("docs/hosts.md", "python", 1), ("docs/hosting.md", "cpp", 1), ("plugin-api/README.md", "c", 1),
         ("plugin-api/README.md", "c", 2), ("plugin-api/python/README.md", "python", 1), ("plugin-api/python/README.md", "python", 2)}
 
 
@@ -117,13 +117,13 @@ def test_python_of_the_denoiser():
 
 
 def test_python_of_mitsuba():
-    """docs/hosting.md: Mitsuba, its price and its picture; import lull is enough"""
+    """docs/hosts.md: Mitsuba, its price and its picture; import lull is enough"""
     if subprocess.run([VENV, "-c", "import mitsuba"], capture_output=True).returncode:
         raise Skip("no mitsuba in build/hosts/venv: run make test-hosts")
     scene = ROOT / "tests/hosts/scenes/box.xml"
     with elsewhere() as folder:
         (folder / "scene.xml").write_text(scene.read_text().replace('value="96"', 'value="24"'))
-        text = FOUND["docs/hosting.md", "python", 1].replace("llvm_ad_rgb", "scalar_rgb").replace("spp_max=2048", "spp_max=256")
+        text = FOUND["docs/hosts.md", "python", 1].replace("llvm_ad_rgb", "scalar_rgb").replace("spp_max=2048", "spp_max=256")
         done = subprocess.run([VENV, "-c", text], text=True, capture_output=True, env={**os.environ, "PYTHONPATH": f"{ROOT}/plugin-api/python"})
         assert done.returncode == 0 and "spp min / mean / max" in done.stdout and os.path.getsize("picture.exr") > 1000, done
 
@@ -279,7 +279,7 @@ def help_of(program, sub):
     if program in ("scripts/setup", "lull-denoiser-setup"):
         return (Path(program) if "/" in program else Path("scripts/packages") / program).read_text()
     if program == "scripts/lab":
-        return subprocess.run([program, "--help"], text=True, capture_output=True).stdout + Path("docs/results.md").read_text()
+        return subprocess.run([program, "--help"], text=True, capture_output=True).stdout + Path("docs/results/decisions.md").read_text()
     return subprocess.run([BUILD / "bin" / program, *([sub] if sub else []), "--help"], text=True, capture_output=True).stdout
 
 

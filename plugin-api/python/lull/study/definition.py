@@ -14,7 +14,7 @@ from .files import Refused, loads, print_json, read_file, write_line
 
 TASKS = ADJUSTMENT, TWO_INTERVAL, VALIDATION = "adjustment", "2ifc", "validation"
 KINDS = "noisy", "denoised", "blend"  # what of a render with --denoise a view shows
-MIN_MS = {ADJUSTMENT: 300.0, TWO_INTERVAL: 150.0, VALIDATION: 500.0}  # for new studies: the reasons are in docs/study.md
+MIN_MS = {ADJUSTMENT: 300.0, TWO_INTERVAL: 150.0, VALIDATION: 500.0}  # for new studies: the reasons are in docs/study-report.md
 MAX_NAME, MAX_LINE = 95, 199  # bytes
 MAX_VIEWS, MAX_BLOCKS, MAX_LEVELS, MAX_CONDITIONS = 1024, 4096, 1024, 64
 MAX_TRIALS = 200000  # of one person

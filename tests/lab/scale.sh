@@ -1,6 +1,6 @@
 #!/bin/sh
 # scripts/lab scale: a recording in, times for numbers of cores out; what cannot be read is named.
-. "$(dirname "$0")/lull_render_setup"
+. "$(dirname "$0")/../cli/lull_render_setup"
 M=$here/../../scripts/lab
 refuses() { # refuses TEXT ARGUMENTS...: exit status 2, one line that contains TEXT
     n=$((n + 1)); text=$1; shift

@@ -38,30 +38,30 @@ t "every page is what the templates make of the figures" scripts/lab pages --che
 
 mkdir -p "$tmp/tree/docs" "$tmp/tree/ggn/observer"
 cp -r docs/*.md docs/results "$tmp/tree/docs" && cp README.md "$tmp/tree" && cp ggn/README.md "$tmp/tree/ggn" && cp ggn/observer/README.md "$tmp/tree/ggn/observer"
-figure=$(grep -o '[0-9]\.[0-9][0-9][0-9]' "$tmp/tree/docs/results.md" | head -n 1)
+figure=$(grep -o '[0-9]\.[0-9][0-9][0-9]' "$tmp/tree/docs/results/decisions.md" | head -n 1)
 echo "AUC $figure against people" >>"$tmp/tree/README.md"
-t "a figure of the tables in README is told" says "README.md tells $figure, a figure of docs/results.md"
+t "a figure of the tables in README is told" says "README.md tells $figure, a figure of docs/results.md or docs/results/decisions.md"
 cp README.md "$tmp/tree"
-for page in docs/results.md docs/speed.md ggn/observer/README.md; do
-    sed -i "/^# Results/,/nothing$/s/ 0\.[0-9]/ 7.1/; /<!-- lab: [a-z]*\./,/<!-- lab: end/s/ 0\.[0-9]/ 7.1/" "$tmp/tree/$page"
+for page in docs/results.md docs/results/decisions.md docs/results/speed.md ggn/observer/README.md; do
+    sed -i "/^# \(Results\|How well the criteria\)/,\$s/ 0\.[0-9]/ 7.1/; /<!-- lab: [a-z]*\./,/<!-- lab: end/s/ 0\.[0-9]/ 7.1/" "$tmp/tree/$page"
     t "a figure that was changed in $page is told" says "$page is not what its template makes of the figures"
     t "  …and mended" sh -c "scripts/lab pages --docs '$tmp/tree/docs' && cmp '$tmp/tree/$page' $page"
 done
 sed -i 's/"samples_ratio": 1\./"samples_ratio": 3./' "$tmp/tree/docs/results/agreement.json"
 scripts/lab pages --check --docs "$tmp/tree/docs" 2>"$tmp/err"
-t "other figures make other pages" test "$(cut -d' ' -f3 "$tmp/err" | xargs -n 1 basename | sort | tr '\n' ' ')" = "README.md results.md "
+t "other figures make other pages" test "$(cut -d' ' -f3 "$tmp/err" | xargs -n 1 basename | sort | tr '\n' ' ')" = "README.md decisions.md "
 sed -i 's/"people"/"somebody"/' "$tmp/tree/docs/results/agreement.json"
-t "figures that lack are one line" refuses "results.md: its figures are not whole" pages --docs "$tmp/tree/docs"
+t "figures that lack are one line" refuses "results/decisions.md: its figures are not whole" pages --docs "$tmp/tree/docs"
 
 mkdir -p "$tmp/out/results" && cp docs/results/cost.json "$tmp/out/results"
 t "lab cost draws from the figures" scripts/lab cost --only draw --out "$tmp/out"
-t "  …the same page" diff "$tmp/out/cost.md" docs/cost.md
-t "  …and every picture of it" sh -c 'for p in $(grep -o "](cost-[a-z-]*\.png)" "$1/cost.md" | tr -d "]()"); do [ -s "docs/$p" ] || { echo "$p"; exit 1; }; done' - "$tmp/out"
+t "  …the same page" diff "$tmp/out/results/cost.md" docs/results/cost.md
+t "  …and every picture of it" sh -c 'for p in $(grep -o "](cost-[a-z-]*\.png)" "$1/results/cost.md" | tr -d "]()"); do [ -s "docs/results/$p" ] || { echo "$p"; exit 1; }; done' - "$tmp/out"
 mkdir -p "$tmp/some/results" && python3 - "$tmp/some/results/cost.json" <<'P'
 import json, sys
 figures = json.load(open("docs/results/cost.json"))
 json.dump({k: v for k, v in figures.items() if k not in ("cadence", "bench", "early", "real", "commits")}, open(sys.argv[1], "w"))
 P
-t "steps of lab cost that were not measured are told" sh -c 'scripts/lab pages --docs "$1" && grep -q "^Not measured in this run" "$1/cost.md"' - "$tmp/some"
+t "steps of lab cost that were not measured are told" sh -c 'scripts/lab pages --docs "$1" && grep -q "^Not measured in this run" "$1/results/cost.md"' - "$tmp/some"
 echo "1..$n"
 exit $failed

@@ -1,6 +1,6 @@
 #!/bin/sh
 # scripts/lablib/cvvdp.py: what ColorVideoVDP says of pictures and clips, as numbers that must stand in an order.
-. "$(dirname "$0")/lull_render_setup"
+. "$(dirname "$0")/../cli/lull_render_setup"
 cat >ask.py <<'PY'
 import sys
 sys.path.insert(0, sys.argv[1])

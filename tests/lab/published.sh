@@ -1,6 +1,6 @@
 #!/bin/sh
 # scripts/lab published with a tiny plan: hours end a run, more hours continue it, all validations are drawn; another plan is refused.
-. "$(dirname "$0")/ggn_setup"
+. "$(dirname "$0")/../cli/ggn_setup"
 published() { scripts/lab published tests/data/train-demo --plan "$tmp/plan" --out "$tmp/out" --beside tests/data/tiny.ggn "$@" >"$tmp/table" 2>"$tmp/err"; }
 validations() { wc -l <"$tmp/out/$1.ggn.csv"; }
 

@@ -1,6 +1,6 @@
 #!/bin/sh
 # scripts/lab ablation with a tiny plan: a line for each variant, nothing trained twice, a changed plan is refused.
-. "$(dirname "$0")/ggn_setup"
+. "$(dirname "$0")/../cli/ggn_setup"
 ablate() { scripts/lab ablation --data tests/data/train-demo --out "$tmp/out" "$@" >"$tmp/table" 2>"$tmp/err"; }
 
 cat >"$tmp/plan" <<'END'

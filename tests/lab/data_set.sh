@@ -1,6 +1,6 @@
 #!/bin/sh
 # scripts/lab data-set with tiny plans: order, resuming after an interrupt, cameras, plans that are wrong.
-. "$(dirname "$0")/lull_render_setup"
+. "$(dirname "$0")/../cli/lull_render_setup"
 BUILD=${P%/bin/*}
 export BUILD
 M=$here/../../scripts/lab
