@@ -44,15 +44,15 @@ static double *judge_noisy(const struct pt_open *o)
     return errors;
 }
 
-static void write_all(const struct pt_image_files *files, const struct pt_open *o, const struct pt_output_info *info,
-                      struct base_err *err)
+static void write_all(const struct pt_open *o, const struct pt_output_info *info, struct base_err *err)
 {
-    pt_output_or_keep(pt_output_exr, files->output, o->render, info, err);
-    pt_output_or_keep(pt_output_preview, files->preview, o->render, info, err);
-    for (int i = 0; i < files->stop_map_count; i++)
-        pt_output_or_keep(pt_output_stop_map, files->stop_maps[i], o->render, info, err);
-    pt_output_or_keep(pt_output_report, files->report, o->render, info, err);
-    pt_output_or_keep(pt_output_page, files->page, o->render, info, err);
+    const char *const *paths = o->frame->paths;
+    pt_output_or_keep(pt_output_exr, paths[PT_OUTPUT], o->render, info, err);
+    pt_output_or_keep(pt_output_preview, paths[PT_PREVIEW], o->render, info, err);
+    for (int i = PT_STOP_MAPS; i < PT_PATHS; i++)
+        pt_output_or_keep(pt_output_stop_map, paths[i], o->render, info, err);
+    pt_output_or_keep(pt_output_report, paths[PT_REPORT], o->render, info, err);
+    pt_output_or_keep(pt_output_page, paths[PT_PAGE], o->render, info, err);
 }
 
 /* The processor's name; NULL where the system does not say. */
@@ -70,16 +70,16 @@ static const char *processor_name(char text[128])
 }
 
 /* What the files say of a render, whose picture is the noisy one. */
-static struct pt_output_info describe(const struct pt_cli *cli, const struct pt_open *o, const char *quote,
-                                      const char *processor)
+static struct pt_output_info describe(const struct pt_open *o, const char *quote, const char *processor)
 {
-    return (struct pt_output_info){.scene = cli->scene,
-                                   .params = cli->params.list,
-                                   .param_count = cli->params.count,
+    const struct pt_cli *cli = o->cli;
+    return (struct pt_output_info){.scene = o->frame->paths[PT_SCENE],
+                                   .params = o->params.list,
+                                   .param_count = o->params.count,
                                    .mask = cli->mask,
                                    .effects = o->scene->effects,
                                    .kernel = o->kernel_name,
-                                   .reproducible = cli->files.reproducible,
+                                   .reproducible = cli->reproducible,
                                    .scene_bytes = o->scene->stats.bytes,
                                    .command = (const char *const *)cli->argv,
                                    .command_count = cli->argc,
@@ -89,8 +89,7 @@ static struct pt_output_info describe(const struct pt_cli *cli, const struct pt_
 
 /* Writes what was asked for; goes on after a failure so that one missing folder, or a denoiser that fails, does not cost the
  * other files. */
-static int write_outputs(const struct pt_cli *cli, const struct pt_open *o, struct pt_output_info info, struct base_log *log,
-                         struct base_err *err)
+static int write_outputs(const struct pt_open *o, struct pt_output_info info, struct base_err *err)
 {
     struct pt_denoised denoised = {0};
     struct base_err why = {0};
@@ -100,9 +99,9 @@ static int write_outputs(const struct pt_cli *cli, const struct pt_open *o, stru
         info.denoised = why.code ? NULL : &denoised;
         info.noisy_error = noisy_error = o->criterion ? judge_noisy(o) : NULL;
     }
-    write_all(&cli->files, o, &info, err);
+    write_all(o, &info, err);
     if (info.denoised && o->picture == PT_PICTURE_BLEND)
-        base_log_note(log, "denoised; %.0f %% of the picture is the noisy one, where the denoiser is not trusted",
+        base_log_note(o->log, "denoised; %.0f %% of the picture is the noisy one, where the denoiser is not trusted",
                       100.0 * denoised.weight_mean);
     pt_denoised_release(&denoised);
     free(noisy_error);
@@ -135,14 +134,16 @@ void pt_action_summary(const struct pt_render *r, struct base_log *log)
 }
 
 /* Samples of the shot's table, which has to be one of such pictures. */
-static int plan_blocks(const struct pt_cli *cli, struct pt_render *r, struct base_err *err)
+static int plan_blocks(const struct pt_open *o, struct base_err *err)
 {
+    const struct pt_shot_table *table = o->frame->table;
+    struct pt_render *r = o->render;
     char grid[PT_SHOT_GRID];
     pt_shot_table_grid(&r->config, grid);
-    if (strcmp(grid, cli->table->grid) != 0 || cli->table->block_count != r->blocks->count)
-        return base_fail(err, BASE_EINVAL, "%s: made for %s with %zu blocks, this frame has %s with %u", cli->shot.table,
-                         cli->table->grid, cli->table->block_count, grid, r->blocks->count);
-    pt_render_plan(r, cli->block_spp);
+    if (strcmp(grid, table->grid) != 0 || table->block_count != r->blocks->count)
+        return base_fail(err, BASE_EINVAL, "%s: made for %s with %zu blocks, this frame has %s with %u", o->cli->shot.table,
+                         table->grid, table->block_count, grid, r->blocks->count);
+    pt_render_plan(r, o->frame->block_spp);
     return 0;
 }
 
@@ -151,23 +152,23 @@ int pt_action_status(enum pt_render_outcome outcome)
     return outcome == PT_RENDER_INTERRUPTED ? PT_EXIT_INTERRUPTED : outcome == PT_RENDER_LOST ? PT_EXIT_BAD_INPUT : 0;
 }
 
-static int render_image(const struct pt_cli *cli, struct pt_open *o, const char *quote, struct base_log *log, int *status,
-                        struct base_err *err)
+static int render_image(struct pt_open *o, const char *quote, int *status, struct base_err *err)
 {
+    const struct pt_shot_frame *frame = o->frame;
     enum pt_render_outcome outcome;
     struct pt_watch watch;
     char processor[128];
-    struct pt_output_info info = describe(cli, o, quote, processor_name(processor));
-    if (cli->checkpoint.resume) {
-        int rc = pt_checkpoint_load(cli->checkpoint.path, o->render, &o->identity, err);
+    struct pt_output_info info = describe(o, quote, processor_name(processor));
+    if (frame->resume) {
+        int rc = pt_checkpoint_load(frame->paths[PT_CHECKPOINT], o->render, &o->identity, err);
         if (rc)
             return rc;
     }
-    if (cli->table && plan_blocks(cli, o->render, err) != 0)
+    if (frame->table && plan_blocks(o, err) != 0)
         return BASE_EINVAL;
-    pt_watch_init(&watch, o, &cli->checkpoint, &cli->files, &info, log);
-    if (cli->display) {
-        int rc = pt_watch_display(&watch, cli->display, cli->scene, err);
+    pt_watch_init(&watch, o, &info);
+    if (o->cli->display) {
+        int rc = pt_watch_display(&watch, err);
         if (rc)
             return rc;
     }
@@ -175,19 +176,19 @@ static int render_image(const struct pt_cli *cli, struct pt_open *o, const char 
     int rc = pt_render_run(o->render, &hooks, &outcome, err);
     pt_watch_end(&watch);
     struct base_err write_err = {0};
-    if (cli->files.whole_only && (rc || pt_action_status(outcome) != 0)) {
+    if (frame->number >= 0 && (rc || pt_action_status(outcome) != 0)) {
         *status = pt_action_status(outcome);
         return rc;
     }
     info.interrupted = pt_action_status(outcome) != 0;
-    if (write_outputs(cli, o, info, log, &write_err) != 0) {
+    if (write_outputs(o, info, &write_err) != 0) {
         if (rc)
-            base_log_say(log, "%s", write_err.text); /* besides the render's own error: it tells where the image is */
+            base_log_say(o->log, "%s", write_err.text); /* besides the render's own error: it tells where the image is */
         else
             rc = base_fail(err, write_err.code, "%s", write_err.text);
         return rc;
     }
-    pt_action_summary(o->render, log);
+    pt_action_summary(o->render, o->log);
     *status = pt_action_status(outcome);
     return rc;
 }
@@ -210,12 +211,13 @@ static int read_quote(const char *path, char **text, struct base_err *err)
     return rc;
 }
 
-int pt_action_image(const struct pt_cli *cli, struct pt_open *o, struct base_log *log, int *status, struct base_err *err)
+int pt_action_image(struct pt_open *o, int *status, struct base_err *err)
 {
     char *quote = NULL;
-    int rc = cli->files.quoted ? read_quote(cli->files.quoted, &quote, err) : 0;
+    const char *quoted = o->frame->paths[PT_QUOTED];
+    int rc = quoted ? read_quote(quoted, &quote, err) : 0;
     if (!rc)
-        rc = render_image(cli, o, quote, log, status, err);
+        rc = render_image(o, quote, status, err);
     free(quote);
     return rc;
 }

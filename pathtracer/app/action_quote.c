@@ -18,10 +18,10 @@ static void ask_quote(void *data, struct pt_render *render, const uint32_t *due,
     pt_quote_ask(pilot->quote, render, due, count);
 }
 
-static int print_quote(const struct pt_cli *cli, const struct pt_open *o, struct pt_quote *quote, int was_interrupted,
-                       struct base_err *err)
+static int print_quote(const struct pt_open *o, struct pt_quote *quote, int was_interrupted, struct base_err *err)
 {
-    const struct pt_quote_info info = {cli->scene, o->scene->stats.bytes, o->load_s, was_interrupted};
+    const struct pt_cli *cli = o->cli;
+    const struct pt_quote_info info = {o->frame->paths[PT_SCENE], o->scene->stats.bytes, o->load_s, was_interrupted};
     int rc = 0;
     if (cli->json)
         rc = pt_quote_json(stdout, quote, o->render, &info, err);
@@ -30,45 +30,44 @@ static int print_quote(const struct pt_cli *cli, const struct pt_open *o, struct
     return rc || !cli->quote_map ? rc : pt_quote_map(cli->quote_map, quote, o->render, err);
 }
 
-static int open_quote(const struct pt_cli *cli, const struct pt_open *o, struct base_log *log, struct pt_quote **out,
-                      struct base_err *err)
+static int open_quote(const struct pt_open *o, struct pt_quote **out, struct base_err *err)
 {
     const struct lull_criterion *noisy = NULL;
     int rc = o->criterion && o->picture != PT_PICTURE_NOISY
-                 ? pt_criterion_find(PT_OPEN_NOISY_CRITERION, NULL, log, &noisy, err)
+                 ? pt_criterion_find(PT_OPEN_NOISY_CRITERION, NULL, o->log, &noisy, err)
                  : 0;
-    return rc ? rc : pt_quote_create(o->render, cli->params.list, cli->params.count, noisy, log, out, err);
+    return rc ? rc : pt_quote_create(o->render, o->params.list, o->params.count, noisy, o->log, out, err);
 }
 
 /* When the pilot is over the checkpoint is the render's, whoever goes on with it. */
-int pt_action_pilot(const struct pt_cli *cli, struct pt_open *o, struct base_log *log, struct pt_quote **out, int *status,
-                    struct base_err *err)
+int pt_action_pilot(struct pt_open *o, struct pt_quote **out, int *status, struct base_err *err)
 {
+    const char *checkpoint = o->frame->paths[PT_CHECKPOINT];
     enum pt_render_outcome outcome;
     struct pilot pilot = {0};
-    int rc = open_quote(cli, o, log, &pilot.quote, err);
+    int rc = open_quote(o, &pilot.quote, err);
     if (rc)
         return rc;
-    pt_watch_init(&pilot.watch, o, &cli->checkpoint, NULL, NULL, log);
+    pt_watch_init(&pilot.watch, o, NULL);
     struct pt_render_hooks hooks = pt_watch_hooks(&pilot.watch);
     hooks.judged = ask_quote;
     rc = pt_render_run(o->render, &hooks, &outcome, err);
-    base_log_clear(log);
+    base_log_clear(o->log);
     *status = pt_action_status(outcome);
-    if (!rc && cli->checkpoint.path && outcome == PT_RENDER_PILOT)
-        rc = pt_checkpoint_save(cli->checkpoint.path, o->render, &o->identity, err);
+    if (!rc && checkpoint && outcome == PT_RENDER_PILOT)
+        rc = pt_checkpoint_save(checkpoint, o->render, &o->identity, err);
     if (!rc && outcome != PT_RENDER_LOST)
         rc = pt_quote_finish(pilot.quote, o->render, err);
     *out = pilot.quote;
     return rc;
 }
 
-int pt_action_quote(const struct pt_cli *cli, struct pt_open *o, struct base_log *log, int *status, struct base_err *err)
+int pt_action_quote(struct pt_open *o, int *status, struct base_err *err)
 {
     struct pt_quote *quote = NULL;
-    int rc = pt_action_pilot(cli, o, log, &quote, status, err);
+    int rc = pt_action_pilot(o, &quote, status, err);
     if (!rc && *status != PT_EXIT_BAD_INPUT) /* a worker that was lost */
-        rc = print_quote(cli, o, quote, *status == PT_EXIT_INTERRUPTED, err);
+        rc = print_quote(o, quote, *status == PT_EXIT_INTERRUPTED, err);
     pt_quote_destroy(quote);
     return rc;
 }

@@ -2,23 +2,23 @@
 #include "agree.h"
 #include "watch.h"
 
-int pt_action_record(const struct pt_cli *cli, struct pt_open *o, struct base_log *log, int *status, struct base_err *err)
+int pt_action_record(struct pt_open *o, int *status, struct base_err *err)
 {
-    struct pt_sequence_config config = cli->sequence;
+    struct pt_sequence_config config = o->cli->sequence;
     struct pt_watch watch;
     int was_interrupted = 0;
-    config.scene_path = cli->scene;
-    config.view = cli->load.view;
+    config.scene_path = o->frame->paths[PT_SCENE];
+    config.view = o->view;
     config.render = o->config;
-    int rc = pt_agree_crc(cli->scene, &config.scene_crc, err);
+    int rc = pt_agree_crc(o->frame->paths[PT_SCENE], &config.scene_crc, err);
     if (!rc)
         rc = base_inputs_crc32(&o->scene_files, &config.inputs_crc, err);
     if (rc)
         return rc;
-    pt_watch_init(&watch, o, &cli->checkpoint, NULL, NULL, log);
+    pt_watch_init(&watch, o, NULL);
     const struct pt_render_hooks hooks = pt_watch_hooks(&watch);
     rc = pt_sequence_record(&config, o->scene, o->kernel, o->threads, o->criterion, &hooks, &was_interrupted, err);
-    base_log_clear(log);
+    base_log_clear(o->log);
     *status = was_interrupted ? PT_EXIT_INTERRUPTED : 0;
     return rc;
 }

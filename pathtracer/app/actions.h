@@ -10,16 +10,19 @@ enum { PT_EXIT_FAILED = 1, PT_EXIT_BAD_INPUT = 2, PT_EXIT_INTERRUPTED = 130 };
 
 int pt_action_status(enum pt_render_outcome outcome);
 
-int pt_action_image(const struct pt_cli *cli, struct pt_open *open, struct base_log *log, int *status, struct base_err *err);
+/* The frame as the command line wants it. Opens what it needs, and closes all but the scene. Every process of a job calls
+ * it: the others help, where they can. */
+int pt_action_frame(struct pt_open *open, const struct pt_shot_frame *frame, struct job *job, int *status,
+                    struct base_err *err);
+
+int pt_action_image(struct pt_open *open, int *status, struct base_err *err);
 /* The last line of a render: what it came to. */
 void pt_action_summary(const struct pt_render *render, struct base_log *log);
 
 /* A pilot and its answer, which the caller destroys. *status not 0: it was ended before. */
-int pt_action_pilot(const struct pt_cli *cli, struct pt_open *open, struct base_log *log, struct pt_quote **quote,
-                    int *status, struct base_err *err);
-int pt_action_quote(const struct pt_cli *cli, struct pt_open *open, struct base_log *log, int *status, struct base_err *err);
-int pt_action_record(const struct pt_cli *cli, struct pt_open *open, struct base_log *log, int *status,
-                     struct base_err *err);
+int pt_action_pilot(struct pt_open *open, struct pt_quote **quote, int *status, struct base_err *err);
+int pt_action_quote(struct pt_open *open, int *status, struct base_err *err);
+int pt_action_record(struct pt_open *open, int *status, struct base_err *err);
 
 /* --explain: the effects that a scene calls for, why, and what they cost, on stdout. Times a few thousand paths (about a
  * second) with the chosen kernel and with the general one. name: the scene's, for the heading. */

@@ -172,12 +172,15 @@ static int set_denoise(void *into, const char *value, struct base_err *err)
 
 static int set_stop_map(void *into, const char *value, struct base_err *err)
 {
-    struct pt_image_files *files = &((struct pt_cli *)into)->files;
+    const char **maps = &((struct pt_cli *)into)->paths[PT_STOP_MAPS];
+    int count = 0;
     if (!pt_output_has_ending(value, "png") && !pt_output_has_ending(value, "csv"))
         return expected(err, "a name that ends in .png or .csv");
-    if (files->stop_map_count == PT_CLI_MAX_STOP_MAPS)
+    while (count < PT_CLI_MAX_STOP_MAPS && maps[count])
+        count++;
+    if (count == PT_CLI_MAX_STOP_MAPS)
         return base_fail(err, BASE_EINVAL, "more than %d stop maps", PT_CLI_MAX_STOP_MAPS);
-    files->stop_maps[files->stop_map_count++] = value;
+    maps[count] = value;
     return 0;
 }
 
@@ -338,37 +341,37 @@ const struct base_option pt_cli_options[] = {
     {"rank-timeout", 0, "SECONDS", TO(rank_timeout_s), 0.1, 1e6,
      .help = "Under mpirun: give up when a process has owed an answer for so long (default 120)"},
     {.help = "What to write:"},
-    {"output", 'o', "FILE.exr", TO(files.output), .output = BASE_FILE, .words = exr,
+    {"output", 'o', "FILE.exr", TO(paths[PT_OUTPUT]), .output = BASE_FILE, .words = exr,
      .help = "Multi-layer EXR (default: the scene's name in the current folder, if nothing else is asked for)"},
-    {"preview", 0, "FILE.png", TO(files.preview), .output = BASE_FILE, .words = png,
+    {"preview", 0, "FILE.png", TO(paths[PT_PREVIEW]), .output = BASE_FILE, .words = png,
      .help = "The image as sRGB, also while rendering"},
     {"stop-map", 0, "FILE.png|FILE.csv", .set = set_stop_map, .output = BASE_FILE,
      .help = "Samples per block as a picture or a table; may be repeated"},
-    {"report", 0, "FILE.json", TO(files.report), .output = BASE_FILE, .words = json, .help = "Everything about the run"},
-    {"live", 0, NULL, TO(files.live),
+    {"report", 0, "FILE.json", TO(paths[PT_REPORT]), .output = BASE_FILE, .words = json, .help = "Everything about the run"},
+    {"live", 0, NULL, TO(live),
      .help = "Write --report and --stop-map while rendering, too, and --preview more often, for python3 -m lull watch"},
-    {"html", 0, "FILE.html", TO(files.page), .output = BASE_FILE, .words = html,
+    {"html", 0, "FILE.html", TO(paths[PT_PAGE]), .output = BASE_FILE, .words = html,
      .help =
          "All of that as one page for a browser: the picture beside maps of samples, error and time, the history of each "
          "block, what was run where"},
-    {"quoted", 0, "FILE.json", TO(files.quoted), .input = BASE_FILE, .words = json,
+    {"quoted", 0, "FILE.json", TO(paths[PT_QUOTED]), .input = BASE_FILE, .words = json,
      .help = "What --quote --json printed before: the page compares it with what became of it"},
     {"aov", 0, "LIST", .set = set_aov, .role = BASE_DECIDES, .tell = tell_aov, .help = "More layers: albedo,normal,depth"},
     {"denoise", 0, "blend|full", .set = set_denoise, .optional = 1,
      .help =
          "Keep the denoised picture, and stop blocks by what is seen of it (criterion denoised): blend (default) keeps as "
          "much of the noisy one as the denoiser is wrong, full none"},
-    {"reproducible", 0, NULL, TO(files.reproducible), .help = "Leave times out of the EXR: equal renders are equal files"},
+    {"reproducible", 0, NULL, TO(reproducible), .help = "Leave times out of the EXR: equal renders are equal files"},
     {"display-server", 0, "HOST[:PORT]", TO(display),
      .help = "Show the image while rendering in an image viewer that listens there (tev, HDRView); port 14158 if none is "
              "named"},
     {"no-progress", 0, NULL, TO(no_progress), .help = "Plain lines now and then, also on a terminal (as with NO_COLOR set)"},
     {"quiet", 'q', NULL, TO(quiet), .help = "No progress, no notes"},
     {.help = "Interrupting and going on:"},
-    {"checkpoint", 0, "FILE", TO(checkpoint.path), .output = BASE_FILE, .kind = &pt_checkpoint_kind,
+    {"checkpoint", 0, "FILE", TO(paths[PT_CHECKPOINT]), .output = BASE_FILE, .kind = &pt_checkpoint_kind,
      .help = "Save the state of the render now and then, when it is interrupted, and at its end"},
-    {"checkpoint-every", 0, "SECONDS", TO(checkpoint.every_s), 0, 1e9, .help = "How often (default 60)"},
-    {"resume", 0, NULL, TO(checkpoint.resume),
+    {"checkpoint-every", 0, "SECONDS", TO(checkpoint_every_s), 0, 1e9, .help = "How often (default 60)"},
+    {"resume", 0, NULL, TO(resume),
      .help = "Go on from the checkpoint, also of a finished render, to more samples or by another --visible"},
     {.help = "What it will cost:"},
     {"quote", 0, NULL, TO(quote),
@@ -419,8 +422,8 @@ int pt_cli_samples(const struct pt_cli *cli)
 
 int pt_cli_writes_image(const struct pt_cli *cli)
 {
-    const struct pt_image_files *files = &cli->files;
-    return files->output || files->preview || files->report || files->page || files->stop_map_count > 0;
+    const char *const *p = cli->paths;
+    return p[PT_OUTPUT] || p[PT_PREVIEW] || p[PT_REPORT] || p[PT_PAGE] || p[PT_STOP_MAPS];
 }
 
 /* What goes with an image alone. */
@@ -441,7 +444,7 @@ static int check_quote(struct pt_cli *cli, struct base_err *err)
         return base_fail(err, BASE_EINVAL, "--quote goes with none of --explain, --debug-path and --sequence");
     if (check_no_image(cli, "--quote", err) != 0)
         return BASE_EINVAL;
-    if (cli->checkpoint.resume || r->time_budget_s > 0)
+    if (cli->resume || r->time_budget_s > 0)
         return base_fail(err, BASE_EINVAL, "--quote goes with neither --resume nor --time-budget (--quote-pilot bounds it)");
     if (r->max_seam > 0)
         return base_fail(err, BASE_EINVAL, "--quote does not know what --max-seam re-opens: leave it out");
@@ -462,7 +465,7 @@ static int check_no_quote(const struct pt_cli *cli, struct base_err *err)
 
 static int check_sequence(struct pt_cli *cli, struct base_err *err)
 {
-    if (cli->spp > 0 || cli->checkpoint.path || cli->has_crop || cli->mask)
+    if (cli->spp > 0 || cli->paths[PT_CHECKPOINT] || cli->has_crop || cli->mask)
         return base_fail(err, BASE_EINVAL, "--sequence goes with neither --spp, --checkpoint, --crop nor --mask");
     if (check_no_image(cli, "--sequence", err) != 0)
         return BASE_EINVAL;
@@ -505,7 +508,7 @@ static int check_plan(struct pt_cli *cli, struct base_err *err)
     struct pt_render_config *r = &cli->render;
     if (check_no_image(cli, "--plan-shot", err) != 0)
         return BASE_EINVAL;
-    if (cli->checkpoint.path || cli->shot.table)
+    if (cli->paths[PT_CHECKPOINT] || cli->shot.table)
         return base_fail(err, BASE_EINVAL, "--plan-shot goes with neither --checkpoint nor --shot-table");
     if (cli->spp > 0 || r->max_seam > 0 || r->time_budget_s > 0)
         return base_fail(err, BASE_EINVAL, "--plan-shot goes with neither --spp, --max-seam nor --time-budget");
@@ -535,7 +538,7 @@ static int check_shot(struct pt_cli *cli, struct base_err *err)
     cli->shot.plan_every = s->plan_every > 0 ? s->plan_every : 8;
     if (s->plan)
         return check_plan(cli, err);
-    if (!cli->files.output)
+    if (!cli->paths[PT_OUTPUT])
         return base_fail(err, BASE_EINVAL, "--frames needs -o OUT_%%04d.exr");
     if (s->table && (cli->criterion || cli->params.count > 0 || cli->mask || cli->spp > 0 || r->spp_min > 0 ||
                      r->spp_max > 0 || r->max_seam > 0))
@@ -547,19 +550,19 @@ static int check_together(struct pt_cli *cli, struct base_err *err)
 {
     if (cli->action == PT_CLI_LIST_CRITERIA)
         return 0;
-    if (!cli->scene)
+    if (!cli->paths[PT_SCENE])
         return base_fail(err, BASE_EINVAL, "a scene file is needed (--help says more)");
     if (check_shot(cli, err) != 0)
         return BASE_EINVAL;
     if (check_samples(cli, err) != 0)
         return BASE_EINVAL;
-    if (cli->checkpoint.resume && !cli->checkpoint.path)
+    if (cli->resume && !cli->paths[PT_CHECKPOINT])
         return base_fail(err, BASE_EINVAL, "--resume needs --checkpoint FILE");
     if (cli->sequence.directory ? check_sequence(cli, err) != 0 : check_no_sequence(cli, err) != 0)
         return BASE_EINVAL;
-    if (cli->files.live && !cli->files.preview && !cli->files.report && cli->files.stop_map_count == 0)
+    if (cli->live && !cli->paths[PT_PREVIEW] && !cli->paths[PT_REPORT] && !cli->paths[PT_STOP_MAPS])
         return base_fail(err, BASE_EINVAL, "--live belongs to --report, --stop-map and --preview");
-    if (cli->files.quoted && !cli->files.page)
+    if (cli->paths[PT_QUOTED] && !cli->paths[PT_PAGE])
         return base_fail(err, BASE_EINVAL, "--quoted belongs to --html");
     if (cli->mask && cli->spp > 0)
         return base_fail(err, BASE_EINVAL, "--mask %s: --spp takes the same samples everywhere", cli->mask);
@@ -581,7 +584,7 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err
         .args_doc = "SCENE.pbrt",
         .list = pt_cli_options,
         .args_max = 1,
-        .args = offsetof(struct pt_cli, scene),
+        .args = offsetof(struct pt_cli, paths[PT_SCENE]),
         .args_are = BASE_ARGS_FILES,
         .mpi_version = job_mpi_version,
         .outputs = offsetof(struct pt_cli, outputs),
@@ -590,7 +593,7 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err
         .render = {.block_width = 200,
                    .block_height = 200,
                    .integrator = {.sampler = -1, .strategy = -1, .filter = -1, .max_depth = PT_CLI_SCENES_DEPTH}},
-        .checkpoint = {.every_s = 60.0},
+        .checkpoint_every_s = 60.0,
         .rank_timeout_s = 120.0};
     int rc = base_options_parse(&command, argc, argv, cli, err);
     cli->argv = argv;

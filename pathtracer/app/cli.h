@@ -23,22 +23,17 @@ struct pt_cli_params {
     uint32_t count;
 };
 
-/* What an image is written to; NULL = not asked for. */
-struct pt_image_files {
-    const char *output, *preview, *report, *page;
-    const char *quoted; /* what was quoted for it, to be compared with on the page */
-    const char *stop_maps[PT_CLI_MAX_STOP_MAPS];
-    int stop_map_count;
-    int reproducible;          /* leave times out of the EXR */
-    int live;                  /* stop maps and report are written while rendering, too */
-    int whole_only;            /* nothing is written of an image that was interrupted */
-    char default_output[1024]; /* of pt_open, when nothing is asked for */
-};
-
-struct pt_checkpoint_plan {
-    const char *path; /* NULL: none */
-    double every_s;
-    int resume;
+/* Files of a frame: what it is made from and to. */
+enum pt_path {
+    PT_SCENE,
+    PT_OUTPUT,
+    PT_PREVIEW,
+    PT_REPORT,
+    PT_PAGE,
+    PT_QUOTED, /* what was quoted for it, to be compared with on the page */
+    PT_CHECKPOINT,
+    PT_STOP_MAPS, /* the first; those that there are come first */
+    PT_PATHS = PT_STOP_MAPS + PT_CLI_MAX_STOP_MAPS
 };
 
 /* Frames that belong together (shot.h). */
@@ -47,12 +42,11 @@ struct pt_shot_plan {
     const char *plan, *table;         /* --plan-shot, --shot-table */
     int plan_every, same_seed;
 };
-struct pt_shot_table;
 
 /* Text is borrowed from argv. Each part is what one piece of the program takes. */
 struct pt_cli {
-    int action;        /* enum pt_cli_action */
-    const char *scene; /* path; NULL only when criteria are listed */
+    int action;                  /* enum pt_cli_action */
+    const char *paths[PT_PATHS]; /* NULL: not given; of a shot with a place for the frame's number */
     struct pt_load_options load;
     /* Size and crop are the scene's unless has_crop, and in its integrator what is -1 (max_depth: PT_CLI_SCENES_DEPTH). */
     struct pt_render_config render;
@@ -64,13 +58,13 @@ struct pt_cli {
     int threads;                 /* 0 = all processors */
     double rank_timeout_s;       /* wait for an answer of another process */
     struct base_outputs outputs; /* all files to be written that the command line names */
-    struct pt_image_files files;
-    struct pt_checkpoint_plan checkpoint;
+    int reproducible;            /* leave times out of the EXR */
+    int live;                    /* stop maps and report are written while rendering, too */
+    double checkpoint_every_s;
+    int resume;
     struct pt_sequence_config sequence; /* directory NULL: none */
     const char *display;                /* address of a viewer; NULL: none */
     struct pt_shot_plan shot;
-    const struct pt_shot_table *table; /* of this frame's shot, and the samples of its blocks there; NULL: none */
-    const uint32_t *block_spp;
     const char *quote_map;
     int quote, json;
     int debug[3];      /* x, y, sample of --debug-path */

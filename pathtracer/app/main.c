@@ -3,9 +3,7 @@
 #include <string.h>
 
 #include "actions.h"
-#include "agree.h"
 #include "base/interrupt.h"
-#include "render/farm.h"
 #include "render/host_find.h"
 #include "shot.h"
 
@@ -16,39 +14,25 @@ static int list_criteria(struct base_log *log, struct base_err *err)
     return 0;
 }
 
-static int act(const struct pt_cli *cli, struct pt_open *o, struct base_log *log, int *status, struct base_err *err)
-{
-    switch (cli->action) {
-    case PT_CLI_EXPLAIN: pt_action_explain(o->scene, &o->config, cli->scene); return 0;
-    case PT_CLI_DEBUG_PATH: return pt_action_debug_path(o->scene, &o->config, cli->debug, err);
-    case PT_CLI_QUOTE: return pt_action_quote(cli, o, log, status, err);
-    case PT_CLI_SEQUENCE: return pt_action_record(cli, o, log, status, err);
-    default: return pt_action_image(cli, o, log, status, err);
-    }
-}
-
 /* Workers open what rank 0 opens, where they can help. Who interrupts or ends the job does it through rank 0. */
-static int run(struct pt_cli *cli, struct job *job, struct base_log *log, int *status, struct base_err *err)
+static int run(const struct pt_cli *cli, struct job *job, struct base_log *log, int *status, struct base_err *err)
 {
-    struct pt_open open;
-    const int works = job_rank(job) > 0, samples = pt_cli_samples(cli);
-    if (works)
+    struct pt_open open = {0};
+    struct pt_shot_frame frame;
+    if (job_rank(job) > 0) {
         base_interrupt_ignore();
-    if (works && !samples)
-        return 0;
+        if (!pt_cli_samples(cli))
+            return 0;
+    }
     if (cli->action == PT_CLI_LIST_CRITERIA)
         return list_criteria(log, err);
-    int rc = pt_open_scene(cli, job, log, &open, err);
-    if (!rc && samples)
-        rc = pt_open_render(cli, job, log, &open, err);
-    if (!rc && !works) /* before that there is nothing to save, and a criterion may never return from being loaded */
-        base_interrupt_catch();
-    if (!rc && samples)
-        rc = pt_agree_handshake(&open, job, err);
+    int rc = pt_frame_alone(&frame, cli, err);
     if (!rc)
-        rc = works ? pt_farm_serve(job, open.threads, &(struct pt_row_maker){open.scene, open.kernel, NULL}, err)
-                   : act(cli, &open, log, status, err);
+        rc = pt_open_init(&open, cli, job, log, err);
+    if (!rc)
+        rc = pt_action_frame(&open, &frame, job, status, err);
     pt_open_release(&open);
+    pt_frame_release(&frame);
     return rc;
 }
 
@@ -75,7 +59,7 @@ int main(int argc, char **argv)
         log.terminal = 0;
     job_watch(job, pt_cli_is_shot(&cli) ? 0.0 : cli.rank_timeout_s, &base_interrupted); /* whole frames take long */
     if (!rc)
-        rc = pt_cli_is_shot(&cli) ? pt_shot_run(&cli, job, run, &log, &status, &err) : run(&cli, job, &log, &status, &err);
+        rc = pt_cli_is_shot(&cli) ? pt_shot_run(&cli, job, &log, &status, &err) : run(&cli, job, &log, &status, &err);
     if (rc) {
         base_log_say(&log, "%s", err.text);
         status = rc == BASE_EINVAL || rc == BASE_EIO ? PT_EXIT_BAD_INPUT : PT_EXIT_FAILED;

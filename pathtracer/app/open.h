@@ -1,13 +1,14 @@
 /*
- * What every action and every process of a job works with, opened in one order: threads, scene, criterion, render. The log
- * and the job are borrowed until pt_open_release.
+ * What every action and every process of a job works with, opened in one order: threads, a scene, a frame of it with its
+ * criterion and render. The frames of a shot follow each other in one pt_open; the scene stays while it is the same. The
+ * command line, the log and the job are borrowed until pt_open_release, a frame until pt_open_end_frame.
  */
 #ifndef PT_OPEN_H
 #define PT_OPEN_H
 
 #include "base/inputs.h"
 #include "base/log.h"
-#include "cli.h"
+#include "frame.h"
 #include "integ/integrator.h"
 #include "render/mask.h"
 #include "render/render.h"
@@ -17,29 +18,43 @@
 #define PT_OPEN_NOISY_CRITERION "observer"
 
 struct pt_open {
-    double start_s; /* wall time of the beginning … */
-    double load_s;  /* … and how long until the scene was there */
+    const struct pt_cli *cli;
+    struct base_log *log;
     struct base_threads *threads;
-    struct base_inputs scene_files, judging; /* what was read; judging: plugin, mask, shot table */
+
+    /* the scene */
+    char scene_path[4096];
+    struct pt_view view;
+    struct base_inputs scene_files; /* what was read … */
+    uint32_t scene_crc;             /* … and its checksum, of a shot */
     struct pt_scene *scene;
+    struct pt_scene_defaults found; /* what it says of the image */
     pt_kernel *kernel;
     const char *kernel_name;
-    struct pt_render_config config;        /* what the command line says over what the scene says */
+
+    /* the frame */
+    const struct pt_shot_frame *frame;
+    double start_s;                        /* wall time of the beginning … */
+    double load_s;                         /* … and how long until the scene was there */
+    struct pt_render_config config;        /* what command line and frame say over what the scene says */
+    struct base_inputs judging;            /* what was read: plugin, mask, shot table */
     enum pt_picture picture;               /* that is kept */
     const char *denoiser;                  /* library that makes it, as for lull_host_denoising */
     struct lull_plane mask;                /* data NULL: none */
-    const struct pt_cli_params *params;    /* borrows; of the criterion, as given */
+    struct pt_cli_params params;           /* of the criterion; text is the command line's */
     struct lull_host_criterion *criterion; /* NULL: uniform, or a recording that asks none */
     struct base_identity identity;         /* of the image, for checkpoints and other processes; empty without */
     struct pt_render *render;              /* of an image or its quote */
 };
 
-/* Threads and scene. job: NULL = this process is alone. BASE_EINVAL when an input is not as it should be; *out may be
- * released after a failure, of both. */
-int pt_open_scene(const struct pt_cli *cli, struct job *job, struct base_log *log, struct pt_open *out,
-                  struct base_err *err);
+/* Threads. job: NULL = this process is alone. *out may be released after a failure, of the others, too. */
+int pt_open_init(struct pt_open *out, const struct pt_cli *cli, struct job *job, struct base_log *log, struct base_err *err);
+/* The frame's scene, unless it is open already. BASE_EINVAL when an input is not as it should be. */
+int pt_open_scene(struct pt_open *open, const struct pt_shot_frame *frame, struct base_err *err);
 /* Then, of what draws samples, the rest, after a look at where outputs will go. */
-int pt_open_render(struct pt_cli *cli, struct job *job, struct base_log *log, struct pt_open *open, struct base_err *err);
+int pt_open_frame(struct pt_open *open, struct job *job, struct base_err *err);
+/* What a next frame needs of its own. */
+void pt_open_end_frame(struct pt_open *open);
 void pt_open_release(struct pt_open *open);
 
 #endif

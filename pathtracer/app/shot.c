@@ -10,10 +10,8 @@
 #include "base/options.h"
 #include "render/checkpoint.h"
 #include "render/output.h"
-#include "sample/rng.h"
-#include "shot_table.h"
 
-enum { FRAMES_MAX = 1000000, PATH_BYTES_MAX = 1 << 26, NAME_ROOM = 4096, LINE_ROOM = 512, ONE_NAMES = 7 };
+enum { FRAMES_MAX = 1000000, PATH_BYTES_MAX = 1 << 26, NAME_ROOM = 4096, LINE_ROOM = 512 };
 
 /* --- which frames --------------------------------------------------------------------------------------------------- */
 
@@ -170,33 +168,7 @@ static int read_path(const struct pt_shot_plan *plan, struct pt_shot *s, struct 
     return rc;
 }
 
-/* --- names ---------------------------------------------------------------------------------------------------------- */
-
-/* Where the number's place begins and how long it is; 0: there is none; -1: something else has a '%'. */
-static int find_place(const char *pattern, size_t *begin, int *digits)
-{
-    const char *percent = strchr(pattern, '%'), *at = percent + 1;
-    if (!percent)
-        return 0;
-    *begin = (size_t)(percent - pattern);
-    *digits = 1;
-    if (at[0] == '0' && at[1] >= '1' && at[1] <= '9') {
-        *digits = at[1] - '0';
-        at += 2;
-    }
-    return *at == 'd' && !strchr(at, '%') ? (int)(at + 1 - percent) : -1;
-}
-
-int pt_shot_name(const char *pattern, int frame, char *out, size_t room, struct base_err *err)
-{
-    size_t begin = strlen(pattern);
-    int digits = 1, length = find_place(pattern, &begin, &digits);
-    if (length < 0)
-        return base_fail(err, BASE_EINVAL, "%s: expected one %%d or %%04d in the place of the frame's number", pattern);
-    int n = length ? snprintf(out, room, "%.*s%0*d%s", (int)begin, pattern, digits, frame, pattern + begin + length)
-                   : snprintf(out, room, "%s", pattern);
-    return (size_t)n < room ? 0 : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", pattern);
-}
+/* --- the whole shot ----------------------------------------------------------------------------------------------- */
 
 /* Frames would replace each other's files. */
 static int check_names(const struct pt_cli *cli, const struct pt_shot *s, struct base_err *err)
@@ -207,7 +179,7 @@ static int check_names(const struct pt_cli *cli, const struct pt_shot *s, struct
                              cli->outputs.list[i].option, cli->outputs.list[i].path);
     for (size_t i = 0; i < s->count; i++) {
         char name[NAME_ROOM];
-        int rc = pt_shot_name(cli->scene, s->frames[i], name, sizeof name, err);
+        int rc = pt_frame_name(cli->paths[PT_SCENE], s->frames[i], name, sizeof name, err);
         if (!rc && base_file_check_input(name, err) != 0)
             rc = err->code = BASE_EINVAL;
         if (rc)
@@ -230,130 +202,79 @@ void pt_shot_release(struct pt_shot *s)
     *s = (struct pt_shot){0};
 }
 
-/* --- one frame ------------------------------------------------------------------------------------------------------ */
-
-uint32_t pt_shot_seed(uint32_t seed, int frame)
-{
-    return pt_hash32((uint32_t)frame + pt_hash32(seed + 0x9e3779b9u)); /* both hashes are bijections */
-}
-
-/* Puts the frame's name for *path in the place of it; NULL stays. */
-static int rename_one(char **names, const char **path, int frame, struct base_err *err)
-{
-    if (!*path)
-        return 0;
-    int rc = pt_shot_name(*path, frame, *names, NAME_ROOM, err);
-    *path = *names;
-    *names += NAME_ROOM;
-    return rc;
-}
-
-static int rename_all(struct pt_frame_cli *f, const struct pt_cli *from, int frame, struct base_err *err)
-{
-    struct pt_cli *c = &f->cli;
-    char *names = f->names;
-    struct pt_image_files *files = &c->files;
-    const char **paths[ONE_NAMES] = {&c->scene,    &files->output, &files->preview,    &files->report,
-                                     &files->page, &files->quoted, &c->checkpoint.path};
-    int rc = 0;
-    for (int i = 0; i < ONE_NAMES && !rc; i++)
-        rc = rename_one(&names, paths[i], frame, err);
-    for (int i = 0; i < c->files.stop_map_count && !rc; i++)
-        rc = rename_one(&names, &c->files.stop_maps[i], frame, err);
-    c->outputs.count = 0;
-    for (int i = 0; i < from->outputs.count && !rc; i++) {
-        const char *path = from->outputs.list[i].path;
-        rc = rename_one(&names, &path, frame, err);
-        if (!rc)
-            rc = base_outputs_add(&c->outputs, from->outputs.list[i].option, path, err);
-    }
-    return rc;
-}
-
-int pt_frame_cli_init(struct pt_frame_cli *f, const struct pt_cli *cli, const struct pt_shot *s, size_t i,
-                      struct base_err *err)
-{
-    f->cli = *cli;
-    f->names = calloc((size_t)(ONE_NAMES + cli->files.stop_map_count + cli->outputs.count), NAME_ROOM);
-    if (!f->names)
-        return base_fail_nomem(err, "names");
-    if (!cli->shot.same_seed)
-        f->cli.render.integrator.seed = pt_shot_seed(cli->render.integrator.seed, s->frames[i]);
-    if (s->views) {
-        const double fov_deg = cli->load.view.fov_deg;
-        f->cli.load.view = s->views[i];
-        f->cli.load.view.fov_deg = s->views[i].fov_deg > 0 ? s->views[i].fov_deg : fov_deg;
-    }
-    f->cli.files.whole_only = 1;
-    return rename_all(f, cli, s->frames[i], err);
-}
-
-void pt_frame_cli_release(struct pt_frame_cli *f) { free(f->names); }
-
-/* --- all frames ----------------------------------------------------------------------------------------------------- */
+/* --- frame by frame -------------------------------------------------------------------------------------------------- */
 
 static int is_there(const char *path) { return access(path, F_OK) == 0; }
 
 /* Samples by the table instead of a criterion. */
-static int use_table(struct pt_cli *c, const struct pt_shot_table *table, int frame, struct base_err *err)
+static int use_table(struct pt_shot_frame *f, const struct pt_shot_table *table, const char *name, struct base_err *err)
 {
-    const uint32_t *spp = pt_shot_table_frame(table, frame);
-    if (!spp)
-        return base_fail(err, BASE_EINVAL, "%s: frame %d is not in it", c->shot.table, frame);
-    c->block_spp = spp;
-    c->table = table;
-    c->render.uniform = 1;
-    c->render.spp_min = c->render.spp_max = 1;
-    for (size_t i = 0; i < table->block_count; i++)
-        if (spp[i] > c->render.spp_max)
-            c->render.spp_min = c->render.spp_max = spp[i];
-    return 0;
+    f->table = table;
+    f->block_spp = pt_shot_table_frame(table, f->number);
+    return f->block_spp ? 0 : base_fail(err, BASE_EINVAL, "%s: frame %d is not in it", name, f->number);
 }
 
-static int render_frame(const struct pt_cli *cli, const struct pt_shot *s, const struct pt_shot_table *table, size_t i,
-                        pt_shot_render *render, struct base_log *log, int *status, struct base_err *err)
+static int render_frame(struct pt_open *o, struct pt_shot_frame *f, const struct pt_shot_table *table, const char *place,
+                        int *status, struct base_err *err)
 {
-    struct pt_frame_cli f;
-    int rc = pt_frame_cli_init(&f, cli, s, i, err);
-    const char *checkpoint = f.cli.checkpoint.path;
-    if (!rc && is_there(f.cli.files.output) && pt_output_is_ours(f.cli.files.output)) {
-        base_log_note(log, "frame %d: %s is there", s->frames[i], f.cli.files.output);
-        goto out;
+    const char *output = f->paths[PT_OUTPUT], *checkpoint = f->paths[PT_CHECKPOINT];
+    int rc = 0;
+    if (is_there(output) && pt_output_is_ours(output)) {
+        base_log_note(o->log, "frame %d: %s is there", f->number, output);
+        return 0;
     }
-    if (!rc && table)
-        rc = use_table(&f.cli, table, s->frames[i], err);
+    if (table)
+        rc = use_table(f, table, o->cli->shot.table, err);
     if (!rc)
         rc = base_file_check_kind(checkpoint, &pt_checkpoint_kind, err);
-    if (!rc) {
-        base_log_note(log, "frame %d (%zu of %zu)", s->frames[i], i + 1, s->count);
-        f.cli.checkpoint.resume = checkpoint && is_there(checkpoint);
-        rc = render(&f.cli, NULL, log, status, err);
-    }
+    if (rc)
+        return rc;
+    base_log_note(o->log, "frame %d (%s)", f->number, place);
+    f->resume = checkpoint && is_there(checkpoint);
+    rc = pt_action_frame(o, f, NULL, status, err);
     if (!rc && *status == 0 && checkpoint && is_there(checkpoint) && unlink(checkpoint) != 0)
-        base_log_say(log, "%s: cannot be removed, though its frame is done", checkpoint);
-out:
-    pt_frame_cli_release(&f);
+        base_log_say(o->log, "%s: cannot be removed, though its frame is done", checkpoint);
     return rc;
 }
 
-int pt_shot_run(const struct pt_cli *cli, struct job *job, pt_shot_render *render, struct base_log *log, int *status,
-                struct base_err *err)
+int pt_shot_frame_init(const struct pt_shot *s, size_t i, const struct pt_cli *cli, struct pt_shot_frame *f,
+                       struct base_err *err)
+{
+    return pt_frame_init(f, cli, s->frames[i], s->views ? &s->views[i] : NULL, err);
+}
+
+static int render_all(struct pt_open *o, const struct pt_shot *s, size_t first, size_t step, int *status,
+                      struct base_err *err)
+{
+    const char *name = o->cli->shot.table;
+    struct pt_shot_table table = {0};
+    int rc = name ? pt_shot_table_read(name, &table, err) : 0;
+    for (size_t i = first; i < s->count && !rc && *status == 0; i += step) {
+        struct pt_shot_frame f;
+        char place[64];
+        snprintf(place, sizeof place, "%zu of %zu", i + 1, s->count);
+        rc = pt_shot_frame_init(s, i, o->cli, &f, err);
+        if (!rc)
+            rc = render_frame(o, &f, name ? &table : NULL, place, status, err);
+        pt_frame_release(&f);
+    }
+    pt_shot_table_release(&table);
+    return rc;
+}
+
+int pt_shot_run(const struct pt_cli *cli, struct job *job, struct base_log *log, int *status, struct base_err *err)
 {
     struct pt_shot s;
-    struct pt_shot_table table = {0};
-    struct pt_cli own = *cli; /* params are the caller's */
+    struct pt_open open = {0};
     int rc = pt_shot_init(cli, &s, err);
-    if (job && cli->threads == 0)
-        own.threads = job_threads(job);
-    if (!rc && cli->shot.plan)
-        rc = job ? base_fail(err, BASE_EINVAL, "--plan-shot is the work of one process: leave out mpirun")
-                 : pt_shot_plan(cli, &s, log, status, err);
-    if (!rc && cli->shot.table)
-        rc = pt_shot_table_read(cli->shot.table, &table, err);
-    size_t first = (size_t)job_rank(job), step = (size_t)job_count(job);
-    for (size_t i = first; i < s.count && !rc && *status == 0 && !cli->shot.plan; i += step)
-        rc = render_frame(&own, &s, cli->shot.table ? &table : NULL, i, render, log, status, err);
-    pt_shot_table_release(&table);
+    if (!rc && cli->shot.plan && job)
+        rc = base_fail(err, BASE_EINVAL, "--plan-shot is the work of one process: leave out mpirun");
+    if (!rc)
+        rc = pt_open_init(&open, cli, job, log, err);
+    if (!rc)
+        rc = cli->shot.plan ? pt_shot_plan(&s, &open, status, err)
+                            : render_all(&open, &s, (size_t)job_rank(job), (size_t)job_count(job), status, err);
+    pt_open_release(&open);
     pt_shot_release(&s);
     return rc;
 }

@@ -1,12 +1,8 @@
-/*
- * A shot: frames that belong together, from one scene file per frame or one scene and a path of the camera. Each frame is a
- * command line of its own, in which names have the frame's number in the place of %d or %04d.
- */
+/* A shot: frames that belong together, from one scene file per frame or one scene and a path of the camera. */
 #ifndef PT_SHOT_H
 #define PT_SHOT_H
 
-#include "base/log.h"
-#include "cli.h"
+#include "open.h"
 #include "job/job.h"
 
 struct pt_shot {
@@ -25,35 +21,14 @@ int pt_shot_parse_frames(const char *text, struct pt_shot *shot, struct base_err
 /* Lines "frame;eye;at;up;fov" below one that says so; the first four as for --look-at, fov as for --fov or nothing. name: of
  * the file. */
 int pt_shot_parse_path(const char *name, const char *text, size_t size, struct pt_shot *shot, struct base_err *err);
-/* The pattern with the frame's number in it, in out[room]. A name without '%' stays. */
-int pt_shot_name(const char *pattern, int frame, char *out, size_t room, struct base_err *err);
-/* Its own for each frame of a shot and each seed of the command line; another seed is another picture of independent
- * noise. */
-uint32_t pt_shot_seed(uint32_t seed, int frame);
-
-/* The command line of frame `i` of the shot. Borrows both; released by pt_frame_cli_release. */
-struct pt_frame_cli {
-    struct pt_cli cli;
-    char *names; /* owns */
-};
-int pt_frame_cli_init(struct pt_frame_cli *frame, const struct pt_cli *cli, const struct pt_shot *shot, size_t i,
-                      struct base_err *err);
-void pt_frame_cli_release(struct pt_frame_cli *frame);
-
-/* Renders one command line; what main does without a shot. */
-typedef int pt_shot_render(struct pt_cli *cli, struct job *job, struct base_log *log, int *status, struct base_err *err);
+/* Frame i, by number and path (frame.h). */
+int pt_shot_frame_init(const struct pt_shot *shot, size_t i, const struct pt_cli *cli, struct pt_shot_frame *frame,
+                       struct base_err *err);
 
 /* Every frame whose image is not there yet, one after the other; of several processes each takes every n-th. Or, with
  * --plan-shot, its table. */
-int pt_shot_run(const struct pt_cli *cli, struct job *job, pt_shot_render *render, struct base_log *log, int *status,
-                struct base_err *err);
-/* Samples that a block gets between two pilots, of `count` blocks in rows of `columns`: the larger of its two needs; where
- * something moves in it or beside it, half of the octaves from there to the largest need of what moves. A block moves when
- * its need changes by more than the pilots' intervals allow. */
-uint32_t pt_shot_need(const struct lull_host_quote_block *a, const struct lull_host_quote_block *b, size_t count,
-                      uint32_t columns, size_t block);
+int pt_shot_run(const struct pt_cli *cli, struct job *job, struct base_log *log, int *status, struct base_err *err);
 /* --plan-shot: pilots of every n-th frame, the table from them, its price on stdout. */
-int pt_shot_plan(const struct pt_cli *cli, const struct pt_shot *shot, struct base_log *log, int *status,
-                 struct base_err *err);
+int pt_shot_plan(const struct pt_shot *shot, struct pt_open *open, int *status, struct base_err *err);
 
 #endif

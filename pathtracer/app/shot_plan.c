@@ -1,15 +1,11 @@
 #include "shot.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "actions.h"
 #include "quote_output.h"
-#include "shot_table.h"
-
-static const double FADE = 0.8408964152537145; /* 2^(-1/4) */
 
 /* What a pilot said of one frame. */
 struct pilot {
@@ -54,62 +50,28 @@ static int keep_answer(struct plan *p, const struct pt_open *o, const struct pt_
     return 0;
 }
 
-static int run_pilot(struct plan *p, const struct pt_cli *cli, const struct pt_shot *s, size_t at, struct base_log *log,
-                     int *status, struct base_err *err)
+static int run_pilot(struct plan *p, struct pt_open *o, const struct pt_shot *s, size_t at, int *status,
+                     struct base_err *err)
 {
-    struct pt_frame_cli f;
-    struct pt_open o = {0};
+    struct pt_shot_frame f;
     struct pt_quote *quote = NULL;
-    int rc = pt_frame_cli_init(&f, cli, s, at, err);
-    base_log_note(log, "pilot of frame %d", s->frames[at]);
+    int rc = pt_shot_frame_init(s, at, o->cli, &f, err);
+    base_log_note(o->log, "pilot of frame %d", s->frames[at]);
     if (!rc)
-        rc = pt_open_scene(&f.cli, NULL, log, &o, err);
+        rc = pt_open_scene(o, &f, err);
     if (!rc)
-        rc = pt_open_render(&f.cli, NULL, log, &o, err);
+        rc = pt_open_frame(o, NULL, err);
     if (!rc)
-        rc = pt_action_pilot(&f.cli, &o, log, &quote, status, err);
+        rc = pt_action_pilot(o, &quote, status, err);
     if (!rc && *status == 0)
-        rc = keep_answer(p, &o, quote, at, err);
+        rc = keep_answer(p, o, quote, at, err);
     pt_quote_destroy(quote);
-    pt_open_release(&o);
-    pt_frame_cli_release(&f);
+    pt_open_end_frame(o);
+    pt_frame_release(&f);
     return rc;
 }
 
 /* --- table ---------------------------------------------------------------------------------------------------------- */
-
-/* A block moves when what it needs has changed by more than the pilots may be wrong. */
-static int has_moved(const struct lull_host_stop_at *a, const struct lull_host_stop_at *b)
-{
-    return a->low > b->high || b->low > a->high;
-}
-
-uint32_t pt_shot_need(const struct lull_host_quote_block *a, const struct lull_host_quote_block *b, size_t count,
-                      uint32_t columns, size_t block)
-{
-    const long width = (long)columns, height = (long)count / width, x = (long)block % width, y = (long)block / width;
-    const double own = fmax(1.0, fmax(a[block].stop.spp, b[block].stop.spp));
-    double most = own;
-    for (long v = y > 0 ? y - 1 : 0; v <= y + 1 && v < height; v++)
-        for (long u = x > 0 ? x - 1 : 0; u <= x + 1 && u < width; u++) {
-            const struct lull_host_stop_at *before = &a[v * width + u].stop, *after = &b[v * width + u].stop;
-            if (has_moved(before, after))
-                most = fmax(most, fmax(before->spp, after->spp));
-        }
-    return (uint32_t)ceil(sqrt(own * most));
-}
-
-/* Samples change by at most a quarter of an octave from frame to frame, so that noise fades instead of jumping; the larger
- * ones stay. */
-static void fade(struct pt_shot_table *t, size_t frame, size_t beside)
-{
-    const size_t n = t->block_count;
-    for (size_t i = 0; i < n; i++) {
-        const uint32_t least = (uint32_t)ceil(FADE * t->spp[beside * n + i]);
-        if (t->spp[frame * n + i] < least)
-            t->spp[frame * n + i] = least;
-    }
-}
 
 /* The last pilot at or before a frame. */
 static size_t pilot_of(const struct plan *p, size_t frame)
@@ -132,12 +94,13 @@ static int fill_table(struct plan *p, const struct pt_shot *s, struct base_err *
         const size_t k = pilot_of(p, f), after = k + 1 < p->pilot_count ? k + 1 : k; /* the last frame is a pilot */
         t->frames[f] = s->frames[f];
         for (size_t i = 0; i < n; i++)
-            t->spp[f * n + i] = pt_shot_need(p->pilots[k].blocks, p->pilots[after].blocks, n, p->columns, i);
+            t->spp[f * n + i] =
+                lull_host_quote_between(p->pilots[k].blocks, p->pilots[after].blocks, (uint32_t)n, p->columns, (uint32_t)i);
     }
     for (size_t f = 1; f < count; f++)
-        fade(t, f, f - 1);
+        lull_host_quote_fade(&t->spp[f * n], &t->spp[(f - 1) * n], (uint32_t)n);
     for (size_t f = count - 1; f > 0; f--)
-        fade(t, f - 1, f);
+        lull_host_quote_fade(&t->spp[(f - 1) * n], &t->spp[f * n], (uint32_t)n);
     t->frame_count = count;
     return 0;
 }
@@ -169,21 +132,19 @@ static void print_price(const struct plan *p)
            most * blocks * frames / p->samples);
 }
 
-int pt_shot_plan(const struct pt_cli *cli, const struct pt_shot *s, struct base_log *log, int *status, struct base_err *err)
+int pt_shot_plan(const struct pt_shot *s, struct pt_open *o, int *status, struct base_err *err)
 {
-    const size_t every = (size_t)cli->shot.plan_every;
-    struct pt_cli own = *cli;
+    const size_t every = (size_t)o->cli->shot.plan_every;
     struct plan p = {.pilots = calloc(s->count, sizeof *p.pilots)};
     int rc = p.pilots ? 0 : base_fail_nomem(err, "pilots");
-    own.action = PT_CLI_QUOTE;
     for (size_t at = 0, last = s->count - 1; at <= last && !rc && *status == 0;) {
-        rc = run_pilot(&p, &own, s, at, log, status, err);
+        rc = run_pilot(&p, o, s, at, status, err);
         at = at < last && at + every > last ? last : at + every;
     }
     if (!rc && *status == 0)
         rc = fill_table(&p, s, err);
     if (!rc && *status == 0)
-        rc = pt_shot_table_write(cli->shot.plan, &p.table, err);
+        rc = pt_shot_table_write(o->cli->shot.plan, &p.table, err);
     if (!rc && *status == 0) {
         add_up(&p);
         print_price(&p);

@@ -30,31 +30,29 @@ static void tell_quality(const struct pt_open *o, char *text, size_t room)
     const char *value = NULL;
     double number;
     for (size_t i = 0; i < sizeof names / sizeof names[0] && !value && o->criterion; i++) {
-        value = lull_host_parameter(lull_host_table(o->criterion), names[i], o->params->list, o->params->count, NULL);
+        value = lull_host_parameter(lull_host_table(o->criterion), names[i], o->params.list, o->params.count, NULL);
         if (value && base_parse_real(value, -1e300, 1e300, &number))
             snprintf(text, room, "criterion %s, %s %g", lull_host_table(o->criterion)->id, names[i], number);
     }
 }
 
-void pt_watch_init(struct pt_watch *w, const struct pt_open *open, const struct pt_checkpoint_plan *checkpoint,
-                   const struct pt_image_files *files, const struct pt_output_info *info, struct base_log *log)
+void pt_watch_init(struct pt_watch *w, const struct pt_open *open, const struct pt_output_info *info)
 {
-    static const struct pt_image_files none;
-    *w = (struct pt_watch){.log = log,
+    *w = (struct pt_watch){.log = open->log,
                            .open = open,
-                           .checkpoint = checkpoint,
-                           .files = files ? files : &none,
                            .info = info,
-                           .checkpoint_at_s = base_clock_wall_s() + checkpoint->every_s};
-    pt_progress_init(&w->progress, log);
-    w->progress.map = log->terminal && speaks_utf8();
+                           .checkpoint_at_s = base_clock_wall_s() + open->cli->checkpoint_every_s};
+    pt_progress_init(&w->progress, w->log);
+    w->progress.map = w->log->terminal && speaks_utf8();
     tell_quality(open, w->progress.quality, sizeof w->progress.quality);
 }
 
-int pt_watch_display(struct pt_watch *w, const char *address, const char *scene, struct base_err *err)
+int pt_watch_display(struct pt_watch *w, struct base_err *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
-    int32_t code = lull_host_display_open(w->open->render->frame, address, base_file_name(scene), &w->display, &e);
+    const struct pt_open *o = w->open;
+    int32_t code = lull_host_display_open(o->render->frame, o->cli->display, base_file_name(o->frame->paths[PT_SCENE]),
+                                          &w->display, &e);
     return code == LULL_OK
                ? 0
                : base_fail(err, code == LULL_E_MEMORY ? BASE_ENOMEM : BASE_EINVAL, "--display-server %s", e.message);
@@ -70,13 +68,15 @@ void pt_watch_end(struct pt_watch *w)
     w->display = NULL;
 }
 
+static const char *path_of(const struct pt_watch *w, enum pt_path which) { return w->open->frame->paths[which]; }
+
 /* A checkpoint that fails on the way costs nothing yet: the next one may succeed. */
 static void save_now_and_then(struct pt_watch *w, const struct pt_render *render)
 {
     struct base_err why = {0};
-    if (pt_checkpoint_save(w->checkpoint->path, render, &w->open->identity, &why) != 0)
+    if (pt_checkpoint_save(path_of(w, PT_CHECKPOINT), render, &w->open->identity, &why) != 0)
         base_log_say(w->log, "no checkpoint, the render goes on: %s", why.text);
-    w->checkpoint_at_s = base_clock_wall_s() + w->checkpoint->every_s;
+    w->checkpoint_at_s = base_clock_wall_s() + w->open->cli->checkpoint_every_s;
 }
 
 static int is_interrupted(void *data)
@@ -95,7 +95,7 @@ static void write_preview(const struct pt_watch *w, const struct pt_render *rend
     if (o->picture != PT_PICTURE_NOISY && to_denoise_s / base_threads_count(o->threads) < share * so_far_s)
         pt_denoised_make(render, PT_PICTURE_DENOISED, o->denoiser, is_interrupted, &denoised, err);
     const struct pt_output_info info = {.denoised = denoised.rgb ? &denoised : NULL};
-    pt_output_preview(w->files->preview, render, &info, err);
+    pt_output_preview(path_of(w, PT_PREVIEW), render, &info, err);
     pt_denoised_release(&denoised);
 }
 
@@ -105,10 +105,10 @@ static void write_live(struct pt_watch *w, const struct pt_render *render, struc
     const struct pt_progress_now progress = pt_progress_of(&w->progress.pace, render);
     struct pt_output_info info = *w->info;
     info.progress = &progress;
-    for (int i = 0; i < w->files->stop_map_count; i++)
-        pt_output_stop_map(w->files->stop_maps[i], render, &info, err);
-    if (w->files->report)
-        pt_output_report(w->files->report, render, &info, err);
+    for (int i = PT_STOP_MAPS; i < PT_PATHS && path_of(w, i); i++)
+        pt_output_stop_map(path_of(w, i), render, &info, err);
+    if (path_of(w, PT_REPORT))
+        pt_output_report(path_of(w, PT_REPORT), render, &info, err);
 }
 
 /* The picture so far: after the first slice, then when three times as long has passed, at most so often that it takes a
@@ -117,28 +117,30 @@ static void write_live(struct pt_watch *w, const struct pt_render *render, struc
 static void write_files(struct pt_watch *w, const struct pt_render *render)
 {
     const double ratio = 3.0, longest_s = 60.0, share = 0.01, live_s = 1.0, live_share = 0.05;
+    const int live = w->open->cli->live;
     struct base_err ignored = {0};
     double begin_s = base_clock_wall_s();
-    if (w->files->preview)
+    if (path_of(w, PT_PREVIEW))
         write_preview(w, render, &ignored);
-    if (w->files->live)
+    if (live)
         write_live(w, render, &ignored);
     double now_s = base_clock_wall_s(), took_s = now_s - begin_s;
     double later_s = fmax(fmin(ratio * (now_s - w->open->start_s), longest_s), took_s / share);
-    w->files_at_s = w->files->live ? fmax(begin_s + live_s, now_s + took_s / live_share) : now_s + later_s;
+    w->files_at_s = live ? fmax(begin_s + live_s, now_s + took_s / live_share) : now_s + later_s;
 }
 
 static int after_slice(void *data, struct pt_render *render, struct base_err *err)
 {
     struct pt_watch *w = data;
     (void)err;
-    if ((w->files->preview || w->files->live) && !base_interrupted && base_clock_wall_s() >= w->files_at_s)
+    if (w->info && (path_of(w, PT_PREVIEW) || w->open->cli->live) && !base_interrupted &&
+        base_clock_wall_s() >= w->files_at_s)
         write_files(w, render);
     struct pt_host_view show;
     if (w->display)
         lull_host_display_update(w->display, pt_host_show(&render->film, render->blocks, &show), NULL);
     pt_progress_update(&w->progress, render);
-    if (w->checkpoint->path && !base_interrupted && base_clock_wall_s() >= w->checkpoint_at_s)
+    if (path_of(w, PT_CHECKPOINT) && !base_interrupted && base_clock_wall_s() >= w->checkpoint_at_s)
         save_now_and_then(w, render);
     return 0;
 }
@@ -146,7 +148,7 @@ static int after_slice(void *data, struct pt_render *render, struct base_err *er
 static int suspend(void *data, struct pt_render *render, struct base_err *err)
 {
     const struct pt_watch *w = data;
-    return w->checkpoint->path ? pt_checkpoint_save(w->checkpoint->path, render, &w->open->identity, err) : 0;
+    return path_of(w, PT_CHECKPOINT) ? pt_checkpoint_save(path_of(w, PT_CHECKPOINT), render, &w->open->identity, err) : 0;
 }
 
 struct pt_render_hooks pt_watch_hooks(struct pt_watch *w)

@@ -9,19 +9,16 @@
 struct pt_watch {
     struct base_log *log;
     struct pt_progress progress;
-    const struct pt_open *open;                  /* of whom the settings are saved */
-    const struct pt_checkpoint_plan *checkpoint; /* path NULL: none */
-    const struct pt_image_files *files;          /* the preview; live: stop maps and the report */
-    const struct pt_output_info *info;           /* what they say */
-    struct lull_host_display *display;           /* owns; NULL: none */
-    double checkpoint_at_s, files_at_s;          /* wall times of the next ones */
+    const struct pt_open *open;         /* whose frame says which files */
+    const struct pt_output_info *info;  /* what preview, stop maps and report say; NULL: none is written */
+    struct lull_host_display *display;  /* owns; NULL: none */
+    double checkpoint_at_s, files_at_s; /* wall times of the next ones */
 };
 
-/* All is borrowed. files, info: NULL, nothing is written. */
-void pt_watch_init(struct pt_watch *watch, const struct pt_open *open, const struct pt_checkpoint_plan *checkpoint,
-                   const struct pt_image_files *files, const struct pt_output_info *info, struct base_log *log);
+/* All is borrowed. info: NULL, nothing is written but checkpoints. */
+void pt_watch_init(struct pt_watch *watch, const struct pt_open *open, const struct pt_output_info *info);
 /* Shows the render in a viewer, under the name of the scene, until pt_watch_end. */
-int pt_watch_display(struct pt_watch *watch, const char *address, const char *scene, struct base_err *err);
+int pt_watch_display(struct pt_watch *watch, struct base_err *err);
 /* Closes the live view, with the picture as it is, and takes the progress line away. */
 void pt_watch_end(struct pt_watch *watch);
 /* The hooks of pt_render_run that do it; their data is the watch. */

@@ -53,8 +53,8 @@ static void print_several(FILE *out, const struct pt_cli *c)
         fprintf(out, "%s%g", i ? "," : "look-at=", c->load.view.look_at_world[i]);
     for (uint32_t i = 0; i < c->params.count; i++)
         fprintf(out, "param %s is %s; ", c->params.list[i].key, c->params.list[i].value);
-    for (int i = 0; i < c->files.stop_map_count; i++)
-        print_text(out, "stop-map", c->files.stop_maps[i]);
+    for (int i = PT_STOP_MAPS; i < PT_PATHS; i++)
+        print_text(out, "stop-map", c->paths[i]);
     if (c->action == PT_CLI_DEBUG_PATH)
         fprintf(out, "debug=%d,%d,%d ", c->debug[0], c->debug[1], c->debug[2]);
 }
@@ -64,11 +64,11 @@ static void print_cli(FILE *out, const struct pt_cli *c)
     static const char *const actions[] = {"render", "list", "explain", "debug", "sequence", "quote"};
     const struct {
         const char *name, *text;
-    } texts[] = {{"criterion", c->criterion},    {"mask", c->mask},
-                 {"output", c->files.output},    {"preview", c->files.preview},
-                 {"report", c->files.report},    {"checkpoint", c->checkpoint.path},
-                 {"quote-map", c->quote_map},    {"sequence", c->sequence.directory},
-                 {"levels", c->sequence.levels}, {"blocks", c->sequence.blocks},
+    } texts[] = {{"criterion", c->criterion},     {"mask", c->mask},
+                 {"output", c->paths[PT_OUTPUT]}, {"preview", c->paths[PT_PREVIEW]},
+                 {"report", c->paths[PT_REPORT]}, {"checkpoint", c->paths[PT_CHECKPOINT]},
+                 {"quote-map", c->quote_map},     {"sequence", c->sequence.directory},
+                 {"levels", c->sequence.levels},  {"blocks", c->sequence.blocks},
                  {"name", c->sequence.name}};
     const struct {
         const char *name;
@@ -87,8 +87,8 @@ static void print_cli(FILE *out, const struct pt_cli *c)
                    {"threads", c->threads, 0},
                    {"rank-timeout", c->rank_timeout_s, 120},
                    {"seed", c->render.integrator.seed, 0},
-                   {"every", c->checkpoint.every_s, 60},
-                   {"resume", c->checkpoint.resume, 0},
+                   {"every", c->checkpoint_every_s, 60},
+                   {"resume", c->resume, 0},
                    {"quote", c->quote, 0},
                    {"pilot-spp", (double)c->render.pilot_spp, 0},
                    {"pilot-s", c->render.pilot_s, 0},
@@ -96,7 +96,7 @@ static void print_cli(FILE *out, const struct pt_cli *c)
                    {"effects", c->all_effects, 0},
                    {"strict", c->load.strict, 0},
                    {"quiet", c->quiet, 0},
-                   {"reproducible", c->files.reproducible, 0},
+                   {"reproducible", c->reproducible, 0},
                    {"selection", c->load.light_selection, 0},
                    {"sampler", c->render.integrator.sampler, -1},
                    {"strategy", c->render.integrator.strategy, -1},
@@ -106,7 +106,7 @@ static void print_cli(FILE *out, const struct pt_cli *c)
                    {"aov", c->render.planes, 0},
                    {"order", c->render.order_seed, 0},
                    {"reference", (double)c->sequence.reference_spp, 0}};
-    fprintf(out, "%s %s ", actions[c->action], c->scene ? c->scene : "nothing");
+    fprintf(out, "%s %s ", actions[c->action], c->paths[PT_SCENE] ? c->paths[PT_SCENE] : "nothing");
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
         print_text(out, texts[i].name, texts[i].text);
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
@@ -183,7 +183,7 @@ static void write_files(void)
     assert_int_equal(pic_write_png("small.png", 2, 2, 1, grey, &err), 0);
 }
 
-static void print_render(FILE *out, const struct pt_cli *cli, const struct pt_open *s)
+static void print_render(FILE *out, const struct pt_open *s)
 {
     const struct pt_render_config *c = &s->render->config;
     const struct pt_integrator *i = &c->integrator;
@@ -198,7 +198,7 @@ static void print_render(FILE *out, const struct pt_cli *cli, const struct pt_op
             i->rr_depth, i->sampler, i->strategy, i->filter, (double)i->filter_x, (double)i->filter_y,
             (double)i->filter_sigma, (double)i->max_component, i->seed, i->want_aux);
     fprintf(out, "threads %d kernel %s effects %x output %s criterion %s", base_threads_count(s->threads), s->kernel_name,
-            s->scene->effects, cli->files.output ? cli->files.output : "none",
+            s->scene->effects, s->frame->paths[PT_OUTPUT] ? s->frame->paths[PT_OUTPUT] : "none",
             s->criterion ? lull_host_table(s->criterion)->id : "none");
     for (uint32_t k = 0; s->criterion && k < s->render->blocks->count; k++)
         fprintf(out, " %d", (int)s->render->blocks->list[k].step);
@@ -227,25 +227,31 @@ static char *make_render(struct approve_case *c)
     struct base_err err = {0};
     static struct pt_cli cli;
     static struct pt_open open;
+    struct pt_shot_frame frame = {0};
     int argc = split_words(c, argv);
     FILE *out = open_memstream(&text, &size);
     assert_true(out && getcwd(at, sizeof at) && chdir(folder) == 0);
     open = (struct pt_open){0};
     int rc = pt_cli_parse(&cli, argc, argv, &err);
     if (!rc)
-        rc = pt_open_scene(&cli, NULL, NULL, &open, &err);
+        rc = pt_frame_alone(&frame, &cli, &err);
     if (!rc)
-        rc = pt_open_render(&cli, NULL, NULL, &open, &err);
+        rc = pt_open_init(&open, &cli, NULL, NULL, &err);
     if (!rc)
-        print_render(out, &cli, &open);
-    if (!rc && cli.checkpoint.path)
+        rc = pt_open_scene(&open, &frame, &err);
+    if (!rc)
+        rc = pt_open_frame(&open, NULL, &err);
+    if (!rc)
+        print_render(out, &open);
+    if (!rc && cli.paths[PT_CHECKPOINT])
         rc = pt_agree_identity(&open, &all, &err);
-    if (!rc && cli.checkpoint.path)
+    if (!rc && cli.paths[PT_CHECKPOINT])
         print_settings(out, all.text);
     base_identity_release(&all);
     if (rc)
         fprintf(out, "%d: %s\n", rc, err.text);
     pt_open_release(&open);
+    pt_frame_release(&frame);
     pt_cli_release(&cli);
     fclose(out);
     assert_int_equal(chdir(at), 0);
@@ -567,14 +573,15 @@ static void between_two_slices(void **state)
 {
     (void)state;
     struct base_err err = {0};
-    struct pt_open open = {.render = &render};
-    struct pt_checkpoint_plan plan = {.path = "/missing/c", .every_s = 1000};
+    struct pt_cli cli = {.checkpoint_every_s = 1000};
+    struct pt_shot_frame frame = {.paths = {[PT_CHECKPOINT] = "/missing/c"}};
     struct heard heard;
+    struct pt_open open = {.cli = &cli, .frame = &frame, .log = &heard.log, .render = &render};
     struct pt_watch w;
     double before_s = base_clock_wall_s();
     hear_begin(&heard);
     heard.log.quiet = 1;
-    pt_watch_init(&w, &open, &plan, NULL, NULL, &heard.log);
+    pt_watch_init(&w, &open, NULL);
     assert_true(w.checkpoint_at_s >= before_s + 1000 && w.checkpoint_at_s <= base_clock_wall_s() + 1000);
     const struct pt_render_hooks hooks = pt_watch_hooks(&w);
     base_interrupted = 0;
@@ -595,12 +602,11 @@ static void between_two_slices(void **state)
                         "no checkpoint, the render goes on: /missing/c: cannot write there: No such file or directory\n");
     hear_end(&heard);
     assert_int_equal(hooks.suspend(hooks.data, &render, &err), BASE_EIO);
-    plan.path = NULL;
+    frame.paths[PT_CHECKPOINT] = NULL;
     assert_int_equal(hooks.suspend(hooks.data, &render, &err), 0);
     static const double waits[2][2] = {{15, 45}, {100, 60}};
     const struct pt_output_info info = {0};
-    struct pt_image_files files = {.preview = "/missing/p.png"};
-    w.files = &files;
+    frame.paths[PT_PREVIEW] = "/missing/p.png";
     w.info = &info;
     render.config.crop[2] = render.config.crop[3] = 1;
     for (int i = 0; i < 2; i++) {
@@ -615,7 +621,7 @@ static void between_two_slices(void **state)
         assert_true(w.files_at_s >= before_s + waits[i][1]);
         assert_true(w.files_at_s <= after_s + fmax(waits[i][1] + 4 * (after_s - before_s), 100 * (after_s - before_s)));
     }
-    files.live = 1; /* each second, at most a twentieth of the time */
+    cli.live = 1; /* each second, at most a twentieth of the time */
     w.files_at_s = 0;
     before_s = base_clock_wall_s();
     hooks.slice(hooks.data, &render, &err);

@@ -47,17 +47,17 @@ static void names_of_frames(void **state)
 {
     char name[32];
     (void)state;
-    assert_int_equal(pt_shot_name("a_%04d.exr", 7, name, sizeof name, NULL), 0);
+    assert_int_equal(pt_frame_name("a_%04d.exr", 7, name, sizeof name, NULL), 0);
     assert_string_equal(name, "a_0007.exr");
-    assert_int_equal(pt_shot_name("%d/x", 123456, name, sizeof name, NULL), 0);
+    assert_int_equal(pt_frame_name("%d/x", 123456, name, sizeof name, NULL), 0);
     assert_string_equal(name, "123456/x");
-    assert_int_equal(pt_shot_name("still.pbrt", 7, name, sizeof name, NULL), 0);
+    assert_int_equal(pt_frame_name("still.pbrt", 7, name, sizeof name, NULL), 0);
     assert_string_equal(name, "still.pbrt");
     static const char *const bad[] = {"%", "%s", "%n", "%4d", "%0d", "%012d", "%%d", "%d%d", "%d%n", "%ld", "%04"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-        if (pt_shot_name(bad[i], 1, name, sizeof name, NULL) != BASE_EINVAL)
+        if (pt_frame_name(bad[i], 1, name, sizeof name, NULL) != BASE_EINVAL)
             fail_msg("'%s' is taken for a name", bad[i]);
-    assert_int_equal(pt_shot_name("a_name_that_is_too_long_for_32.exr", 1, name, sizeof name, NULL), BASE_EINVAL);
+    assert_int_equal(pt_frame_name("a_name_that_is_too_long_for_32.exr", 1, name, sizeof name, NULL), BASE_EINVAL);
 }
 
 /* Mean over `frames` frames of what each pixel of a still scene gets, 4 samples of a product of two numbers; the variance over
@@ -70,7 +70,7 @@ static double variance_of_mean(int frames, int same_seed)
         double mean = 0.0;
         for (int f = 0; f < frames; f++)
             for (uint32_t i = 0; i < SPP; i++) {
-                uint32_t seed = same_seed ? 3 : pt_shot_seed(3, f);
+                uint32_t seed = same_seed ? 3 : pt_frame_seed(3, f);
                 struct pt_sampler s = pt_sampler_make(1, seed, pixel % 64, pixel / 64, i);
                 struct pt_sample2 p = pt_sampler_2d(&s, PT_DIM_PIXEL);
                 mean += (double)(p.x * p.y) / (SPP * frames);
@@ -101,7 +101,7 @@ static void no_two_frames_have_one_seed(void **state)
     (void)state;
     for (uint32_t s = 0; s < SEEDS; s++)
         for (int f = 0; f < FRAMES; f++)
-            seeds[s * FRAMES + (uint32_t)f] = pt_shot_seed(s, f);
+            seeds[s * FRAMES + (uint32_t)f] = pt_frame_seed(s, f);
     for (int i = 0; i < SEEDS * FRAMES; i++)
         for (int k = 0; k < i; k++)
             assert_int_not_equal(seeds[i], seeds[k]);
@@ -156,18 +156,19 @@ static void needs_between_pilots(void **state)
     set_need(&a[3], 900.0); /* stands still */
     set_need(&b[3], 950.5);
     set_need(&a[4], 800.0); /* is over in the second */
-    assert_int_equal(pt_shot_need(a, b, BLOCKS, COLUMNS, 3), 951);
-    assert_int_equal(pt_shot_need(a, b, BLOCKS, COLUMNS, 2), 112); /* beside 3 */
+    assert_int_equal(lull_host_quote_between(a, b, BLOCKS, COLUMNS, 3), 951);
+    assert_int_equal(lull_host_quote_between(a, b, BLOCKS, COLUMNS, 2), 112); /* beside 3 */
     static const int near_4[] = {0, 1, 4, 5, 8, 9}, far_from_4[] = {2, 6, 7, 10, 11};
     for (size_t i = 0; i < sizeof near_4 / sizeof *near_4; i++) { /* half the way there, in octaves */
         double own = near_4[i] == 4 ? 800.0 : 110.0 + near_4[i];
-        assert_int_equal(pt_shot_need(a, b, BLOCKS, COLUMNS, (size_t)near_4[i]), (uint32_t)ceil(sqrt(own * 800.0)));
+        assert_int_equal(lull_host_quote_between(a, b, BLOCKS, COLUMNS, (uint32_t)near_4[i]),
+                         (uint32_t)ceil(sqrt(own * 800.0)));
     }
     for (size_t i = 0; i < sizeof far_from_4 / sizeof *far_from_4; i++) /* nor across the picture's edge */
-        assert_int_equal(pt_shot_need(a, b, BLOCKS, COLUMNS, (size_t)far_from_4[i]), 110 + far_from_4[i]);
+        assert_int_equal(lull_host_quote_between(a, b, BLOCKS, COLUMNS, (uint32_t)far_from_4[i]), 110 + far_from_4[i]);
     set_need(&b[7], 10.0); /* moves beside what stands still */
-    assert_int_equal(pt_shot_need(a, b, BLOCKS, COLUMNS, 7), 107);
-    assert_int_equal(pt_shot_need(b, b, BLOCKS, COLUMNS, 7), 10); /* a pilot with itself: one frame is a still */
+    assert_int_equal(lull_host_quote_between(a, b, BLOCKS, COLUMNS, 7), 107);
+    assert_int_equal(lull_host_quote_between(b, b, BLOCKS, COLUMNS, 7), 10); /* a pilot with itself: one frame is a still */
 }
 
 static const char table_text[] = "lull-shot-table 1\nsize=4x2 crop=0,0,4,2 block=2x2\n0;1;2147483647\n12;30;4\n";

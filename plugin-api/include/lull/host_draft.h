@@ -99,6 +99,15 @@ LULL_EXPORT void lull_host_quote_ask(struct lull_host_quote *quote, const struct
 LULL_EXPORT int32_t lull_host_quote_finish(struct lull_host_quote *quote, const struct lull_host_view *view,
                                            const struct lull_host_quote_row **rows, uint32_t *count, struct lull_error *err);
 
+/* Samples that a block of a frame between two quotes of a moving picture gets, of `count` blocks in rows of `columns`: the
+ * larger of its two needs; where something moves in it or beside it, half of the octaves from there to the largest need of
+ * what moves. A block moves when its need changes by more than the quotes' intervals allow. a, b: [count]. */
+LULL_EXPORT uint32_t lull_host_quote_between(const struct lull_host_quote_block *a, const struct lull_host_quote_block *b,
+                                             uint32_t count, uint32_t columns, uint32_t block);
+/* Raises the samples of a frame's blocks, [count], to at most a quarter of an octave below those of the frame beside it, so
+ * that noise fades instead of jumping. */
+LULL_EXPORT void lull_host_quote_fade(uint32_t *spp, const uint32_t *beside, uint32_t count);
+
 /* --- dropped samples ------------------------------------------------------------------------------------------------- */
 
 /* A dropped sample, so that its path can be replayed. The frame keeps the first LULL_HOST_DROPPED_KEPT for the report. */
