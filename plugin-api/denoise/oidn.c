@@ -142,6 +142,12 @@ int lull_oidn_prepare(struct lull_oidn *o, const struct lull_oidn_form *form, st
     return 0;
 }
 
+void lull_oidn_resize(struct lull_oidn *o, int32_t width, int32_t height)
+{
+    o->shared->form.width = width + 2 * o->shared->form.margin;
+    o->shared->form.height = height + 2 * o->shared->form.margin;
+}
+
 int lull_oidn_open(const char *library, struct lull_oidn **out, struct base_err *err)
 {
     struct lull_oidn *o = calloc(1, sizeof *o);

@@ -13,8 +13,10 @@
  * - lib/ of lull/oidn in XDG_DATA_HOME (~/.local/share) and of /usr/local/lib/lull/oidn: lull-denoiser-setup makes them.
  *
  * The same bits for every number of threads and for every run on one processor, but not for every instruction set. A crop
- * gives the bits of the whole picture inside if its corner lies on a multiple of LULL_OIDN_GRID of the frame and it has
- * LULL_OIDN_HALO pixels around (as far as the frame reaches); measured with 2.5.1.
+ * whose sides lie on multiples of LULL_OIDN_GRID of the frame, or where the frame ends, gives the bits of the whole picture
+ * in all but the outermost LULL_OIDN_HALO pixels. That is how far the network sees, from its convolutions: 2 and 3 pixels in
+ * the picture's own size, then twice 1 and 2 in each of four smaller ones, are five cells of the grid. Measured with 2.5.1:
+ * of a crop with 80 pixels around no value differs, with 64 a quarter of them.
  *
  * A denoiser errs most where a picture ends: outermost pixels are several times as far off as others, but not in a picture
  * that is mirrored on for LULL_OIDN_MARGIN pixels (tests/unit/base_oidn.c). A crop that reaches the end of the frame must be
@@ -29,7 +31,7 @@
 
 #include "base/err.h"
 
-enum { LULL_OIDN_GRID = 16, LULL_OIDN_HALO = 96, LULL_OIDN_MARGIN = LULL_OIDN_GRID, LULL_OIDN_COLORS = 2 };
+enum { LULL_OIDN_GRID = 16, LULL_OIDN_HALO = 80, LULL_OIDN_MARGIN = LULL_OIDN_GRID, LULL_OIDN_COLORS = 2 };
 
 enum lull_oidn_quality { LULL_OIDN_FAST = 4, LULL_OIDN_BALANCED = 5, LULL_OIDN_HIGH = 6 }; /* the library's own numbers */
 
@@ -68,6 +70,8 @@ const char *lull_oidn_version(const struct lull_oidn *oidn);
 
 /* Takes the memory that pictures of this form need, 72 bytes a pixel; the program takes some 600 more while it runs. */
 int lull_oidn_prepare(struct lull_oidn *oidn, const struct lull_oidn_form *form, struct base_err *err);
+/* From now on pictures of this size, which need no more memory than those of the form. */
+void lull_oidn_resize(struct lull_oidn *oidn, int32_t width, int32_t height);
 
 /* Denoises each color of the prepared form. cancelled(data), which may be NULL, is asked 50 times a second; not 0 ends the
  * program and the call, with BASE_ECANCELLED. Allocates nothing. BASE_ENOMEM; BASE_EIO: the program cannot be run;

@@ -14,48 +14,42 @@ static void lay_out(float **const buffers[], size_t count, size_t size, float **
         *buffers[i] = *next;
 }
 
-static int allocate(struct lull_denoised_pair *pair, struct base_err *err)
+/* Both numbers of pixels are small enough for sums of what is allocated. */
+static const size_t MOST = SIZE_MAX / sizeof(float) / 64;
+
+static size_t pixels_of(const struct lull_oidn_form *form)
 {
-    const struct lull_oidn_form *picture = &pair->form.picture;
-    struct lull_denoised_part *part = &pair->part;
-    const int cuts = pair->form.part_pixels > 0;
+    const size_t width = (size_t)form->width, height = (size_t)form->height;
+    return height > MOST / width ? MOST : width * height;
+}
+
+static int allocate(struct lull_denoised_pair *pair, const struct lull_oidn_form *form, struct base_err *err)
+{
     float **const pictures[] = {&pair->half[0],     &pair->half[1], &pair->denoised[0],
                                 &pair->denoised[1], &pair->albedo,  &pair->normal};
-    float **const cut_out[] = {&part->half[0], &part->half[1], &part->denoised[0], &part->denoised[1]};
-    float **const maps[] = {&part->error.denoised, &part->error.agreed, &part->error.noisy,
-                            &part->weight,         &part->apart,        &pair->scratch};
-    const size_t count = 4u + (picture->albedo != 0) + (picture->normal != 0);
-    const size_t most = SIZE_MAX / sizeof(float) / 64, width = (size_t)picture->width, height = (size_t)picture->height;
-    pair->pixels = height > most / width ? most : width * height;
-    const size_t part_pixels = cuts ? pair->form.part_pixels : pair->pixels;
-    if (pair->pixels < most && part_pixels < most)
-        pair->memory = calloc(3 * count * pair->pixels + (cuts ? 12u + 6u : 6u) * part_pixels, sizeof(float));
+    const size_t count = 4u + (form->albedo != 0) + (form->normal != 0);
+    pair->width = form->width;
+    pair->height = form->height;
+    pair->pixels = pair->room = pixels_of(form);
+    if (pair->room < MOST)
+        pair->memory = calloc(3 * count * pair->room, sizeof(float));
     if (!pair->memory)
         return base_fail_nomem(err, "pictures to denoise");
     float *next = pair->memory;
-    lay_out(pictures, count, 3 * pair->pixels, &next);
-    lay_out(cut_out, cuts ? 4 : 0, 3 * part_pixels, &next);
-    lay_out(maps, 6, part_pixels, &next);
-    for (int k = 0; k < 2 && !cuts; k++) {
-        part->half[k] = pair->half[k];
-        part->denoised[k] = pair->denoised[k];
-    }
-    part->width = picture->width;
-    part->height = picture->height;
-    part->pixels = part_pixels;
+    lay_out(pictures, count, 3 * pair->room, &next);
     return 0;
 }
 
-int lull_denoised_open(struct lull_denoised_pair *pair, const char *library, const struct lull_denoised_form *form,
+int lull_denoised_open(struct lull_denoised_pair *pair, const char *library, const struct lull_oidn_form *form,
                        struct base_err *err)
 {
-    *pair = (struct lull_denoised_pair){.form = *form};
+    *pair = (struct lull_denoised_pair){0};
     /* First, since of what is too large this fails at once, but shared memory takes all that the machine has. */
-    int rc = allocate(pair, err);
+    int rc = allocate(pair, form, err);
     if (!rc)
         rc = lull_oidn_open(library, &pair->oidn, err);
     if (!rc)
-        rc = lull_oidn_prepare(pair->oidn, &form->picture, err);
+        rc = lull_oidn_prepare(pair->oidn, form, err);
     if (rc)
         lull_denoised_close(pair);
     return rc;
@@ -68,10 +62,58 @@ void lull_denoised_close(struct lull_denoised_pair *pair)
     *pair = (struct lull_denoised_pair){0};
 }
 
+/* whole: NULL, or whose pictures are the part's. */
+static int open_part(struct lull_denoised_part *part, size_t pixels, const struct lull_denoised_pair *whole,
+                     struct base_err *err)
+{
+    float **const pictures[] = {&part->half[0], &part->half[1], &part->denoised[0], &part->denoised[1]};
+    float **const maps[] = {&part->error.denoised, &part->error.agreed, &part->error.noisy,
+                            &part->weight,         &part->apart,        &part->scratch};
+    *part = (struct lull_denoised_part){.pixels = pixels};
+    if (pixels < MOST)
+        part->memory = calloc((whole ? 6u : 12u + 6u) * pixels, sizeof(float));
+    if (!part->memory) {
+        *part = (struct lull_denoised_part){0};
+        return base_fail_nomem(err, "what is kept of pictures to denoise");
+    }
+    float *next = part->memory;
+    lay_out(pictures, whole ? 0 : 4, 3 * pixels, &next);
+    lay_out(maps, 6, pixels, &next);
+    return 0;
+}
+
+int lull_denoised_part_open(struct lull_denoised_part *part, size_t pixels, struct base_err *err)
+{
+    return open_part(part, pixels, NULL, err);
+}
+
+int lull_denoised_part_open_whole(struct lull_denoised_part *part, const struct lull_denoised_pair *pair,
+                                  struct base_err *err)
+{
+    int rc = open_part(part, pair->pixels, pair, err);
+    for (int k = 0; k < 2 && !rc; k++) {
+        part->half[k] = pair->half[k];
+        part->denoised[k] = pair->denoised[k];
+    }
+    part->width = rc ? 0 : pair->width;
+    part->height = rc ? 0 : pair->height;
+    return rc;
+}
+
+void lull_denoised_part_close(struct lull_denoised_part *part)
+{
+    free(part->memory);
+    *part = (struct lull_denoised_part){0};
+}
+
 /* --- reading ----------------------------------------------------------------------------------------------------------- */
 
-void lull_denoised_clear(struct lull_denoised_pair *pair)
+void lull_denoised_begin(struct lull_denoised_pair *pair, int32_t width, int32_t height)
 {
+    pair->width = width;
+    pair->height = height;
+    pair->pixels = (size_t)width * (size_t)height;
+    lull_oidn_resize(pair->oidn, width, height);
     float *const pictures[] = {pair->half[0], pair->half[1], pair->albedo, pair->normal};
     for (int i = 0; i < 4; i++)
         if (pictures[i])
@@ -94,14 +136,15 @@ int lull_denoised_put(struct lull_denoised_pair *pair, size_t at, const double m
 
 static void mirror(float *picture, int32_t width, int32_t height, struct lull_denoised_rect known)
 {
-    for (int32_t y = 0; y < height; y++)
-        for (int32_t x = 0; x < width; x++) {
+    for (int32_t y = 0; y < height; y++) {
+        const int32_t v = known.y0 + lull_oidn_mirrored(y - known.y0, known.y1 - known.y0);
+        const int32_t skip = v == y ? known.x0 : INT32_MAX; /* what is known needs no mirror */
+        for (int32_t x = skip == 0 ? known.x1 : 0; x < width; x = x + 1 == skip ? known.x1 : x + 1) {
             const int32_t u = known.x0 + lull_oidn_mirrored(x - known.x0, known.x1 - known.x0);
-            const int32_t v = known.y0 + lull_oidn_mirrored(y - known.y0, known.y1 - known.y0);
-            if (u != x || v != y)
-                memcpy(picture + 3 * ((size_t)y * (size_t)width + (size_t)x),
-                       picture + 3 * ((size_t)v * (size_t)width + (size_t)u), 3 * sizeof *picture);
+            memcpy(picture + 3 * ((size_t)y * (size_t)width + (size_t)x),
+                   picture + 3 * ((size_t)v * (size_t)width + (size_t)u), 3 * sizeof *picture);
         }
+    }
 }
 
 void lull_denoised_mirror(struct lull_denoised_pair *pair, struct lull_denoised_rect known)
@@ -109,7 +152,7 @@ void lull_denoised_mirror(struct lull_denoised_pair *pair, struct lull_denoised_
     float *const pictures[] = {pair->half[0], pair->half[1], pair->albedo, pair->normal};
     for (int i = 0; i < 4; i++)
         if (pictures[i])
-            mirror(pictures[i], pair->form.picture.width, pair->form.picture.height, known);
+            mirror(pictures[i], pair->width, pair->height, known);
 }
 
 /* --- what becomes of it ------------------------------------------------------------------------------------------------ */
@@ -123,10 +166,10 @@ int lull_denoised_run(struct lull_denoised_pair *pair, int (*cancelled)(void *da
     return lull_oidn_run(pair->oidn, &pictures, cancelled, data, err);
 }
 
-void lull_denoised_cut(struct lull_denoised_pair *pair, struct lull_denoised_rect rect)
+void lull_denoised_cut(struct lull_denoised_part *part, const struct lull_denoised_pair *pair,
+                       struct lull_denoised_rect rect)
 {
-    struct lull_denoised_part *part = &pair->part;
-    const size_t row = (size_t)pair->form.picture.width;
+    const size_t row = (size_t)pair->width;
     part->width = rect.x1 - rect.x0;
     part->height = rect.y1 - rect.y0;
     part->pixels = (size_t)part->width * (size_t)part->height;
@@ -139,23 +182,21 @@ void lull_denoised_cut(struct lull_denoised_pair *pair, struct lull_denoised_rec
         }
 }
 
-void lull_denoised_estimate(struct lull_denoised_pair *pair, size_t first, size_t n, const struct lull_estimate_in *in)
+void lull_denoised_estimate(struct lull_denoised_part *part, size_t first, size_t n, const struct lull_estimate_in *in)
 {
-    const struct lull_estimate *error = &pair->part.error;
+    const struct lull_estimate *error = &part->error;
     lull_estimate_pixels(in, n,
                          &(struct lull_estimate){error->denoised + first, error->agreed + first, error->noisy + first});
 }
 
-void lull_denoised_weigh(struct lull_denoised_pair *pair)
+void lull_denoised_weigh(struct lull_denoised_part *part)
 {
-    struct lull_denoised_part *part = &pair->part;
-    lull_blend_weights(&part->error, part->width, part->height, pair->scratch, part->weight, part->apart);
+    lull_blend_weights(&part->error, part->width, part->height, part->scratch, part->weight, part->apart);
     lull_blend_despeckle(part->apart, part->pixels, part->denoised[0], part->denoised[1]);
 }
 
-void lull_denoised_blend(const struct lull_denoised_pair *pair, const float *weight, float *const kept[2])
+void lull_denoised_blend(const struct lull_denoised_part *part, const float *weight, float *const kept[2])
 {
-    const struct lull_denoised_part *part = &pair->part;
     for (int k = 0; k < 2; k++)
         lull_blend(part->half[k], part->denoised[k], weight, part->pixels, kept[k]);
 }

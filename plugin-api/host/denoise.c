@@ -17,7 +17,8 @@ struct picture {
     int32_t width;
     double exposure, luminance[3];
     int albedo, normal;             /* whether the view has these */
-    struct lull_denoised_pair pair; /* owns; of the whole view */
+    struct lull_denoised_pair pair; /* owns; of the whole view, */
+    struct lull_denoised_part part; /* as this */
     float *mean;                    /* owns; [pixels][3]: of all samples */
 };
 
@@ -27,15 +28,18 @@ static int32_t open_pair(struct picture *p, int32_t height, struct lull_error *e
 {
     const struct lull_host_denoising *how = p->how;
     struct base_err why = {0};
-    const struct lull_denoised_form form = {.picture = {.width = p->width,
-                                                        .height = height,
-                                                        .albedo = p->albedo,
-                                                        .normal = p->normal,
-                                                        .quality = LULL_OIDN_HIGH,
-                                                        .threads = (int32_t)how->threads,
-                                                        .margin = LULL_OIDN_MARGIN,
-                                                        .exposure = (float)p->exposure}};
-    return lull_denoised_open(&p->pair, how->library, &form, &why) ? lull_host_translate(&why, err) : LULL_OK;
+    const struct lull_oidn_form form = {.width = p->width,
+                                        .height = height,
+                                        .albedo = p->albedo,
+                                        .normal = p->normal,
+                                        .quality = LULL_OIDN_HIGH,
+                                        .threads = (int32_t)how->threads,
+                                        .margin = LULL_OIDN_MARGIN,
+                                        .exposure = (float)p->exposure};
+    int rc = lull_denoised_open(&p->pair, how->library, &form, &why);
+    if (!rc)
+        rc = lull_denoised_part_open_whole(&p->part, &p->pair, &why);
+    return rc ? lull_host_translate(&why, err) : LULL_OK;
 }
 
 /* --- reading ----------------------------------------------------------------------------------------------------------- */
@@ -94,7 +98,7 @@ static float shown(const struct picture *p, const float *rgb)
 /* Where there are no halves it stays 0: the denoised picture is kept. */
 static void estimate(struct picture *p, const struct lull_kit_span *s, size_t at)
 {
-    const struct lull_denoised_part *part = &p->pair.part;
+    const struct lull_denoised_part *part = &p->part;
     const double share = (double)s->block->half_spp / (double)s->block->spp;
     float light[4][LULL_KIT_SPAN_MAX];
     if (s->block->half_spp == 0 || s->block->half_spp >= s->block->spp)
@@ -105,19 +109,19 @@ static void estimate(struct picture *p, const struct lull_kit_span *s, size_t at
             light[2 + k][i] = shown(p, part->denoised[k] + 3 * (at + i));
         }
     const struct lull_estimate_in in = {light[0], light[1], light[2], light[3], share};
-    lull_denoised_estimate(&p->pair, at, (size_t)s->count, &in);
+    lull_denoised_estimate(&p->part, at, (size_t)s->count, &in);
 }
 
 /* The mean of the denoised halves, and how much of the noisy picture each pixel takes. */
 static int32_t denoise_halves(struct picture *p, float *denoised, struct lull_error *err)
 {
-    const struct lull_denoised_part *part = &p->pair.part;
+    const struct lull_denoised_part *part = &p->part;
     struct base_err why = {0};
     each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF), read_halves);
     if (lull_denoised_run(&p->pair, p->how->cancelled, p->how->context, &why))
         return lull_host_translate(&why, err);
     each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), estimate);
-    lull_denoised_weigh(&p->pair);
+    lull_denoised_weigh(&p->part);
     for (size_t i = 0; i < 3 * part->pixels; i++)
         denoised[i] = 0.5f * part->denoised[0][i] + 0.5f * part->denoised[1][i];
     return LULL_OK;
@@ -147,7 +151,7 @@ static void black_out(const struct picture *p, float *rgb)
 
 static int32_t make(struct picture *p, int32_t height, const struct lull_host_picture *out, struct lull_error *err)
 {
-    const struct lull_denoised_part *part = &p->pair.part;
+    const struct lull_denoised_part *part = &p->part;
     int32_t code = open_pair(p, height, err);
     if (code != LULL_OK)
         return code;
@@ -191,6 +195,7 @@ int32_t lull_host_denoise(const struct lull_host_frame *frame, const struct lull
         code = lull_error_set(err, LULL_E_INVALID, "a denoised picture needs the plane COLOR, a blend HALF besides");
     else
         code = make(&p, view->y1 - view->y0, out, err);
+    lull_denoised_part_close(&p.part);
     lull_denoised_close(&p.pair);
     free(p.mean);
     lull_host_hide(&s);

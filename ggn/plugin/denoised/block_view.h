@@ -1,7 +1,7 @@
 /*
- * The view of a block of a picture that will be denoised: both halves of its samples are denoised, with what lies around
- * (denoise/pair.h), and two estimates say how visible the error is of the picture that will be kept (observer/kept.h). This
- * translates: the ABI's view into the pair, the pair into what a display shows.
+ * The view of a block of a picture that will be denoised: both halves of its samples and what the denoiser makes of them
+ * (plugin/denoised/look.h), of which two estimates say how visible the error is of the picture that will be kept
+ * (observer/kept.h). This translates pictures into what a display shows.
  *
  * The picture that is kept is the mean of two, P(A) and P(B), each of one half: a blend of the noisy half and the denoised
  * one without its specks (denoise/blend.h), or the denoised one alone. What is crossed with the other half is a blend, too,
@@ -12,23 +12,11 @@
 #ifndef GGN_PLUGIN_DENOISED_BLOCK_VIEW_H
 #define GGN_PLUGIN_DENOISED_BLOCK_VIEW_H
 
-#include <lull/criterion_kit.h>
-
-#include "denoise/pair.h"
 #include "observer/kept.h"
-
-/* Pixels around a block that the denoiser is shown, and the most that lie there because the corner is on its grid. */
-enum { GD_HALO = 32, GD_REACH = GD_HALO + LULL_OIDN_GRID - 1 };
-
-struct gd_form {               /* of a frame */
-    struct lull_rect area;     /* around all blocks */
-    int32_t width, height;     /* of the largest blocks */
-    struct lull_oidn_form box; /* what is denoised for a block, of any size */
-};
+#include "plugin/denoised/look.h"
 
 struct gd_block_view {
-    struct lull_denoised_pair pair; /* of the box; its part is the block, of P pixels */
-    struct lull_rect box;           /* of the block that was read last */
+    struct lull_denoised_part part; /* the block, of P pixels */
     float *rgb;                     /* [3][P]: one picture as a display shows it */
     float *noisy_light[2];          /* [P] each: luminance that is shown of the noisy halves, */
     float *denoised_light[2];       /* of the denoised ones, */
@@ -42,25 +30,17 @@ struct gd_block_view {
     float *crossed[2];              /* [P][3]: those blends */
     float *kept[2];                 /* [P][3] */
     double *judging;                /* scratch of observer/kept.h */
-    void *memory;                   /* owns all of the above but the pair */
-    struct base_err err;            /* of the last call that failed */
+    void *memory;                   /* owns all of the above but the part */
 };
 
-/* frame: checked. quality: of struct lull_oidn_form. */
-struct gd_form gd_form_of(const struct lull_frame *frame, enum lull_oidn_quality quality);
-
-/* library: as for lull_oidn_open. */
-int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form, const char *library, struct base_err *err);
+/* For blocks of this form. */
+int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form, struct base_err *err);
 void gd_block_view_release(struct gd_block_view *seen);
 
-/* Reads a block of 0 < half_spp < spp and its surroundings. Returns whether the halves differ anywhere in the block. */
-int gd_block_view_read(struct gd_block_view *seen, const struct gd_form *form, const struct lull_kit *kit,
-                       const struct lull_view *view, const struct lull_block *block, struct lull_kit_tally *tally);
-/* Whether the block that was read shows more than one colour. */
-int gd_block_view_structure(struct gd_block_view *seen, const struct lull_block *block);
-/* Denoises what was read and estimates its error. blend: the picture kept is the blend. temporal: as for ggn_kept_judge. 0,
- * or a negative code and seen->err. */
-int gd_block_view_errors(struct gd_block_view *seen, const struct lull_kit *kit, const struct lull_block *block, int blend,
-                         const struct ggn_temporal *temporal, struct ggn_kept_errors *errors);
+/* Estimates the error of a block that the look has denoised. blend: the picture kept is the blend. temporal: as for
+ * ggn_kept_judge. */
+struct ggn_kept_errors gd_block_view_errors(struct gd_block_view *seen, const struct gd_look *look,
+                                            const struct lull_kit *kit, const struct lull_block *block, int blend,
+                                            const struct ggn_temporal *temporal);
 
 #endif

@@ -1,9 +1,9 @@
 /*
  * The criterion "denoised", of denoised.so: when is the picture good that people keep, which is denoised? Each check
- * denoises both halves of a block's samples and estimates how visible the error of the kept picture is
- * (plugin/denoised/block_view.h): from the difference of the denoised halves, and from that of each from the other, noisy
- * one. `error` is the larger of the two over the level at which people stop seeing it; a block stops when two checks in a
- * row find it low enough for `visible`.
+ * denoises both halves of a block's samples, together with those of its neighbours that are due (plugin/denoised/cover.h),
+ * and estimates how visible the error of the kept picture is (plugin/denoised/block_view.h): from the difference of the
+ * denoised halves, and from that of each from the other, noisy one. `error` is the larger of the two over the level at which
+ * people stop seeing it; a block stops when two checks in a row find it low enough for `visible`.
  *
  * The history of a block is its last check: asked again at the same samples it answers the same, though its neighbours,
  * which the denoiser reads too, may have changed.
@@ -11,6 +11,7 @@
 #include "observer/observer.h"
 #include "plugin/criteria.h"
 #include "plugin/denoised/block_view.h"
+#include "plugin/denoised/cover.h"
 #include "plugin/moving.h"
 #include "plugin/translate.h"
 
@@ -44,6 +45,11 @@ struct past {     /* what is remembered of a block; saved as it is, without padd
     uint32_t flags, low, zero; /* low: the check found an error that is low enough */
 };
 
+struct sight { /* of a block that is asked about */
+    enum gd_halves halves;
+    struct lull_kit_tally tally;
+};
+
 struct lull_instance {
     struct lull_kit kit;
     struct ggn_observer observer;
@@ -53,28 +59,34 @@ struct lull_instance {
     atomic_flag warned;  /* of halves that are none: once per frame */
     struct gd_form form; /* of the open frame, as all below */
     uint32_t workers;
+    struct gd_look look;
     struct gd_block_view *seen;  /* owns, [workers] */
     struct lull_rect *rect;      /* owns, [blocks] */
     struct past *past, *pending; /* own, [blocks] */
+    struct sight *sight;         /* owns, [blocks] */
+    uint8_t *asked;              /* owns, [blocks]: in the rectangle that is looked at; 0 between looks */
+    struct gd_group *groups;     /* owns, [blocks]: of one question, as these: */
+    uint32_t *next, *members;    /* own, [blocks]: links of groups, the blocks of one */
 };
 
 /* --- one block --------------------------------------------------------------------------------------------------------- */
 
 /* The larger of both errors, NaN where there is none; *now gets both. */
-static double error_of(struct lull_instance *in, struct gd_block_view *seen, const struct lull_view *view,
-                       const struct lull_block *b, struct lull_kit_tally *tally, struct past *now)
+static double error_of(struct lull_instance *in, struct gd_block_view *seen, const struct lull_block *b,
+                       struct lull_kit_tally *tally, struct past *now)
 {
     const size_t pixels = (size_t)lull_kit_pixels(b);
-    struct ggn_kept_errors e;
-    if (!gd_block_view_read(seen, &in->form, &in->kit, view, b, tally))
+    const struct sight *sight = &in->sight[b->id];
+    *tally = sight->tally;
+    if (sight->halves != GD_HALVES_DIFFER)
         return now->halves = now->crossed =
-                   gp_error_of_same(&in->kit, gd_block_view_structure(seen, b), &in->warned,
+                   gp_error_of_same(&in->kit, sight->halves == GD_HALVES_STRUCTURED, &in->warned,
                                     "denoised: COLOR and HALF are the same in a block that is not of one colour: HALF must "
                                     "hold a fixed half of the samples",
                                     tally);
-    if (gd_block_view_errors(seen, &in->kit, b, in->kit.value[P_PICTURE] == 0,
-                             gp_is_moving(&in->kit, P_FPS) ? &in->temporal : NULL, &e))
-        return (double)NAN; /* evaluate finds it in seen->err */
+    const struct ggn_kept_errors e =
+        gd_block_view_errors(seen, &in->look, &in->kit, b, in->kit.value[P_PICTURE] == 0,
+                             gp_is_moving(&in->kit, P_FPS) ? &in->temporal : NULL);
     now->halves = ggn_observer_error(&in->observer, e.halves, pixels);
     now->crossed = ggn_observer_error(&in->observer, e.crossed, pixels);
     return fmax(now->halves, now->crossed);
@@ -98,6 +110,17 @@ static void decide(const struct lull_instance *in, const struct lull_block *b, c
         d->p_noisy = ggn_observer_p_noisy(&in->observer, d->error);
 }
 
+/* Whether this block's samples are to be judged, which they have not been before. */
+static int is_new(const struct lull_instance *in, const struct lull_block *b)
+{
+    return in->past[b->id].spp != b->spp || b->spp == 0;
+}
+
+static int can_be_judged(const struct lull_instance *in, const struct lull_block *b)
+{
+    return b->spp >= in->kit.need.first_spp && gp_has_halves(b);
+}
+
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                   struct lull_decision *d, uint32_t worker)
 {
@@ -106,19 +129,18 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
     struct lull_kit_tally tally = {0};
     double error = (double)NAN;
 
+    (void)view;
     *now = in->past[b->id];
-    if (now->spp != b->spp || b->spp == 0) {
+    if (is_new(in, b)) {
         now->halves = now->crossed = (double)NAN;
-        if (b->spp < in->kit.need.first_spp) {
+        if (can_be_judged(in, b))
+            error = error_of(in, seen, b, &tally, now);
+        else
             tally.early = 1;
-        } else if (!gp_has_halves(b)) {
+        if (b->spp >= in->kit.need.first_spp && !gp_has_halves(b))
             gp_warn_once(&in->kit, &in->warned,
                          "denoised: HALF holds none or all of a block's samples, so that errors cannot be told; no block is "
                          "stopped by it");
-            tally.early = 1;
-        } else {
-            error = error_of(in, seen, view, b, &tally, now);
-        }
         decide(in, b, &tally, error, now, d);
         *now = (struct past){b->spp,       d->next_spp, d->p_noisy, d->predicted_spp, d->error, now->halves,
                              now->crossed, d->action,   d->flags,   now->low,         0};
@@ -141,19 +163,104 @@ static void tell(const struct lull_instance *in, const struct lull_block *b, con
     gp_log(&in->kit, LULL_LOG_DEBUG, line);
 }
 
-/* As lull_kit_evaluate; fails when a block could not be denoised. A call that failed leaves no trace. */
+/* --- a question -------------------------------------------------------------------------------------------------------- */
+
+static const struct lull_block *block_at(const struct lull_kit_batch *batch, uint32_t i)
+{
+    return lull_kit_at(batch->blocks, batch->block_stride, i);
+}
+
+/* Some blocks of a question. */
+struct some {
+    struct lull_kit_batch batch;
+    const uint32_t *members; /* which */
+};
+
+static void judge_task(void *arg, uint64_t task, uint32_t worker)
+{
+    struct some *some = arg;
+    lull_kit_task(&some->batch, some->members[task], worker);
+}
+
+static int32_t judge_all(const struct lull_kit_batch *batch, const uint32_t *members, uint32_t count,
+                         struct lull_error *err)
+{
+    const struct lull_host *host = batch->in->kit.host;
+    struct some some = {*batch, members};
+    if (host && host->parallel_for && count > 0) {
+        int32_t status = host->parallel_for(host, count, judge_task, &some);
+        return status == LULL_OK ? LULL_OK : lull_kit_fail(err, status, "evaluate: the host left out blocks");
+    }
+    for (uint32_t i = 0; i < count; i++)
+        judge_task(&some, i, 0);
+    return LULL_OK;
+}
+
+/* Denoises a group's blocks together, then judges each. */
+static int32_t look_at(struct lull_instance *in, const struct lull_kit_batch *batch, const struct gd_group *group,
+                       struct lull_error *err)
+{
+    const struct lull_rect *core = &in->rect[block_at(batch, group->first)->id];
+    struct base_err why = {0};
+    uint32_t count = 0;
+    for (uint32_t i = group->first;; i = in->next[i]) {
+        in->members[count++] = i;
+        in->asked[block_at(batch, i)->id] = 1;
+        if (i == group->last)
+            break;
+    }
+    gd_look_begin(&in->look, &in->form, batch->view, &group->box, core, in->asked);
+    for (uint32_t k = 0; k < count; k++) {
+        const struct lull_block *b = block_at(batch, in->members[k]);
+        gd_look_put(&in->look, batch->view, b, &in->sight[b->id].tally);
+        in->asked[b->id] = 0;
+    }
+    if (gd_look_run(&in->look, in->kit.host, &why))
+        return gp_fail_from(err, LULL_E_INTERNAL, "evaluate", &why);
+    return judge_all(batch, in->members, count, err);
+}
+
+/* Finds the blocks that must be denoised, each a group of its own, and in members[] the others. Returns how many of each. */
+static uint32_t sort_out(struct lull_instance *in, const struct lull_kit_batch *batch, uint32_t *others)
+{
+    uint32_t groups = 0;
+    *others = 0;
+    for (uint32_t i = 0; i < batch->count; i++) {
+        const struct lull_block *b = block_at(batch, i);
+        struct sight *sight = &in->sight[b->id];
+        *sight = (struct sight){0};
+        const int look = is_new(in, b) && can_be_judged(in, b);
+        if (look)
+            sight->halves = gd_halves_of(batch->view, b, &sight->tally);
+        if (look && sight->halves == GD_HALVES_DIFFER)
+            in->groups[groups++] = (struct gd_group){gd_box_around(&in->rect[b->id], &in->form.area), i, i};
+        else
+            in->members[(*others)++] = i;
+    }
+    return groups;
+}
+
+/* As lull_kit_evaluate, but denoises neighbours together; fails when blocks could not be denoised. A call that failed leaves
+ * no trace. */
 static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
                         uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
                         struct lull_error *err)
 {
-    for (uint32_t i = 0; in && i < in->workers; i++)
-        in->seen[i].err.code = 0;
-    int32_t status = lull_kit_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
-    for (uint32_t i = 0; !status && i < in->workers; i++)
-        if (in->seen[i].err.code)
-            status = gp_fail_from(err, LULL_E_INTERNAL, "evaluate", &in->seen[i].err);
+    const struct lull_kit_batch batch = {in, view, blocks, decisions, block_stride, decision_stride, count};
+    int32_t status = lull_kit_batch_check(&batch, err);
+    uint32_t others;
+    if (status != LULL_OK)
+        return status;
+    if (count > in->kit.block_count)
+        return lull_kit_fail(err, LULL_E_INVALID, "evaluate: more blocks than the frame has");
+    uint32_t groups = sort_out(in, &batch, &others);
+    status = judge_all(&batch, in->members, others, err);
+    if (view->all)
+        groups = gd_cover(in->groups, groups, in->next, in->form.most);
+    for (uint32_t g = 0; g < groups && !status; g++)
+        status = look_at(in, &batch, &in->groups[g], err);
     for (uint32_t i = 0; i < count && !status; i++) {
-        const struct lull_block *b = lull_kit_at(blocks, block_stride, i);
+        const struct lull_block *b = block_at(&batch, i);
         const int again = in->past[b->id].spp == b->spp;
         in->past[b->id] = in->pending[b->id];
         if (!again)
@@ -168,32 +275,58 @@ static void frame_release(struct lull_instance *in)
 {
     for (uint32_t i = 0; in->seen && i < in->workers; i++)
         gd_block_view_release(&in->seen[i]);
+    gd_look_close(&in->look);
     free(in->seen);
     free(in->rect);
     free(in->past);
+    free(in->sight);
+    free(in->asked);
+    free(in->groups);
+    free(in->next);
     in->seen = NULL;
     in->rect = NULL;
     in->past = in->pending = NULL;
+    in->sight = NULL;
+    in->asked = NULL;
+    in->groups = NULL;
+    in->next = in->members = NULL;
     in->workers = 0;
+}
+
+static void blocks_create(struct lull_instance *fresh, const struct lull_frame *frame, struct base_err *why)
+{
+    const size_t n = frame->block_count;
+    fresh->rect = malloc(n * sizeof *fresh->rect);
+    fresh->past = calloc(2 * n, sizeof *fresh->past);
+    fresh->sight = calloc(n, sizeof *fresh->sight);
+    fresh->asked = calloc(n, sizeof *fresh->asked);
+    fresh->groups = malloc(n * sizeof *fresh->groups);
+    fresh->next = malloc(2 * n * sizeof *fresh->next);
+    if (!fresh->rect || !fresh->past || !fresh->sight || !fresh->asked || !fresh->groups || !fresh->next) {
+        base_fail_nomem(why, "the blocks");
+        return;
+    }
+    fresh->pending = fresh->past + n;
+    fresh->members = fresh->next + n;
+    for (uint32_t i = 0; i < n; i++)
+        fresh->rect[i] = *lull_kit_rect(frame, i);
 }
 
 /* Fills *fresh with what a frame needs. */
 static int32_t frame_create(const struct lull_instance *in, const struct lull_frame *frame, struct lull_instance *fresh,
                             struct lull_error *err)
 {
-    const size_t n = frame->block_count;
+    const uint32_t workers = lull_kit_workers(&in->kit);
     struct base_err why = {0};
-    fresh->form = gd_form_of(frame, (enum lull_oidn_quality)(LULL_OIDN_FAST + (int)in->kit.value[P_QUALITY]));
-    fresh->seen = calloc(lull_kit_workers(&in->kit), sizeof *fresh->seen);
-    fresh->rect = malloc(n * sizeof *fresh->rect);
-    fresh->past = calloc(2 * n, sizeof *fresh->past);
-    if (!fresh->seen || !fresh->rect || !fresh->past)
+    fresh->form = gd_form_of(frame, (enum lull_oidn_quality)(LULL_OIDN_FAST + (int)in->kit.value[P_QUALITY]), workers);
+    blocks_create(fresh, frame, &why);
+    fresh->seen = why.code ? NULL : calloc(workers, sizeof *fresh->seen);
+    if (!why.code && !fresh->seen)
         base_fail_nomem(&why, "the blocks");
-    fresh->pending = fresh->past ? fresh->past + n : NULL;
-    for (uint32_t i = 0; !why.code && i < n; i++)
-        fresh->rect[i] = *lull_kit_rect(frame, i);
-    for (uint32_t i = 0; !why.code && i < lull_kit_workers(&in->kit); i++)
-        if (!gd_block_view_create(&fresh->seen[i], &fresh->form, in->library, &why))
+    if (!why.code)
+        gd_look_open(&fresh->look, &fresh->form, in->library, &why);
+    for (uint32_t i = 0; !why.code && i < workers; i++)
+        if (!gd_block_view_create(&fresh->seen[i], &fresh->form, &why))
             fresh->workers = i + 1;
     if (!why.code)
         return LULL_OK;
@@ -212,10 +345,16 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     frame_release(in);
     in->form = fresh.form;
     in->workers = fresh.workers;
+    in->look = fresh.look;
     in->seen = fresh.seen;
     in->rect = fresh.rect;
     in->past = fresh.past;
     in->pending = fresh.pending;
+    in->sight = fresh.sight;
+    in->asked = fresh.asked;
+    in->groups = fresh.groups;
+    in->next = fresh.next;
+    in->members = fresh.members;
     atomic_flag_clear(&in->warned);
     lull_kit_frame_open(in, frame);
     if ((frame->planes & AUXILIARY) != AUXILIARY)
@@ -283,7 +422,8 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     gp_temporal_init(&in->temporal, &in->kit, P_FPS, P_PPD);
     in->kit.need.halo = GD_REACH;
     in->kit.need.checks_hint = 5;
-    in->kit.need.bytes_per_block = 2 * sizeof(struct past) + sizeof(struct lull_rect);
+    in->kit.need.bytes_per_block = 2 * sizeof(struct past) + sizeof(struct lull_rect) + sizeof(struct sight) +
+                                   sizeof(struct gd_group) + 2 * sizeof(uint32_t) + sizeof(uint8_t);
     *instance = in;
     return LULL_OK;
 }
