@@ -133,7 +133,8 @@ HOST_LIB := $(OUT)/lib/liblull-host.so.1
 EXAMPLES := $(BIN)/host-example
 DENOISER := $(OUT)/lib/lull/modules/lull-denoiser# a program that denoise/oidn.h runs
 IMAGES   := $(OUT)/lib/lull/modules/lull-images.so
-MODULES  := $(DENOISER) $(MPI_MODULE) $(IMAGES)
+JUDGE    := $(OUT)/lib/lull/modules/ggn-judge# what ggn starts for the commands that are Python
+MODULES  := $(DENOISER) $(MPI_MODULE) $(IMAGES) $(JUDGE)
 CRITERIA := $(EXAMPLE_SRC:plugin-api/examples/%.c=$(LIB)/%.so) $(GGN_ENTRIES:ggn/plugin/entry_%.c=$(LIB)/%.so)
 TESTS    := $(patsubst tests/%.c,$(OUT)/tests/%,$(TEST_SRC))
 SANE     := $(patsubst tests/%.c,build/asan/tests/%,$(SANE_SRC))
@@ -193,7 +194,7 @@ $(BIN)/lull-render: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(IMAGES
 $(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_CORE_OBJ) | $(IMAGES)
 	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
 # Their packages are found beside them where they are installed, else in the source tree.
-$(BIN)/lull-study $(BIN)/lull-plot: plugin-api/python/program | $(BIN)/ggn
+$(BIN)/lull-study $(BIN)/lull-plot $(JUDGE): plugin-api/python/program | $(BIN)/ggn
 	@install -D -m 755 $< $@
 # Of what both programs stand on the checker takes what it names.
 $(OBJ)/base.a: $(BASE_OBJ)
@@ -399,12 +400,12 @@ INSTALLED = $(call put,$(PREFIX)/bin,755,$(PROGRAMS) scripts/packages/lull-denoi
     $(call put,$(share)/man/man1,644,$(wildcard docs/man/*.1)) $(call put,$(share)/man/man7,644,$(wildcard docs/man/*.7)) \
     $(call put,$(share)/bash-completion/completions,644,$(wildcard scripts/packages/completions/*)) \
     $(call put,$(share)/lull,644,$(wildcard ggn/models/*.ggn)) \
-    $(call put,$(share)/lull/plot,644,$(wildcard plugin-api/python/lull/plot/*.py)) \
+    $(foreach p,judge plot,$(call put,$(share)/lull/$(p),644,$(wildcard plugin-api/python/lull/$(p)/*.py))) \
     $(call put,$(share)/lull/study,644,$(wildcard $(STUDY)/*.py)) \
     $(call put,$(share)/lull/study/page,644,$(wildcard $(STUDY)/page/*.*)) \
     $(call put,$(share)/lull/study/page/vendor,644,$(wildcard $(STUDY)/page/vendor/*))
 OWN_FOLDERS = $(libdir)/lull/modules $(libdir)/lull $(libdir)/cmake/lull $(PREFIX)/include/lull \
-    $(share)/lull/study/page/vendor $(share)/lull/study/page $(share)/lull/study $(share)/lull/plot $(share)/lull
+    $(share)/lull/study/page/vendor $(share)/lull/study/page $(share)/lull/study $(share)/lull/plot $(share)/lull/judge $(share)/lull
 # Where LIBDIR is elsewhere, this link: programs find their criteria and modules in ../lib/lull.
 OWN_LINK = $(filter-out $(libdir)/lull,$(PREFIX)/lib/lull)
 PC_FILES := $(OUT)/lull-criterion.pc $(OUT)/lull-host.pc

@@ -53,9 +53,8 @@ int ggn_feature_set_make(struct ggn_feature_set *t, const struct ggn_baseline *b
     if (t->first)
         t->first[s->n_blocks] = rows;
     t->x = malloc(rows * t->size * sizeof *t->x);
-    const struct ggn_eval_values made = {t->x, t->size * sizeof *t->x, t->first};
     int rc = !t->first || !t->x ? base_fail_nomem(err, "baseline")
-                                : ggn_eval_each_block(s, threads, extract_block, &j, &made, 1, err);
+                                : ggn_eval_each_block(s, threads, extract_block, &j, err);
     if (rc)
         ggn_feature_set_release(t);
     return rc;
@@ -229,17 +228,14 @@ int ggn_method_baseline(struct ggn_method *m, const struct ggn_eval_set *s, cons
                         const struct ggn_feature_set *features, struct base_threads *threads, struct base_err *err)
 {
     struct replaying j = {s, b, features, m};
-    int rc = ggn_method_init(m, s, ggn_baseline_titles[b->kind], 1, err);
+    int rc = ggn_method_init(m, s, ggn_baseline_titles[b->kind], 0, err);
     if (rc)
         return rc;
     m->cut = b->policy.threshold;
     m->passes = b->policy.passes;
-    const struct ggn_eval_values made = {m->score, sizeof *m->score, NULL};
-    rc = ggn_eval_each_block(s, threads, judge_block, &j, &made, 1, err);
+    rc = ggn_eval_each_block(s, threads, judge_block, &j, err);
     if (rc)
         ggn_method_release(m);
-    else
-        ggn_method_run(m, s);
     return rc;
 }
 

@@ -27,7 +27,7 @@ void ggn_feature_set_release(struct ggn_feature_set *features);
 int ggn_baseline_train(struct ggn_baseline *b, const struct ggn_feature_set *features, const struct ggn_eval_set *s,
                        enum ggn_split split, int epochs, struct base_err *err);
 
-/* Scores: p_noisy of every case; cut and passes are the policy's. Then runs. */
+/* Scores: p_noisy of every case; cut and passes are the policy's. */
 int ggn_method_baseline(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_baseline *b,
                         const struct ggn_feature_set *features, struct base_threads *threads, struct base_err *err);
 

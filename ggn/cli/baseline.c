@@ -42,14 +42,14 @@ static int kind_of(const char *name, enum ggn_baseline_kind *kind, struct base_e
 }
 
 static int save(const struct options *o, const struct ggn_baseline *b, const struct ggn_eval_set *s,
-                const struct ggn_method_metrics *m, struct base_err *err)
+                const struct ggn_method_figures *m, struct base_err *err)
 {
     cJSON *from = cJSON_CreateObject();
     int failed = !from;
     base_json_text(from, "labels", ggn_dataset_label_source(&s->images.data), &failed);
     base_json_number(from, "blocks", m->blocks, &failed);
     base_json_number(from, "scenes", m->scenes, &failed);
-    base_json_number(from, "windows", (double)m->cases, &failed);
+    base_json_number(from, "windows", (double)m->windows, &failed);
     base_json_number(from, "epochs", b->lstm ? o->epochs : 0, &failed);
     base_json_number(from, "early_rate_tuned_for", o->early, &failed);
     base_json_number(from, "training_auc", m->auc, &failed);
@@ -66,18 +66,18 @@ static int train(const struct options *o, enum ggn_baseline_kind kind, struct gg
     enum ggn_split split = ggn_eval_count(s, GGN_SPLIT_TRAIN) > 0 ? GGN_SPLIT_TRAIN : GGN_SPLIT_NONE;
     struct ggn_baseline b;
     struct ggn_method m;
-    struct ggn_method_metrics metrics;
+    struct ggn_method_figures figures;
     int rc = ggn_method_learned(&m, &b, s, kind, split, o->early, o->epochs, threads, err);
 
     if (rc)
         return rc;
-    rc = ggn_method_measure(&m, s, split, &metrics, err);
+    rc = ggn_method_measure(&m, s, split, &figures, err);
     if (!rc)
-        rc = save(o, &b, s, &metrics, err);
+        rc = save(o, &b, s, &figures, err);
     if (!rc)
         printf("%s: %d blocks of %d scenes; on these: AUC %.4f, early %.3f, samples %.3f; threshold %.4f\n%s\n",
-               ggn_baseline_titles[kind], metrics.blocks, metrics.scenes, metrics.auc, metrics.early_stop_rate,
-               metrics.samples_ratio, b.policy.threshold, o->out);
+               ggn_baseline_titles[kind], figures.blocks, figures.scenes, figures.auc, figures.early_stop_rate,
+               figures.samples_ratio, b.policy.threshold, o->out);
     ggn_method_release(&m);
     ggn_baseline_release(&b);
     return rc;

@@ -24,11 +24,13 @@
     X(convert, "store a model's weights in another type") \
     X(flip, "visible difference of two images (LDR-FLIP)") \
     X(visible, "where the noise of an image is still seen, against a reference") \
+    X(thresholds, "thresholds or stops of any file, as JSON") \
     X(compare, "stop maps or thresholds against (human) thresholds") \
     X(import, "pictures into block sequences") \
     X(label, "thresholds for recorded sequences: human, or a model observer's") \
     X(train, "train a stopping criterion on block sequences") \
     X(baseline, "train a published model before the network, as a criterion") \
+    X(replay, "what models answer on recorded sequences, as JSON") \
     X(evaluate, "figures of models and baselines on recorded sequences") \
     X(cost, "what accuracy costs each criterion on recorded sequences") \
     X(reconstruct, "the picture with each block at its threshold") \

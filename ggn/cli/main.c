@@ -106,19 +106,13 @@ static int part(const char *command, int status)
     return all;
 }
 
-/* These share out their work; another command would do it as often as there are processes. */
-static int is_shared(const struct command *command)
-{
-    return command->run == ggn_cmd_label || command->run == ggn_cmd_evaluate;
-}
-
 static int run(const struct command *command, int argc, char **argv)
 {
     struct base_err err = {0};
     if (job_open(&ggn_cmd_job, &err))
         return ggn_cmd_fail(argv[0], &err);
     job_watch(ggn_cmd_job, 0, &base_interrupted);
-    if (ggn_cmd_job && !is_shared(command)) {
+    if (ggn_cmd_job && command->run != ggn_cmd_label) { /* it shares out its work; others would do it once a process */
         base_fail(&err, BASE_EINVAL, "works in one process: start it without mpirun");
         return part(argv[0], ggn_cmd_fail(argv[0], &err));
     }

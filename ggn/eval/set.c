@@ -4,12 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "data/agree.h"
-#include "job/farm.h"
 #include "nn/ssim.h"
 #include "observer/curve.h"
 #include "observer/flip.h"
-#include "observer/observer.h"
 #include "sequence/simulate.h"
 #include "sequence/tail.h"
 
@@ -63,11 +60,6 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *er
     return 0;
 }
 
-double ggn_eval_compared(const struct ggn_eval_block *block, double spp)
-{
-    return block->split == GGN_SPLIT_PEOPLE ? ggn_observer_to_study(spp) : spp;
-}
-
 enum { COLUMNS = 11 };
 
 static int make_columns(struct ggn_eval_set *s, struct base_err *err)
@@ -98,85 +90,38 @@ static int make_columns(struct ggn_eval_set *s, struct base_err *err)
 /* --- blocks in parallel --- */
 
 struct each {
-    const struct ggn_eval_set *set;
     int (*fn)(void *, int, int, struct base_err *);
     void *data;
-    const struct ggn_eval_values *values;
-    int n_values;
     struct base_err *errs; /* [blocks] */
 };
 
-/* Where a block's values begin in bytes. */
-static size_t begin_of(const struct ggn_eval_set *s, const struct ggn_eval_values *v, int b)
-{
-    return v->size * (v->begin ? v->begin[b] : b < s->n_blocks ? s->blocks[b].first : s->n);
-}
-
-static int do_blocks(void *data, uint32_t first, uint32_t n, int thread, struct base_err *err)
+static void do_block(void *data, long b, int worker)
 {
     struct each *e = data;
-    for (uint32_t b = first; b < first + n; b++)
-        e->errs[b].code = e->fn(e->data, (int)b, thread, &e->errs[b]);
-    (void)err;
-    return 0;
-}
-
-/* A block's values to (or from) the bytes of an answer, one array after the other; returns how many. */
-static size_t move_values(const struct each *e, int b, void *to, const void *from)
-{
-    size_t at = 0;
-    for (int i = 0; i < e->n_values; i++) {
-        const size_t begin = begin_of(e->set, &e->values[i], b), bytes = begin_of(e->set, &e->values[i], b + 1) - begin;
-        char *values = (char *)e->values[i].values + begin;
-        if (to && bytes > 0)
-            memcpy((char *)to + at, values, bytes);
-        if (from && bytes > 0)
-            memcpy(values, (const char *)from + at, bytes);
-        at += bytes;
-    }
-    return at;
-}
-
-static int answer_block(void *data, struct job_task *task, uint32_t k, uint32_t n, void *answer, int thread,
-                        struct base_err *err)
-{
-    struct each *e = data;
-    const int b = (int)(task->first + k);
-    (void)n;
-    int rc = e->fn(e->data, b, thread, err);
-    if (!rc)
-        move_values(e, b, answer, NULL);
-    return rc;
-}
-
-static int apply_block(void *data, uint32_t b, const void *answer)
-{
-    move_values(data, (int)b, NULL, answer);
-    return 0;
+    e->errs[b].code = e->fn(e->data, (int)b, worker, &e->errs[b]);
 }
 
 int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *threads,
-                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data,
-                        const struct ggn_eval_values *values, int n_values, struct base_err *err)
+                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data, struct base_err *err)
 {
-    const int n = set->n_blocks;
-    struct each e = {set, fn, data, values, n_values, calloc((size_t)n, sizeof(struct base_err))};
-    struct job_farm farm = {.count = (uint32_t)n, .here = do_blocks, .apply = apply_block, .data = &e};
-    const struct job_service service = {answer_block, &e};
+    struct each e = {fn, data, calloc((size_t)set->n_blocks, sizeof(struct base_err))};
+    int rc = 0;
     if (!e.errs)
         return base_fail_nomem(err, "evaluation");
-    for (int b = 0; b < n; b++) {
-        const size_t bytes = (move_values(&e, b, NULL, NULL) + 7) / 8 * 8;
-        farm.answer_bytes = bytes > farm.answer_bytes ? bytes : farm.answer_bytes;
-    }
-    int rc = job_share(set->job, threads, &farm, &service, err);
-    for (int b = 0; b < n && !rc; b++)
+    base_threads_for(threads, set->n_blocks, do_block, &e);
+    for (int b = 0; b < set->n_blocks && !rc; b++)
         if (e.errs[b].code != 0)
             rc = base_fail(err, e.errs[b].code, "%s", e.errs[b].text);
     free(e.errs);
-    for (int i = 0; i < n_values && !rc; i++)
-        rc = job_broadcast(set->job, values[i].values, begin_of(set, &values[i], n));
-    return rc ? rc : job_failed(set->job, err);
+    return rc;
+}
+
+int ggn_eval_count(const struct ggn_eval_set *s, enum ggn_split split)
+{
+    int n = 0;
+    for (int b = 0; b < s->n_blocks; b++)
+        n += s->blocks[b].split == split;
+    return n;
 }
 
 /* --- statistics and quality --- */
@@ -458,7 +403,7 @@ static int extend(struct ggn_series_set *set, double cadence, uint32_t seed, str
 int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o, struct base_threads *threads, int *skipped,
                       struct base_err *err)
 {
-    struct ggn_eval_set s = {.window = o->window, .job = o->job};
+    struct ggn_eval_set s = {.window = o->window};
     struct ggn_series_set_options co = {.dir = o->dir,
                                         .split = o->split,
                                         .ratio = o->ratio,
@@ -466,7 +411,6 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
                                         .noise_maps = o->noise_maps,
                                         .measures = o->measures};
     struct fill f = {&s, o->quality, o->no_ssim};
-    struct ggn_eval_values columns[COLUMNS];
     int rc = ggn_series_set_load(&s.images, &co, err);
     if (rc)
         return rc;
@@ -476,12 +420,8 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
         rc = list_blocks(&s, skipped, err);
     if (!rc)
         rc = make_columns(&s, err);
-    for (size_t c = 0; c < COLUMNS && !rc; c++)
-        columns[c] = (struct ggn_eval_values){s.spp + c * s.n, sizeof *s.spp, NULL};
     if (!rc)
-        rc = ggn_agree(s.job, &s.images, o->files, o->n_files, base_threads_count(threads), err);
-    if (!rc)
-        rc = ggn_eval_each_block(&s, threads, fill_block, &f, columns, COLUMNS, err);
+        rc = ggn_eval_each_block(&s, threads, fill_block, &f, err);
     s.law = o->without_halves ? s.visible_means : s.visible;
     if (rc)
         ggn_eval_set_release(&s);

@@ -5,7 +5,6 @@
 #ifndef GGN_EVAL_SET_H
 #define GGN_EVAL_SET_H
 
-#include "job/job.h"
 #include "base/threads.h"
 #include "data/series.h"
 
@@ -20,12 +19,7 @@ struct ggn_eval_block {
     size_t first, end;      /* its cases */
 };
 
-/* spp as thresholds of this block are compared: those of views that people judged in samples of their study
- * (observer/observer.h), all others as they are. */
-double ggn_eval_compared(const struct ggn_eval_block *block, double spp);
-
 struct ggn_eval_set {
-    struct job *job;              /* borrows; NULL: alone */
     struct ggn_series_set images; /* owns: the images, continued beyond the recording where possible */
     int window;                   /* S: the first S-1 levels of a block make no case */
     int n_blocks, n_scenes;
@@ -54,9 +48,6 @@ struct ggn_eval_options {
     int noise_maps;           /* also make the noise maps (data/series.h) */
     int without_halves;       /* residual models judge as in a host without half buffers */
     int measures;             /* also measure the levels (data/series.h) */
-    struct job *job;          /* the processes that share out the blocks, all with the same data; NULL: alone */
-    const char *const *files; /* [n_files] what else must be the same for all of them (data/agree.h) */
-    int n_files;
 };
 
 /* Blocks without a label are left out; *skipped counts the views without any. BASE_EINVAL if nothing is left. Errors of the
@@ -66,18 +57,10 @@ int ggn_eval_set_load(struct ggn_eval_set *set, const struct ggn_eval_options *o
                       int *skipped, struct base_err *err);
 void ggn_eval_set_release(struct ggn_eval_set *set);
 
-/* Values that are made block by block: those of block b, of `size` bytes each, lie from begin[b] to begin[b + 1],
- * begin [n_blocks + 1]; NULL: one value for each case. */
-struct ggn_eval_values {
-    void *values;
-    size_t size;
-    const size_t *begin;
-};
-
-/* Calls fn for each block, in parallel and shared out to the processes of the job; returns the first error (in order of
- * blocks). What fn has put into values[n_values] all processes have then. */
+/* Calls fn for each block, in parallel; returns the first error (in order of blocks). */
 int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *threads,
                         int (*fn)(void *data, int block, int worker, struct base_err *err), void *data,
-                        const struct ggn_eval_values *values, int n_values, struct base_err *err);
+                        struct base_err *err);
+int ggn_eval_count(const struct ggn_eval_set *s, enum ggn_split split);
 
 #endif

@@ -15,6 +15,14 @@ struct run {
     const char *observer;
 };
 
+/* The observer that judges a view: from the file at `path`, without the view where it was fitted; NULL: built in. */
+static int observer_of(const char *path, const struct ggn_eval_set *s, const struct ggn_eval_block *block,
+                       struct ggn_observer *o, struct base_err *err)
+{
+    *o = ggn_observer_default;
+    return path ? ggn_observer_read(path, s->images.data.views[block->view].name, o, err) : 0;
+}
+
 /* log2 of the law's error: at cases as the set says, at the levels before them as they were measured. [n_levels] */
 static void list_law(const struct run *r, const struct ggn_eval_block *b, const struct ggn_observer *o, double *law)
 {
@@ -37,7 +45,7 @@ static int judge_by_law(const struct run *r, int index, struct ggn_viewer *viewe
     const int skipped = r->set->window - 1;
     struct ggn_observer o;
     double *law = malloc((size_t)c->n_levels * sizeof *law);
-    int rc = law ? ggn_method_observer_of(r->observer, r->set, b, &o, err) : base_fail_nomem(err, r->method->name);
+    int rc = law ? observer_of(r->observer, r->set, b, &o, err) : base_fail_nomem(err, r->method->name);
 
     if (!rc) {
         list_law(r, b, &o, law);
@@ -50,22 +58,6 @@ static int judge_by_law(const struct run *r, int index, struct ggn_viewer *viewe
         }
     }
     free(law);
-    return rc;
-}
-
-int ggn_eval_trained_stop(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_policy *p,
-                          const char *observer, struct base_err *err)
-{
-    const double stop = exp2((log(m->cut / (1 - m->cut)) - p->shift) / p->scale);
-    struct ggn_observer o;
-    int rc = 0;
-
-    for (int i = 0; i < s->n_blocks && !rc; i++) {
-        const struct ggn_eval_block *b = &s->blocks[i];
-        rc = ggn_method_observer_of(observer, s, b, &o, err);
-        if (!rc)
-            m->stop[i] = ggn_method_law_stop(&o, s, s->law, b, stop, m->correction, p->first_spp, p->ratio, NULL);
-    }
     return rc;
 }
 
@@ -102,23 +94,6 @@ static int check_halves(const struct ggn_eval_set *s, const char *name, struct b
     return 0;
 }
 
-static int init_method(struct ggn_method *m, const struct ggn_eval_set *s, const char *name,
-                       const struct ggn_stop_rule *rule, struct base_err *err)
-{
-    int rc = ggn_method_init(m, s, name, 1, err);
-
-    if (rc)
-        return rc;
-    m->correction = rule->reach > 0 ? calloc(s->n, sizeof *m->correction) : NULL;
-    if (rule->reach > 0 && !m->correction) {
-        ggn_method_release(m);
-        return base_fail_nomem(err, name);
-    }
-    m->cut = rule->policy.threshold;
-    m->passes = rule->policy.passes;
-    return 0;
-}
-
 int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model,
                      const struct ggn_policy *policy, const char *name, enum ggn_precision precision, const char *observer,
                      struct base_threads *threads, struct base_err *err)
@@ -132,9 +107,11 @@ int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const s
     if (window < 2 || window > GGN_WINDOW_MAX)
         return base_fail(err, BASE_EINVAL, "%s: windows of %d images; evaluation takes 2 to %d", name, window,
                          GGN_WINDOW_MAX);
-    int rc = init_method(m, s, name, &r.rule, err);
+    int rc = ggn_method_init(m, s, name, r.rule.reach > 0, err);
     if (rc)
         return rc;
+    m->cut = policy->threshold;
+    m->passes = policy->passes;
     r.viewers = calloc((size_t)workers, sizeof *r.viewers);
     if (!r.viewers)
         rc = base_fail_nomem(err, name);
@@ -142,18 +119,12 @@ int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const s
         rc = ggn_viewer_init(&r.viewers[made], model, precision, &s->images, err);
     if (!rc && r.rule.reach > 0)
         rc = check_halves(s, name, err);
-    const struct ggn_eval_values made_by_block[] = {{m->score, sizeof *m->score, NULL},
-                                                    {m->correction, sizeof *m->correction, NULL}};
     if (!rc)
-        rc = ggn_eval_each_block(s, threads, judge_block, &r, made_by_block, m->correction ? 2 : 1, err);
+        rc = ggn_eval_each_block(s, threads, judge_block, &r, err);
     for (int i = 0; i < made; i++)
         ggn_viewer_release(&r.viewers[i]);
     free(r.viewers);
-    if (!rc && r.rule.reach > 0)
-        rc = ggn_eval_trained_stop(m, s, policy, observer, err);
-    if (!rc && r.rule.reach <= 0)
-        ggn_method_run(m, s);
-    else if (rc)
+    if (rc)
         ggn_method_release(m);
     return rc;
 }

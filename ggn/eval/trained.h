@@ -8,17 +8,12 @@
 #include "model/policy.h"
 
 /*
- * Scores are p_noisy of every window that the policy's cadence makes; stops are those of the rule (model/stopper.h,
- * data/replay.h).
- * A residual model asks between levels too, where the law is known; it needs set->images.meter. observer: of its law, as for
- * ggn_method_observer.
+ * Scores are p_noisy of every window that the policy's cadence makes (data/replay.h); cut and passes are the policy's.
+ * A residual model asks between levels too, where the law is known; it needs set->images.meter. observer: of its law, a file
+ * (observer/observer.h) of which a view that had a part in the fit gets the parameters without it; NULL: built in.
  */
 int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model,
                      const struct ggn_policy *policy, const char *name, enum ggn_precision precision, const char *observer,
                      struct base_threads *threads, struct base_err *err);
-/* Sets the stops of a residual model's method once more, for another m->cut; what ggn_method_run is to other methods.
- * policy and observer: those that it was made with. */
-int ggn_eval_trained_stop(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_policy *policy,
-                          const char *observer, struct base_err *err);
 
 #endif

@@ -91,8 +91,6 @@ static uint16_t *denoised(struct ggn_viewer *v, int level, const int *needed, in
     return v->denoised[spare];
 }
 
-const uint16_t *ggn_viewer_denoise(struct ggn_viewer *v, int level) { return denoised(v, level, &level, 1); }
-
 /* What a residual model is told of a window. */
 static void tell(const struct ggn_viewer *v, const int *levels, float scalars[GGN_SCALARS])
 {

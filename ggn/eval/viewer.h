@@ -32,7 +32,5 @@ void ggn_viewer_release(struct ggn_viewer *v);
 void ggn_viewer_turn(struct ggn_viewer *v, const struct ggn_level_series *series);
 /* viewer: a struct ggn_viewer. Logit of the window of these levels, noisiest first. */
 double ggn_viewer_logit(void *viewer, const int *levels);
-/* One denoised level, borrowed until the next call. */
-const uint16_t *ggn_viewer_denoise(struct ggn_viewer *v, int level);
 
 #endif

@@ -22,7 +22,7 @@ CADENCES = (1.05, 1.15, 1.2565, 1.5, 2)
 
 def options(parser):
     parser.add_argument("--data", type=tool.path, default=os.path.join(ROOT, "data"),
-                        help="recordings of lab data-set (data): test views are replayed, of validation views block sizes are measured")
+                        help="recordings of lab data-set (data): test views are replayed")
     parser.add_argument("--render", type=tool.path, metavar="DIR", help="make the test views anew there first (hours)")
     parser.add_argument("--plan", type=tool.path, help="of --render (scripts/dataset.plan)")
     parser.add_argument("--people", type=tool.path, default=os.path.join(tool.SHARED, "human"), help="../shared/human")
@@ -87,11 +87,17 @@ def cost_of(out, folder, *options):
     return slim(json.loads(ggn("cost", "-d", os.path.join(WORK, folder), *options)), out)
 
 
+def measured_anew(out, name, folder, *options):
+    """A set. Thresholds of the blocks' parts stay those of before: what made them, `ggn cost --sizes`, is gone (commit 0a3aff1d)."""
+    found, before = cost_of(out, folder, *options), out["sets"].get(name, {})
+    out["sets"][name] = {**found, "parts": before["parts"]} if "parts" in before else found
+
+
 def replay(o, out):
     """The test views, labelled by the observer."""
     views = link_views(os.path.join(o.data, "test"), os.path.join(WORK, "data/test"))
     ggn("label", "--threads", o.threads, *views)
-    out["sets"]["test"] = cost_of(out, "data", "--sizes", "--threads", o.threads, *baselines(o))
+    measured_anew(out, "test", "data", "--threads", o.threads, *baselines(o))
     out["references"], foreign = {}, set()
     for view in views:
         manifest = manifest_of(view)
@@ -216,17 +222,6 @@ def cadence(o, out):
         out["cadence"]["%g" % ratio] = cost_of(out, "few", "--cadence", ratio, "--no-quality", "--threads", o.threads, "-m", o.model[0], *asked)
 
 
-def sizes(o, out):
-    """The limit of whole pictures: validation views of which every block was recorded."""
-    recorded_there = os.path.join(o.data, "validation")
-    if os.path.isdir(recorded_there):
-        views = link_views(recorded_there, os.path.join(WORK, "sizes/validation"))
-        ggn("label", "--threads", o.threads, *views)
-        data = json.loads(ggn("cost", "-d", os.path.join(WORK, "sizes"), "--split", "validation", "--sizes", "--no-quality",
-                              "--threads", o.threads))
-        out["sets"]["validation"] = {"parts": data["parts"]}
-
-
 def people(o, out):
     """The views that people judged, every one by an observer fitted to the others; two baselines also by their published thresholds."""
     views = os.path.join(o.people, "views")
@@ -235,7 +230,7 @@ def people(o, out):
     people_views(o.people, views, os.path.join(WORK, "people/people"))
     published = [x for k in ("SVD-Entropy", "26-attributes") for x in ("--thresholds", os.path.join(o.people, k + "-thresholds.csv"))]
     options = ("--split", "people", "--no-quality", "-O", "ggn/observer/observer.json")
-    out["sets"]["people"] = cost_of(out, "people", *options, "--sizes", "--threads", o.threads, *shipped(o), *baselines(o), *published)
+    measured_anew(out, "people", "people", *options, "--threads", o.threads, *shipped(o), *baselines(o), *published)
     judged(o, out, "people", *options, "--no-pictures", *shipped(o), folder="people")
 
 
@@ -448,7 +443,7 @@ def guards(o, out):
     out["guards"] = tool.load(path)
 
 
-STEPS = {"replay": replay, "recorded": recorded, "judge": judge, "early": early, "price": price, "real": real, "grow": grow, "sizes": sizes,
+STEPS = {"replay": replay, "recorded": recorded, "judge": judge, "early": early, "price": price, "real": real, "grow": grow,
          "cadence": cadence, "people": people, "precision": precision, "guards": guards}
 
 

@@ -26,7 +26,7 @@ d=$tmp/d one=$tmp/d/train/one-view0
 
 # --- options: help, and both bounds of every number ----------------------------------------------------------------------------
 says help --help
-for command in bench golden inspect convert flip visible compare import label train baseline evaluate cost reconstruct; do
+for command in bench golden inspect convert flip visible thresholds compare import label train baseline replay evaluate cost reconstruct; do
     says help "$command" --help
 done
 while read -r command options; do
@@ -37,12 +37,14 @@ golden base-r base-m base-d threads
 convert type
 flip ppd
 visible block
+thresholds block
 compare cap block
 import block
 label source spread threads
 train preset seed window kr km kd crop batch-denoiser batch steps-denoiser steps epochs epoch-steps patience lr-denoiser lr picture synthetic extend ratio validation-windows early-rate threads
 baseline epochs early ratio window type threads
-evaluate visible early epochs ratio window threads
+replay visible ratio window precision cadence threads
+evaluate visible early ratio window threads
 cost split precision ratio cadence threads
 END
 for value in passes=1 =1 passes passes=x none=1 visible=1.5 sixteen-letters-.=1; do says bounds evaluate -d none -p "$value"; done
@@ -96,8 +98,6 @@ run evaluate.near evaluate -d "$d" -m $model -m "$tmp/bf16.ggn" --baseline "$tmp
 for method in spp constant scenesmean halfbuf variance observer peoplecsv; do rm -f "$got"/evaluated.near/*-$method.*; done # as above
 # shellcheck disable=SC2086
 run evaluate-retuned.near evaluate -d "$d" -m $model $people --no-quality --retune --visible 0.4 -p passes=1 -p first-spp=12 --no-pictures
-# shellcheck disable=SC2086
-run evaluate-trained.near evaluate -d "$d" $people --no-quality --baselines --epochs 2 --json
 says evaluate-errors evaluate -d "$d" -w 4
 says evaluate-errors evaluate -d "$d" $people -w 10 --recorded
 says evaluate-errors evaluate -d "$d" -O "$tmp/o.json" -w 4 --thresholds "$tmp/h.csv"
@@ -107,8 +107,7 @@ run baseline-mask.near baseline noise-mask -d "$d" --type f16 -o "$tmp/n.ggn"
 
 # --- cost ------------------------------------------------------------------------------------------------------------------------
 run cost cost -d "$d" --split people $people -o "$got/cost.json"
-run cost-sizes cost -d "$d" --split train --recorded --no-quality --ratio 1.2 --sizes
-run cost-parts cost -d $data --split validation --recorded --no-quality --sizes --scores
+run cost-recorded cost -d "$d" --split train --recorded --no-quality --ratio 1.2
 run cost-cadence.near cost -d "$d" --split validation --cadence 1.7 -m $model --baseline "$tmp/a.ggn" --baseline "$tmp/n.ggn"
 run cost.near cost -d "$d" --split test -m $model --baseline "$tmp/a.ggn" --no-pictures
 run cost-scores.near cost -d "$d" --split train -m $model -m "$tmp/bf16.ggn" --scores --precision f64 --recorded

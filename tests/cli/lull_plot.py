@@ -39,7 +39,7 @@ a;2;400;1;400;0.6
 """
 SIZES = (("curves.csv", "curves", 1440, 400), ("blocks.csv", "scatter", 760, 720), ("blocks.csv", "histogram", 760, 480),
          ("blocks.csv", "maps", 780, 276), ("figures.json", "roc", 720, 680), ("figures.json", "scores", 900, 560),
-         ("figures.json", "strips", 1100, 1127), ("cost.json", "frontier", 1280, 480))
+         ("cost.json", "frontier", 1280, 480))
 
 
 def evaluation():
@@ -48,8 +48,7 @@ def evaluation():
     stops = [{"scene": "s", "view": "v", "block": n, "threshold": 100 * 2**n, "censored": n == 2, "spp": {"-spp": 90, "m.ggn": 120},
               "split": "validation", "column": n, "row": 0, "windows": windows} for n in range(3)]
     methods = {name: {"auc": 1, "cut": 0.5} for name in ("-spp", "m.ggn")}
-    return {"splits": {"validation": methods}, "stops": stops,
-            "strips": {"validation-denoiser.png": ["first", "second"], "validation-features.png": ["third"]}}
+    return {"splits": {"validation": methods}, "stops": stops}
 
 
 def cost():
@@ -172,13 +171,6 @@ def test_scores():
     assert [line.get_xdata()[0] for line in lines[3:6]] == [100, 200, 400] and list(lines[6].get_ydata()) == [0.5, 0.5]
 
 
-def test_strips():
-    """strips are cut from their pictures and have their titles"""
-    axes = kinds.strips(read("figures.json"), ANYTHING).axes
-    assert [a.get_title() for a in axes] == ["first", "second", "third"]
-    assert [a.images[0].get_array().shape[:2] for a in axes] == [(4, 12), (4, 12), (4, 16)]
-
-
 def test_frontier():
     """cost is the median over scenes of the ratio to the limit, quality their mean or median"""
     noisy, worst = kinds.frontier(read("cost.json"), ANYTHING).axes
@@ -193,7 +185,7 @@ def test_usage():
     refused("none.csv: No such file or directory", "none.csv", "-o", "no.png")
     refused("no.jpg: expected a name that ends in .png", "curves.csv", "-o", "no.jpg")
     refused("nowhere/no.png: cannot write there", "curves.csv", "-o", "nowhere/no.png")
-    refused("this is an input", "validation-denoiser.png", "-o", "./validation-denoiser.png")
+    refused("this is an input", "picture.png", "-o", "./picture.png")
     refused("--kind pie: expected curves, roc, ", "curves.csv", "-k", "pie", "-o", "no.png")
     refused("--kind roc: blocks.csv is good for scatter, histogram, maps", "blocks.csv", "-k", "roc", "-o", "no.png")
     refused("--split test: expected validation", "figures.json", "-s", "test", "-o", "no.png")
@@ -212,26 +204,11 @@ def test_bad_files():
         refused(words, "bad", "-o", "no.png")
 
 
-def test_bad_strips():
-    """strips that are gone, cut or others' are one line, status 2"""
-    write("alone.json", evaluation())
-    with open("validation-features.png", "rb") as file:
-        kept = file.read()
-    for content, words in ((kept[:50], "not a PNG"), (None, "No such file or directory")):
-        os.unlink("validation-features.png")
-        if content:
-            write("validation-features.png", content)
-        refused("validation-features.png: " + words, "alone.json", "-k", "strips", "-o", "no.png")
-    write("validation-features.png", kept)
-    write("validation-denoiser.png", png(12, 7))
-    refused("validation-denoiser.png: not the strips of alone.json", "alone.json", "-k", "strips", "-o", "no.png")
-
-
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         for name, content in (("curves.csv", CURVES), ("blocks.csv", BLOCKS), ("stops.csv", STOPS), ("figures.json", evaluation()),
-                              ("cost.json", cost()), ("validation-denoiser.png", png(12, 8)), ("validation-features.png", png(16, 4))):
+                              ("cost.json", cost()), ("picture.png", png(12, 8))):
             write(name, content)
         tap.main(globals())
         os.chdir("/")

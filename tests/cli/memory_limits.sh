@@ -53,7 +53,7 @@ cp -r $data "$tmp/data"
 swept "ggn label" "$BUILD/bin/ggn" label "$tmp/data"
 swept "ggn inspect" "$BUILD/bin/ggn" inspect $model
 swept "ggn visible" "$BUILD/bin/ggn" visible "$tmp/a.exr" "$tmp/b.exr"
-swept "ggn evaluate" "$BUILD/bin/ggn" evaluate --data $data -m $model --no-quality -o "$tmp/out/report"
+swept "ggn replay" "$BUILD/bin/ggn" replay --data $data -m $model --no-quality -o "$tmp/out/replay.json"
 swept "ggn train" "$BUILD/bin/ggn" train --data $data --kr 3 --km 3 --kd 4 --crop 32 --ratio 0 --batch 2 --steps-denoiser 2 --steps 2 \
     --epoch-steps 2 --out "$tmp/out/model.ggn" -q
 swept "ggn baseline" "$BUILD/bin/ggn" baseline svd-entropy --data $data --epochs 1 --ratio 1.3 --output "$tmp/out/svd.ggn"

@@ -26,7 +26,7 @@ lacking() {
 }
 printf 'a;100;200;400;800;1600;\nb;50;60;70;80;\n' >"$tmp/t.csv"
 printf 'a;100;400;380;100;1500;\nb;51;20;300;81;\n' >"$tmp/m.csv"
-lacking "compare" "$ggn" compare "$tmp/t.csv" "$tmp/m.csv" --json
+lacking "thresholds" "$ggn" thresholds "$tmp/t.csv" "$tmp/m.csv"
 lacking "inspect" "$ggn" inspect tests/data/tiny.ggn
 lacking "convert" "$ggn" convert tests/data/tiny.ggn "$tmp/b.ggn" --type bf16
 echo "1..$n"

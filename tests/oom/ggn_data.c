@@ -126,8 +126,9 @@ static int tables(struct base_err *err)
     static const char rawls_image[] = "IHDR\n12\n\1\0\0\0\1\0\0\0\1\0\0\0\nCOMMENTS\nDATA\n4\n\0\0\0\0\n";
     struct ggn_thresholds t;
     struct pic_image image;
-    struct ggn_agreement a;
-    const double x[] = {1, 2, 3}, y[] = {2, 1, 4};
+    const double x[] = {1, 2, 3};
+    const unsigned char label[] = {0, 1, 1};
+    double auc;
     int rc = ggn_thresholds_parse_csv("t.csv", text, &t, err);
     if (rc)
         return rc;
@@ -136,7 +137,7 @@ static int tables(struct base_err *err)
     if (rc)
         return rc;
     pic_release(&image);
-    return ggn_stats_agreement(x, y, 3, 10, &a, err);
+    return ggn_stats_auc(x, label, 3, &auc, err);
 }
 
 static int look(struct base_err *err)

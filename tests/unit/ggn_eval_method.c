@@ -87,105 +87,13 @@ static void cases(void **state)
         assert_true(set.flip[i + 1] < set.flip[i] && set.ssim[i + 1] > set.ssim[i]);
 }
 
-static void informed_scores(void **state)
-{
-    (void)state;
-    struct ggn_method spp, halfbuf, variance;
-    struct ggn_method_metrics a, b, c;
-    int available;
-    assert_int_equal(ggn_method_spp(&spp, &set, NULL), 0);
-    assert_int_equal(ggn_method_halfbuf(&halfbuf, &set, &available, NULL), 0);
-    assert_true(available);
-    assert_int_equal(ggn_method_variance(&variance, &set, &available, NULL), 0);
-    ggn_method_tune(&spp, &set, GGN_SPLIT_TRAIN, 0.0, NULL);
-    ggn_method_tune(&halfbuf, &set, GGN_SPLIT_TRAIN, 0.0, NULL);
-    ggn_method_tune(&variance, &set, GGN_SPLIT_TRAIN, 0.0, NULL);
-    ggn_method_measure(&spp, &set, GGN_SPLIT_TEST, &a, NULL);
-    ggn_method_measure(&halfbuf, &set, GGN_SPLIT_TEST, &b, NULL);
-    ggn_method_measure(&variance, &set, GGN_SPLIT_TEST, &c, NULL);
-    assert_true(b.auc > 0.99 && c.auc > 0.99 && a.auc < 0.93); /* noise / threshold is the same in all blocks */
-    assert_true(b.best_accuracy > a.best_accuracy);
-    assert_near(b.early_stop_rate, 0.0, 0.0);
-    assert_true(b.samples_ratio < 1.5 && b.samples_ratio > 1.0 && a.samples_ratio > b.samples_ratio);
-    assert_true(b.agreement.median_abs_log2 < 1.0); /* levels are an octave apart */
-    assert_int_equal(b.censored, 1);
-    assert_int_equal(b.agreement.blocks, BLOCKS - 1);
-    assert_int_equal(b.cases, BLOCKS * (LEVELS - WINDOW + 1) - 1);
-    /* Stopping where noise is equal costs less than uniform sampling that is as good everywhere. */
-    assert_true(b.samples_vs_uniform < 0.7 && b.time_vs_uniform < 0.7 && b.flip_worst >= b.flip_mean);
-    ggn_method_release(&spp);
-    ggn_method_release(&halfbuf);
-    ggn_method_release(&variance);
-}
-
-static void fixed_stops(void **state)
-{
-    (void)state;
-    struct ggn_method constant, oracle;
-    struct ggn_method_metrics m;
-    ggn_method_constant(&constant, &set, NULL);
-    assert_near(constant.stop[0], 230, 1e-6); /* median of the training scene alone */
-    assert_near(constant.stop[14], 230, 1e-6);
-    ggn_method_scene_mean(&oracle, &set, NULL);
-    assert_near(oracle.stop[5], 1.1 * (50 + 110 + 230 + 550) / 5.0 + 1280 / 5.0, 1e-6);
-    assert_true(oracle.is_oracle);
-    ggn_method_measure(&constant, &set, GGN_SPLIT_TRAIN, &m, NULL);
-    assert_true(isnan(m.auc));
-    assert_near(m.early_stop_rate, 0.4, 1e-12); /* 550 and the censored one */
-    assert_near(m.agreement.mae, (180 + 120 + 0 + 320) / 4.0, 1e-6);
-    ggn_method_release(&constant);
-    ggn_method_release(&oracle);
-    for (int i = 0; i < BLOCKS; i++)
-        set.blocks[i].split = GGN_SPLIT_NONE;
-    ggn_method_constant(&constant, &set, NULL);
-    assert_near(constant.stop[0], 1.1 * 230, 1e-6); /* without training scenes: of the validation scene */
-    ggn_method_release(&constant);
-    for (int i = 0; i < BLOCKS; i++)
-        set.blocks[i].split = GGN_SPLIT_TRAIN;
-}
-
 /* A method of these scores, [cases]. */
 static int made_up(struct ggn_method *m, const double *score)
 {
-    int rc = ggn_method_init(m, &set, "made up", 1, NULL);
+    int rc = ggn_method_init(m, &set, "made up", 0, NULL);
     if (!rc)
         memcpy(m->score, score, set.n * sizeof *score);
     return rc;
-}
-
-/* Passes in a row, guards, unjudged cases. */
-static void decisions(void **state)
-{
-    (void)state;
-    static double score[3 * BLOCKS * (LEVELS - WINDOW + 1)], guard[3 * BLOCKS * (LEVELS - WINDOW + 1)];
-    struct ggn_method m;
-    const struct ggn_eval_block *b = &set.blocks[0];
-    for (size_t i = 0; i < set.n; i++)
-        score[i] = 1.0;
-    score[b->first] = 0.2; /* one slip at 40 */
-    score[b->first + 1] = 0.9;
-    score[b->first + 2] = 0.1;
-    score[b->first + 3] = (double)NAN;
-    score[b->first + 4] = 0.1;
-    assert_int_equal(made_up(&m, score), 0);
-    m.cut = 0.5;
-    ggn_method_run(&m, &set);
-    assert_near(m.stop[0], 40, 0);
-    assert_near(m.stop[1], 1280, 0); /* never stopped: the last level */
-    m.passes = 2;
-    ggn_method_run(&m, &set);
-    assert_near(m.stop[0], 640, 0); /* 160, (320 not judged), 640 */
-    m.guard = guard;
-    guard[b->first + 2] = 0.01; /* a guard leaves the passes counted so far */
-    ggn_method_run(&m, &set);
-    assert_near(m.stop[0], 640, 0);
-    guard[b->first + 4] = 0.01;
-    ggn_method_run(&m, &set);
-    assert_near(m.stop[0], 1280, 0);
-    m.guard_limit = 0.01;
-    ggn_method_run(&m, &set);
-    assert_near(m.stop[0], 640, 0);
-    ggn_method_release(&m);
 }
 
 /* Blocks go on with the samples of their reference; one whose threshold is only known to lie beyond the recording does not. */
@@ -239,186 +147,117 @@ static void network(void **state)
         fail_msg("%s", err.text);
     for (size_t i = 0; i < set.n; i++)
         assert_near(m.score[i], 1.0 / (1.0 + exp(1.0)), 1e-6);
-    assert_near(m.stop[3], 80, 0); /* two passes: 40 and 80 */
+    assert_true(m.passes == 2 && m.cut == 0.5);
     ggn_method_release(&m);
     policy.ratio = 4; /* 20, 80, 320, 1280 */
     assert_int_equal(ggn_eval_trained(&m, &set, model, &policy, "empty", GGN_PRECISION_F32, NULL, threads, &err), 0);
     const struct ggn_eval_block *b = &set.blocks[0];
     for (size_t i = b->first; i < b->end; i++)
         assert_int_equal(isnan(m.score[i]), !(set.spp[i] == 80 || set.spp[i] == 320 || set.spp[i] == 1280));
-    assert_near(m.stop[3], 320, 0);
     ggn_method_release(&m);
     ggn_model_destroy(model);
 }
 
-static void one_class(void **state)
+static double stop_by_hand(const struct ggn_method *m, const struct ggn_eval_block *block, double cut)
 {
-    (void)state;
-    signed char keep[3 * BLOCKS * (LEVELS - WINDOW + 1)];
-    struct ggn_method m;
-    struct ggn_method_metrics metrics;
-    struct base_err err = {0};
-    memcpy(keep, set.noisy, set.n);
-    for (size_t i = 0; i < set.n; i++)
-        set.noisy[i] = 1; /* no negative label at all */
-    ggn_method_spp(&m, &set, NULL);
-    assert_int_equal(ggn_method_tune(&m, &set, GGN_SPLIT_TRAIN, 0.05, &err), 0);
-    assert_int_equal(ggn_method_measure(&m, &set, GGN_SPLIT_TEST, &metrics, &err), 0);
-    assert_true(isnan(metrics.auc) && isnan(metrics.auc_scene_mean) && !isnan(metrics.samples_ratio));
-    memcpy(set.noisy, keep, set.n);
-    assert_int_equal(ggn_method_measure(&m, &set, GGN_SPLIT_NONE, &metrics, &err), BASE_EINVAL);
-    ggn_method_release(&m);
-    struct ggn_eval_options o = {.dir = root, .window = LEVELS + 1, .recorded = 1};
-    struct ggn_eval_set none;
-    int skipped;
-    assert_int_equal(ggn_eval_set_load(&none, &o, threads, &skipped, &err), BASE_EINVAL);
-    assert_non_null(strstr(err.text, "a window needs 8"));
+    size_t i = block->first;
+    for (int row = 0; i < block->end; i++)
+        if (!isnan(m->score[i]) && (row = m->score[i] < cut ? row + 1 : 0) == m->passes)
+            return set.spp[i];
+    return block->cap;
 }
 
-/* Where a block stops by a cut and a limit of the guard, and what that costs a split. */
-static void cost(const struct ggn_method *m, enum ggn_split split, double cut, double limit, double *early, double *samples)
+/* What a cut costs a split. */
+static void cost(const struct ggn_method *m, enum ggn_split split, double cut, double *early, double *samples)
 {
+    double needed = 0;
     int n = 0;
     *early = *samples = 0;
     for (int b = 0; b < set.n_blocks; b++) {
         const struct ggn_eval_block *block = &set.blocks[b];
-        double stop = block->cap;
-        for (size_t i = block->first; i < block->end && block->split == split; i++)
-            if (m->score[i] < cut && !(m->guard && m->guard[i] > limit)) {
-                stop = set.spp[i];
-                break;
-            }
         if (block->split != split)
             continue;
+        const double stop = stop_by_hand(m, block, cut);
         n++;
         *samples += stop;
+        needed += block->label.threshold;
         *early += stop < 0.8 * block->label.threshold;
     }
     *early /= n;
+    *samples /= needed;
 }
 
-/* No other cut between two scores does better, whatever share of early stops is allowed. */
+/* No other cut between two scores does better, whatever share of early stops is allowed; and the figures are of that cut. */
 static void tuned_cuts_are_the_best(void **state)
 {
     (void)state;
-    static const double limits[] = {0.0, 1e-4, 1e-3, 1e-2, INFINITY};
-    static double score[3 * BLOCKS * (LEVELS - WINDOW + 1)], guard[3 * BLOCKS * (LEVELS - WINDOW + 1)];
+    static double score[3 * BLOCKS * (LEVELS - WINDOW + 1)];
     for (int k = 0; k < 12; k++) {
         double rate = (double)(k % 6) / 5.0, best_early = INFINITY, best_samples = INFINITY, early, samples;
+        struct ggn_method_figures f;
         struct ggn_method m;
-        for (size_t i = 0; i < set.n; i++) { /* falling, with slips; and a guard that now and then holds */
-            score[i] = 100.0 / set.spp[i] * exp(1.5 * ggn_noise_gauss((uint32_t)i, (uint32_t)k));
-            guard[i] = 3e-4 * exp(3.0 * ggn_noise_gauss((uint32_t)i, (uint32_t)k + 100)) * 100.0 / set.spp[i];
-        }
+        for (size_t i = 0; i < set.n; i++) /* falling, with slips, and not judged everywhere */
+            score[i] = i % 7 == 3 ? (double)NAN : 100.0 / set.spp[i] * exp(1.5 * ggn_noise_gauss((uint32_t)i, (uint32_t)k));
         assert_int_equal(made_up(&m, score), 0);
-        m.guard = k % 3 ? guard : NULL;
+        m.passes = 1 + k % 2;
         assert_int_equal(ggn_method_tune(&m, &set, GGN_SPLIT_VALIDATION, rate, NULL), 0);
-        for (size_t i = 0; i <= set.n; i++)
-            for (int g = m.guard ? 0 : 4; g < 5; g++) {
-                cost(&m, GGN_SPLIT_VALIDATION, i < set.n ? score[i] : INFINITY, limits[g], &early, &samples);
-                int fits = early <= rate, fitted = best_early <= rate;
-                if (fits > fitted || (fits == fitted && (fits ? samples < best_samples : early < best_early))) {
-                    best_early = early;
-                    best_samples = samples;
-                }
+        for (size_t i = 0; i <= set.n; i++) {
+            if (i < set.n && isnan(score[i]))
+                continue;
+            cost(&m, GGN_SPLIT_VALIDATION, i < set.n ? score[i] : INFINITY, &early, &samples);
+            int fits = early <= rate, fitted = best_early <= rate;
+            if (fits > fitted || (fits == fitted && (fits ? samples < best_samples : early < best_early))) {
+                best_early = early;
+                best_samples = samples;
             }
-        cost(&m, GGN_SPLIT_VALIDATION, m.cut, m.guard_limit, &early, &samples);
+        }
+        cost(&m, GGN_SPLIT_VALIDATION, m.cut, &early, &samples);
         assert_true(best_early <= rate ? early <= rate : early == best_early);
         if (best_early <= rate)
             assert_near(samples, best_samples, 0);
-        double run = 0;
-        for (int b = 0; b < set.n_blocks; b++)
-            run += set.blocks[b].split == GGN_SPLIT_VALIDATION ? m.stop[b] : 0.0;
-        assert_near(run, samples, 0);
+        assert_int_equal(ggn_method_measure(&m, &set, GGN_SPLIT_VALIDATION, &f, NULL), 0);
+        assert_true(f.blocks == BLOCKS && f.scenes == 1 && f.early_stop_rate == early && f.samples_ratio == samples);
         ggn_method_release(&m);
     }
 }
 
-/* Every figure of a method once more from its definition. */
-static void figures(void **state)
+/* The area under the curve from its definition: windows that show noise against those that do not. */
+static void area(void **state)
 {
     (void)state;
     struct ggn_method m;
-    struct ggn_method_metrics f;
+    struct ggn_method_figures f;
+    double pairs = 0, won = 0, cases = 0;
     assert_int_equal(made_up(&m, set.rse), 0);
     m.cut = 0.06;
-    ggn_method_run(&m, &set);
-    for (int b = 0; b < set.n_blocks; b++) /* time is no multiple of samples */
-        for (size_t i = set.blocks[b].first; i < set.blocks[b].end; i++)
-            set.seconds[i] *= 1.0 + b;
     assert_int_equal(ggn_method_measure(&m, &set, GGN_SPLIT_TEST, &f, NULL), 0);
-    double needed = 0, spent = 0, time = 0, early = 0, flip = 0, ssim = 0, worst = 0, least = 1, right = 0, cases = 0,
-           pairs = 0, won = 0;
-    for (int b = 10; b < 15; b++) {
-        const struct ggn_eval_block *block = &set.blocks[b];
-        size_t at = block->first;
-        while (at + 1 < block->end && set.rse[at] >= m.cut)
-            at++;
-        assert_near(m.stop[b], set.spp[at], 0);
-        needed += block->label.threshold;
-        spent += set.spp[at];
-        time += set.seconds[at];
-        early += set.spp[at] < 0.8 * block->label.threshold;
-        flip += set.flip[at] / BLOCKS;
-        ssim += set.ssim[at] / BLOCKS;
-        worst = fmax(worst, set.flip[at]);
-        least = fmin(least, set.ssim[at]);
-        for (size_t i = block->first; i < block->end; i++)
-            if (set.noisy[i] >= 0) {
-                cases++;
-                right += (set.rse[i] >= m.cut) == set.noisy[i];
-                for (size_t k = set.blocks[10].first; k < set.blocks[14].end && set.noisy[i] == 1; k++)
-                    if (set.noisy[k] == 0) {
-                        pairs++;
-                        won += set.rse[i] > set.rse[k] ? 1.0 : set.rse[i] == set.rse[k] ? 0.5 : 0.0;
-                    }
+    for (size_t i = set.blocks[10].first; i < set.blocks[14].end; i++) {
+        cases += set.noisy[i] >= 0;
+        for (size_t k = set.blocks[10].first; k < set.blocks[14].end && set.noisy[i] == 1; k++)
+            if (set.noisy[k] == 0) {
+                pairs++;
+                won += set.rse[i] > set.rse[k] ? 1.0 : set.rse[i] == set.rse[k] ? 0.5 : 0.0;
             }
     }
-    assert_true(f.blocks == BLOCKS && f.scenes == 1 && f.cases == (size_t)cases);
-    assert_near(f.accuracy, right / cases, 1e-12);
+    assert_true(f.windows == (size_t)cases);
     assert_near(f.auc, won / pairs, 1e-12);
-    assert_near(f.auc_scene_mean, f.auc, 1e-12);
-    assert_near(f.early_stop_rate, early / BLOCKS, 1e-12);
-    assert_near(f.samples_ratio, spent / needed, 1e-12);
-    assert_near(f.flip_mean, flip, 1e-12);
-    assert_near(f.ssim_mean, ssim, 1e-12);
-    assert_near(f.flip_worst, worst, 0);
-    assert_near(f.ssim_worst, least, 0);
-    /* the first count at which all blocks, and at all counts after it, are as good as the worst at its stop */
-    size_t k = LEVELS - WINDOW;
-    for (int good = 1; good && k > 0; k -= (size_t)good)
-        for (int b = 10; b < 15; b++)
-            good &= set.flip[set.blocks[b].first + k - 1] <= worst;
-    double uniform = 0, uniform_time = 0;
-    for (int b = 10; b < 15; b++) {
-        uniform += set.spp[set.blocks[b].first + k];
-        uniform_time += set.seconds[set.blocks[b].first + k];
-    }
-    assert_near(f.uniform_spp, set.spp[set.blocks[10].first + k], 0);
-    assert_near(f.samples_vs_uniform, spent / uniform, 1e-12);
-    assert_near(f.time_vs_uniform, time / uniform_time, 1e-12);
-    assert_true(fabs(f.time_vs_uniform - f.samples_vs_uniform) > 1e-3);
-    for (int b = 0; b < set.n_blocks; b++)
-        for (size_t i = set.blocks[b].first; i < set.blocks[b].end; i++)
-            set.seconds[i] /= 1.0 + b;
     ggn_method_release(&m);
 }
 
-/* The scale of the criterion halfbuf: √(area of the block / area of the picture), of blocks that are not square. */
-static void errors_of_the_criteria(void **state)
+static void refused(void **state)
 {
     (void)state;
-    struct ggn_method halfbuf, variance;
-    int available;
-    assert_int_equal(ggn_method_halfbuf(&halfbuf, &set, &available, NULL), 0);
-    assert_int_equal(ggn_method_variance(&variance, &set, &available, NULL), 0);
-    for (size_t i = 0; i < set.n; i++) {
-        assert_near(halfbuf.score[i], set.dammertz[i] / sqrt(BLOCKS), 1e-12);
-        assert_near(variance.score[i], set.rse[i], 0);
-    }
-    assert_true(halfbuf.guard == set.half_unsettled && variance.guard == set.rse_unsettled);
-    ggn_method_release(&halfbuf);
-    ggn_method_release(&variance);
+    struct ggn_eval_options o = {.dir = root, .window = LEVELS + 1, .recorded = 1};
+    struct base_err err = {0};
+    struct ggn_eval_set none;
+    struct ggn_method m;
+    int skipped;
+    assert_int_equal(ggn_eval_set_load(&none, &o, threads, &skipped, &err), BASE_EINVAL);
+    assert_non_null(strstr(err.text, "a window needs 8"));
+    assert_int_equal(made_up(&m, set.rse), 0);
+    assert_int_equal(ggn_method_tune(&m, &set, GGN_SPLIT_NONE, 0.05, &err), BASE_EINVAL);
+    assert_non_null(strstr(err.text, "nothing to tune on in the split 'none'"));
+    ggn_method_release(&m);
 }
 
 /* Beyond the recording noise falls with the root of the samples, time rises with them; what the guard counts is counted anew. */
@@ -475,15 +314,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(cases),
-        cmocka_unit_test(informed_scores),
-        cmocka_unit_test(fixed_stops),
-        cmocka_unit_test(decisions),
         cmocka_unit_test(continued),
         cmocka_unit_test(network),
-        cmocka_unit_test(one_class),
         cmocka_unit_test(tuned_cuts_are_the_best),
-        cmocka_unit_test(figures),
-        cmocka_unit_test(errors_of_the_criteria),
+        cmocka_unit_test(area),
+        cmocka_unit_test(refused),
         cmocka_unit_test(beyond_the_recording),
     };
     return cmocka_run_group_tests_name("eval_method", tests, setup, teardown);

@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.image import imread
 from matplotlib.ticker import MaxNLocator
 
 from ..study.files import Refused
@@ -175,28 +174,6 @@ def maps(source: Any, wanted: Wanted) -> Figure:
     return figure
 
 
-# --- strips ---
-
-def strips(e: Evaluation, wanted: Wanted) -> Figure:
-    """What a model's networks make of blocks: pictures that ggn evaluate left beside its figures, with their titles."""
-    found: list[tuple[np.ndarray, str]] = []
-    for path, titles in e.strips(wanted):
-        try:
-            image = imread(path)
-        except (OSError, SyntaxError, ValueError) as error:
-            raise Refused(f"{path}: {getattr(error, 'strerror', None) or 'not a PNG'}") from None
-        if not titles or len(image) % len(titles):
-            raise Refused(f"{path}: not the strips of {e.path}")
-        found += zip(np.split(image, len(titles)), titles)
-    figure = new_figure(1100, sum(40 + 1100 * image.shape[0] // image.shape[1] for image, _ in found))
-    for n, (image, title) in enumerate(found):
-        axes = figure.add_subplot(len(found), 1, n + 1)
-        axes.imshow(image, interpolation="nearest")
-        axes.set_title(title, fontsize=9)
-        axes.set_axis_off()
-    return figure
-
-
 # --- cost ---
 
 PANELS = {"noisy": ("share of blocks that still show noise", statistics.fmean, 0, (0, 1)),
@@ -243,4 +220,4 @@ def frontier(cost: Cost, _: Wanted) -> Figure:
 
 KINDS: dict[str, Callable[[Any, Wanted], Figure]] = {
     "curves": curves, "roc": roc, "scatter": scatter, "histogram": histogram, "maps": maps, "scores": scores,
-    "strips": strips, "frontier": frontier}
+    "frontier": frontier}

@@ -10,7 +10,7 @@ from ..study.files import Refused, check_output
 from ..study.options import Command, Option, finish, parse, word
 from .sources import Wanted, read
 
-NAMES = ("curves", "roc", "scatter", "histogram", "maps", "scores", "strips", "frontier")
+NAMES = ("curves", "roc", "scatter", "histogram", "maps", "scores", "frontier")
 COMMAND = Command(
     "lull-plot", "FILE -o PICTURE.png", 1, 1,
     "Draws the numbers that ggn writes: learning curves, ROC curves, thresholds, what accuracy costs.",
@@ -19,7 +19,7 @@ COMMAND = Command(
      Option("split", "NAME", "of ggn evaluate: which scenes (test, or the first there is)", letter="s"),
      Option("method", "NAME", "of ggn evaluate: whose decisions (the last one's; roc: everybody's)", letter="m")),
     "FILE is FILE.ggn.csv of a training (curves), blocks.csv of ggn compare (scatter, histogram, maps),\n"
-    "figures.json of ggn evaluate (roc, scatter, histogram, maps, scores, strips), its stops\n"
+    "figures.json of ggn evaluate (roc, scatter, histogram, maps, scores), its stops\n"
     "(scatter, histogram), or what ggn cost wrote (frontier).")
 
 

@@ -83,8 +83,7 @@ class Evaluation:
         self.path, self.figures = path, figures
 
     def kinds(self) -> Sequence[str]:
-        strips = ("strips",) if self.figures.get("strips") else ()
-        return ("roc", "scatter", "histogram", "maps", "scores", *strips)
+        return ("roc", "scatter", "histogram", "maps", "scores")
 
     def split(self, wanted: Wanted) -> str:
         return chosen("split", wanted.split, list(self.figures["splits"]), "test")
@@ -114,13 +113,6 @@ class Evaluation:
 
     def cut(self, split: str, method: str) -> float:
         return number(self.figures["splits"][split][method].get("cut"))
-
-    def strips(self, wanted: Wanted) -> list[tuple[str, Sequence[str]]]:
-        """(file, titles of its strips) of a split."""
-        split = chosen("split", wanted.split, sorted({name.split("-")[0] for name in self.figures["strips"]}), "test")
-        folder = os.path.dirname(self.path)
-        return [(os.path.join(folder, os.path.basename(name)), titles) for name, titles in self.figures["strips"].items()
-                if name.split("-")[0] == split]
 
 
 class Cost:

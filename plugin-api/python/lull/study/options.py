@@ -75,7 +75,7 @@ def _answer(command: Command, rows: Sequence[Option], what: str) -> str:
     if what == "usage":
         words = f"Usage: {command.name} {' '.join(f'[{form}]' for form in forms)} {command.arguments}"
         return textwrap.fill(words, margin, subsequent_indent=" " * 12, break_on_hyphens=False)
-    lines = [f"Usage: {command.name} [OPTION...] {command.arguments}"]
+    lines = [f"Usage: {command.name} [OPTION...] {command.arguments}".rstrip()]
     lines += [*textwrap.wrap(command.doc, margin, break_on_hyphens=False), ""]
     for option, form in zip(rows, forms):
         head = (f"  -{option.letter}, " if option.letter else " " * 6) + form
@@ -97,7 +97,8 @@ def _refuse(error: getopt.GetoptError) -> Refused:
 
 def parse(command: Command, arguments: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
     """(arguments, options that were given by name, '-' as '_'). Answers --help and the like itself, and exits."""
-    rows = [*sorted(command.options), *OWN]
+    taken = {o.letter for o in command.options}
+    rows = [*sorted(command.options), *(o._replace(letter="") if o.letter in taken else o for o in OWN)]
     found: dict[str, Any] = {}
     try:
         letters = "".join(o.letter + (":" if o.value else "") for o in rows if o.letter)
@@ -106,7 +107,7 @@ def parse(command: Command, arguments: Sequence[str]) -> tuple[list[str], dict[s
         raise _refuse(error) from None
     for name, text in given:
         option = next(o for o in rows if name in ("--" + o.name, "-" + o.letter))
-        if option in OWN:
+        if option.name in [o.name for o in OWN]:
             print(_answer(command, rows, option.name))
             raise SystemExit(0)
         try:
@@ -134,14 +135,17 @@ def finish(command: str, run: Callable[[], None], packages: str) -> int:
         status, why = 2, f"{error.name} is needed: {packages}"
     except MemoryError:
         status, why = 1, "out of memory"
-    except (SystemExit, BrokenPipeError):  # --help was answered; nobody listens, which the flush below finds again
+    except SystemExit:  # --help was answered
         pass
+    except OSError as error:
+        status, why = 2, f"{error.filename}: {error.strerror}" if error.filename else "cannot write standard output"
     if status:
         print(f"{command}: {why}", file=sys.stderr)
     try:
         sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more is tried at the end
-        print(f"{command.split()[0]}: cannot write standard output", file=sys.stderr)
+        if not status:
+            print(f"{command}: cannot write standard output", file=sys.stderr)
         return status or 2
     return status

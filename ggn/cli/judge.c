@@ -1,0 +1,39 @@
+/* `ggn evaluate`, `ggn cost`, `ggn compare`: statistics of what `ggn replay` prints, and of thresholds. */
+#include "cli/judge.h"
+
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "cli/commands.h"
+
+static const char place[] = "../lib/lull/modules/ggn-judge";
+
+int ggn_cmd_judge(int argc, char **argv)
+{
+    char ggn[PATH_MAX], program[PATH_MAX + sizeof place];
+    struct base_err err = {0};
+    ssize_t n = readlink("/proc/self/exe", ggn, sizeof ggn - 1);
+    char **words = calloc((size_t)argc + 3, sizeof *words);
+    if (!words)
+        base_fail_nomem(&err, argv[0]);
+    else if (n <= 0)
+        base_fail(&err, BASE_EIO, "/proc/self/exe cannot be read");
+    else {
+        ggn[n] = '\0';
+        snprintf(program, sizeof program, "%.*s%s", (int)(strrchr(ggn, '/') + 1 - ggn), ggn, place);
+        words[0] = program;
+        words[1] = ggn;
+        memcpy(words + 2, argv, (size_t)argc * sizeof *words);
+        execv(program, words);
+        base_fail(&err, BASE_EIO, "no program ggn-judge in lib/lull/modules, or no /usr/bin/python3 that runs it");
+    }
+    free(words);
+    return ggn_cmd_fail(argv[0], &err);
+}
+
+int ggn_cmd_evaluate(int argc, char **argv) { return ggn_cmd_judge(argc, argv); }
+int ggn_cmd_cost(int argc, char **argv) { return ggn_cmd_judge(argc, argv); }
+int ggn_cmd_compare(int argc, char **argv) { return ggn_cmd_judge(argc, argv); }
