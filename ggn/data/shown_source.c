@@ -1,29 +1,15 @@
 #include "data/shown_source.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-/* The next A or A-B of a list of them: returns what follows, or NULL where there is none or it is not well formed. It moves
- * no pointer of the caller: GCC 14.2 compiles that wrongly (-ftree-pre), and `0` would be no list of block 0. */
-static const char *next_item(const char *at, unsigned long *lo, unsigned long *hi)
-{
-    char *end;
-    if (*at < '0' || *at > '9')
-        return NULL;
-    *lo = *hi = strtoul(at, &end, 10);
-    if (*end == '-' && end[1] >= '0' && end[1] <= '9')
-        *hi = strtoul(end + 1, &end, 10);
-    if (*end == ',' && end[1] != '\0')
-        return end + 1;
-    return *end == '\0' ? end : NULL;
-}
+#include "base/list.h"
 
 static int is_list(const char *at)
 {
     unsigned long lo, hi;
     do
-        at = next_item(at, &lo, &hi);
+        at = base_list_next(at, &lo, &hi, NULL);
     while (at && *at != '\0');
     return at != NULL;
 }
@@ -50,7 +36,7 @@ int ggn_shown_source_has(const struct ggn_shown_source *s, uint32_t id)
 {
     unsigned long lo, hi;
     for (const char *at = s->blocks; at && *at != '\0';)
-        if ((at = next_item(at, &lo, &hi)) && id >= lo && id <= hi)
+        if ((at = base_list_next(at, &lo, &hi, NULL)) && id >= lo && id <= hi)
             return 1;
     return !s->blocks;
 }
@@ -67,7 +53,7 @@ int ggn_shown_source_check(const struct ggn_shown_source *s, const struct ggn_sh
 {
     unsigned long lo, hi;
     for (const char *at = s->blocks; at && *at != '\0';)
-        if ((at = next_item(at, &lo, &hi)) && (!has_block(view, lo) || !has_block(view, hi)))
+        if ((at = base_list_next(at, &lo, &hi, NULL)) && (!has_block(view, lo) || !has_block(view, hi)))
             return base_fail(err, BASE_EINVAL, "%s: has no block %lu", s->folder, has_block(view, lo) ? hi : lo);
     return 0;
 }

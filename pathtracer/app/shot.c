@@ -7,6 +7,7 @@
 
 #include "actions.h"
 #include "base/files.h"
+#include "base/list.h"
 #include "base/options.h"
 #include "render/checkpoint.h"
 #include "render/output.h"
@@ -29,39 +30,23 @@ static int add_frame(struct pt_shot *s, long frame, size_t *room, struct base_er
     return 0;
 }
 
-/* A number of the list and what stands behind it. */
-static int number(const char **at, long *out)
-{
-    char *end;
-    if (**at < '0' || **at > '9')
-        return 0;
-    *out = strtol(*at, &end, 10);
-    *at = end;
-    return *out <= PT_SHOT_LAST_FRAME;
-}
-
 int pt_shot_parse_frames(const char *text, struct pt_shot *s, struct base_err *err)
 {
     size_t room = 0;
+    unsigned long first, last, step;
     const char *at = text;
-    for (;;) {
-        long first, last, step = 1;
-        int good = number(&at, &first);
-        last = first;
-        if (good && *at == '-')
-            good = (at++, number(&at, &last)) && last >= first;
-        if (good && *at == ':')
-            good = (at++, number(&at, &step)) && step > 0;
-        if (!good || (*at != ',' && *at != '\0') || (s->count > 0 && first <= s->frames[s->count - 1]))
+    do {
+        at = base_list_next(at, &first, &last, &step);
+        if (!at || last < first || last > PT_SHOT_LAST_FRAME || step == 0 || step > PT_SHOT_LAST_FRAME ||
+            (s->count > 0 && first <= (unsigned long)s->frames[s->count - 1]))
             return base_fail(err, BASE_EINVAL, "--frames %s: expected a rising list like 1-24, 1,5,9 or 1-24:2", text);
-        if ((last - first) / step >= FRAMES_MAX - (long)s->count)
+        if ((last - first) / step >= FRAMES_MAX - s->count)
             return base_fail(err, BASE_EINVAL, "--frames %s: more than %d frames", text, FRAMES_MAX);
-        for (long frame = first; frame <= last; frame += step)
-            if (add_frame(s, frame, &room, err) != 0)
+        for (unsigned long frame = first; frame <= last; frame += step)
+            if (add_frame(s, (long)frame, &room, err) != 0)
                 return BASE_ENOMEM;
-        if (*at++ == '\0')
-            return 0;
-    }
+    } while (*at != '\0');
+    return 0;
 }
 
 /* --- the camera's path ---------------------------------------------------------------------------------------------- */

@@ -8,6 +8,7 @@
 
 #include "base/clock.h"
 #include "base/files.h"
+#include "base/list.h"
 #include "base/lock.h"
 #include "base/text.h"
 #include "base/version.h"
@@ -43,27 +44,17 @@ int pt_sequence_levels(const char *text, uint32_t spp[PT_SEQUENCE_MAX_LEVELS], s
 
 int pt_sequence_choose(const char *text, uint8_t *chosen, uint32_t count, struct base_err *err)
 {
-    for (const char *p = text;;) {
-        char *end;
-        unsigned long first = strtoul(p, &end, 10), last = first;
-        if (end == p || *p < '0' || *p > '9')
-            break;
-        if (*end == '-') {
-            p = end + 1;
-            last = strtoul(p, &end, 10);
-            if (end == p || *p < '0' || *p > '9')
-                break;
-        }
+    unsigned long first, last;
+    const char *at = text;
+    do {
+        at = base_list_next(at, &first, &last, NULL);
+        if (!at)
+            return base_fail(err, BASE_EINVAL, "--blocks %s: expected a list like 0,3,8-11", text);
         if (first > last || last >= count)
             return base_fail(err, BASE_EINVAL, "--blocks %s: blocks are 0 to %u here", text, count - 1);
         memset(chosen + first, 1, last - first + 1);
-        if (*end == '\0')
-            return 0;
-        if (*end != ',')
-            break;
-        p = end + 1;
-    }
-    return base_fail(err, BASE_EINVAL, "--blocks %s: expected a list like 0,3,8-11", text);
+    } while (*at != '\0');
+    return 0;
 }
 
 struct recorder {

@@ -27,7 +27,5 @@ static inline pt_vec3 pt_mat34_normal(const struct pt_mat34 *inv, pt_vec3 n)
     return v3(m[0] * n.x + m[4] * n.y + m[8] * n.z, m[1] * n.x + m[5] * n.y + m[9] * n.z,
               m[2] * n.x + m[6] * n.y + m[10] * n.z);
 }
-/* Inverse in double; 0 and *inv untouched when singular, else 1. */
-int pt_mat34_invert(const struct pt_mat34 *t, struct pt_mat34 *inv);
 
 #endif

@@ -25,15 +25,6 @@ int pt_media_build(struct pt_scene *scene, struct base_err *err)
     return 0;
 }
 
-pt_effects pt_medium_effects(const struct pt_scene *scene, int32_t id)
-{
-    const struct pt_medium *m = &scene->media[id];
-    pt_effects fx = PT_FX_ABSORPTION; /* any medium: segments inside it are attenuated */
-    if (!v3_is_black(m->sigma_s))
-        fx |= PT_FX_SCATTERING;
-    return m->kind == PT_MEDIUM_GRID ? fx | PT_FX_GRID_MEDIUM : fx;
-}
-
 /* One channel is chosen uniformly and gives the distance; the weight is the balance heuristic over the three (one-sample
  * MIS), so grey media have constant weights. */
 static void homogeneous_sample(const struct pt_medium *m, float t_max, struct pt_rng *rng, struct pt_medium_event *event)

@@ -24,9 +24,6 @@ struct pt_medium_event {
 /* Makes the majorants of grid media in the scene's arena. Call once after media are filled. */
 int pt_media_build(struct pt_scene *scene, struct base_err *err);
 
-/* Effects that medium `id` needs. */
-pt_effects pt_medium_effects(const struct pt_scene *scene, int32_t id);
-
 /* Samples the distance to the next scattering within [0, t_max]; t_max may be INFINITY. Media that only absorb use no random
  * number and never scatter. */
 void pt_medium_sample_distance(const struct pt_medium *medium, pt_vec3 origin, pt_vec3 direction, float t_max,

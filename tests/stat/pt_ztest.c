@@ -15,6 +15,7 @@
 #include "pbrt/load.h"
 #include "scene/settings.h"
 #include "support/pt_scenes.h"
+#include "support/pt_mat34.h"
 
 enum { TILES = 8 }; /* per side */
 

@@ -34,6 +34,16 @@ void test_scene_begin(struct pt_scene *scene)
     scene->camera.medium = -1;
 }
 
+/* Of any medium: segments inside it are attenuated. */
+static pt_effects medium_effects(const struct pt_scene *scene, int32_t id)
+{
+    const struct pt_medium *m = &scene->media[id];
+    pt_effects fx = PT_FX_ABSORPTION;
+    if (!v3_is_black(m->sigma_s))
+        fx |= PT_FX_SCATTERING;
+    return m->kind == PT_MEDIUM_GRID ? fx | PT_FX_GRID_MEDIUM : fx;
+}
+
 void test_scene_finish(struct pt_scene *scene)
 {
     struct base_err err = {0};
@@ -58,7 +68,7 @@ void test_scene_finish(struct pt_scene *scene)
                           : scene->lights[i].kind <= PT_LIGHT_ENV_IMAGE ? PT_FX_ENVIRONMENT
                                                                         : PT_FX_DELTA_LIGHT;
     for (int32_t i = 0; i < scene->medium_count; i++)
-        scene->effects |= pt_medium_effects(scene, i);
+        scene->effects |= medium_effects(scene, i);
     scene->effects |= (scene->light_count > 1 ? PT_FX_MANY_LIGHTS : 0) | (scene->instance_count ? PT_FX_INSTANCES : 0) |
                       (scene->camera.lens_radius > 0.0f ? PT_FX_DEFOCUS : 0) | (scene->camera.animated ? PT_FX_MOTION : 0);
 }

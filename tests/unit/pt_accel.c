@@ -12,6 +12,7 @@
 #include "integ/surface.h"
 #include "sample/rng.h"
 #include "support/pt_scenes.h"
+#include "support/pt_mat34.h"
 
 static struct pt_ray ray_to(pt_vec3 origin, pt_vec3 direction)
 {

@@ -15,6 +15,7 @@
 #include "shade/light_select.h"
 #include "shade/warp.h"
 #include "support/pt_scenes.h"
+#include "support/pt_mat34.h"
 
 enum { SAMPLES = 200000 };
 static const double PI = 3.14159265358979323846;

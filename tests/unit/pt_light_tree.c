@@ -11,6 +11,7 @@
 #include "shade/light_select.h"
 #include "shade/warp.h"
 #include "support/pt_scenes.h"
+#include "support/pt_mat34.h"
 
 enum { EMITTERS_MAX = 256, SWEEP = 1 << 15, PLACES = 60 };
 

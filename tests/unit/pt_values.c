@@ -25,6 +25,7 @@
 #include "support/approve.h"
 #include "support/pt_bsdf_cases.h"
 #include "support/pt_scenes.h"
+#include "support/pt_mat34.h"
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 

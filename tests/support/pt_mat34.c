@@ -1,4 +1,4 @@
-#include "scene/mat34.h"
+#include "support/pt_mat34.h"
 
 int pt_mat34_invert(const struct pt_mat34 *t, struct pt_mat34 *inv)
 {
