@@ -12,18 +12,20 @@
  * about it show at most three times the limit.
  *
  * `error` is the visible noise over the level at which people stop seeing it, `p_noisy` the share of viewers who still do; a
- * block stops when that is at most `visible`. With `fps` the noise is that of one frame of many. No model.
+ * block stops when that is at most `visible`, or `error` at most the parameter of that name. With `fps` the noise is that of
+ * one frame of many. No model.
  */
 #include "observer/observer.h"
 #include "model/visibility.h"
 #include "plugin/criteria.h"
+#include "plugin/limit.h"
 #include "plugin/means.h"
 #include "plugin/moving.h"
 #include "plugin/pair.h"
 #include "plugin/translate.h"
 #include "sequence/simulate.h"
 
-enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_FPS, P_PPD, P_COUNT };
+enum { P_VISIBLE, P_ERROR, P_FIRST_SPP, P_GROWTH, P_FPS, P_PPD, P_COUNT };
 enum {
     COLOR = LULL_PLANE_BIT(LULL_PLANE_COLOR),
     PLANES = COLOR | LULL_PLANE_BIT(LULL_PLANE_HALF) | LULL_PLANE_BIT(LULL_PLANE_MOMENT2) | LULL_PLANE_BIT(LULL_PLANE_SPP)
@@ -35,6 +37,7 @@ static const double AROUND = 3.0; /* a smaller one stops only where its surround
 static const struct lull_param params[P_COUNT] = {
     [P_VISIBLE] =
         LULL_KIT_FLOAT("visible", "0.35", 1e-4, 0.9999, "stop when at most this share of viewers would still see noise"),
+    [P_ERROR] = GP_PARAM_ERROR,
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", "16", 2, 1e15, "samples per pixel before the first judgement"),
     [P_GROWTH] = LULL_KIT_FLOAT("growth", "1.5", 1.01, 100, "largest ratio of samples between two checks of a block"),
     [P_FPS] = GP_PARAM_FPS,
@@ -322,7 +325,7 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
         return status;
     atomic_flag_clear(&in->warned);
     in->observer = ggn_observer_default;
-    in->stop_error = ggn_observer_error_at(&in->observer, in->kit.value[P_VISIBLE]);
+    in->stop_error = gp_stop_error(&in->kit, &in->observer, P_VISIBLE, P_ERROR);
     gp_temporal_init(&in->temporal, &in->kit, P_FPS, P_PPD);
     in->kit.need.halo = WINDOW / 2;
     *instance = in;

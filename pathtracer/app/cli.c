@@ -130,6 +130,16 @@ static int set_visible(void *into, const char *value, struct base_err *err)
     return set_param(into, param, err);
 }
 
+static int set_error(void *into, const char *value, struct base_err *err)
+{
+    char param[64];
+    double times;
+    if (!base_parse_real(value, 0.1, 100, &times))
+        return expected(err, "how many times what is just seen, 0.1 to 100");
+    snprintf(param, sizeof param, "error=%.17g", times);
+    return set_param(into, param, err);
+}
+
 static int set_filter(void *into, const char *value, struct base_err *err)
 {
     struct pt_integrator *by = &((struct pt_cli *)into)->render.integrator;
@@ -288,9 +298,12 @@ const struct base_option pt_cli_options[] = {
     {"visible", 0, "SHARE", .set = set_visible,
      .help = "Stop a block when at most this share of viewers would still see noise, of criteria that can tell (observer "
              "and denoised: default 0.35, ggn: the model's own)"},
+    {"error", 0, "TIMES", .set = set_error,
+     .help = "Stop a block when its error is at most so many times what is just seen, e.g. 4 for a draft, 2 for a good picture; "
+             "instead of --visible (observer and denoised)"},
     {"mask", 0, "FILE.png", TO(mask), .input = BASE_FILE, .words = png,
      .help = "A grey picture of the image's size: lighter regions are rendered better. White takes a quarter of the quality "
-             "parameter (visible, else threshold), black leaves it; the lightest pixel of a block counts"},
+             "parameter (error, visible or threshold), black leaves it; the lightest pixel of a block counts"},
     {"param", 'p', "KEY=VALUE", .set = set_param, .role = PT_ROLE_RULE, .tell = tell_params,
      .help = "Parameter of the criterion; may be repeated"},
     {"list-criteria", 0, NULL, TO(action), PT_CLI_LIST_CRITERIA,

@@ -100,10 +100,12 @@ const char *pt_quote_thousands(double value, int more, char text[32])
 static void print_row(FILE *out, const struct pt_quote_setting *setting, const struct lull_host_quote_row *row)
 {
     char who[32], least[32], mean[32], most[32], samples[112], time[32], low[32], high[32], from_to[80], wall[160];
-    if (isnan(setting->visible))
+    if (!setting->parameter)
         snprintf(who, sizeof who, "%s", setting->name);
+    else if (strcmp(setting->parameter, "error") == 0)
+        snprintf(who, sizeof who, "%3.3g x  %s", setting->value, setting->name);
     else
-        snprintf(who, sizeof who, "%3.3g %%  %s", 100 * setting->visible, setting->name);
+        snprintf(who, sizeof who, "%3.3g %%  %s", 100 * setting->value, setting->name);
     snprintf(samples, sizeof samples, "%6s / %6s / %7s", pt_quote_thousands(row->spp_min, 0, least),
              pt_quote_thousands(row->spp_mean, row->unknown > 0 || row->capped > 0, mean),
              pt_quote_thousands(row->spp_max, row->unknown > 0 || row->capped > 0, most));
@@ -151,7 +153,7 @@ void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *
     const struct lull_host_quote_row *asked = asked_row(q);
     char time[64], took[32], load[32];
     snprintf(time, sizeof time, "time, %d thread%s", q->threads, q->threads > 1 ? "s" : "");
-    fprintf(out, "%-26s  %-26s  %-30s  %s\n", "viewers who still see noise", "spp min / mean / max", time,
+    fprintf(out, "%-26s  %-26s  %-30s  %s\n", "times just seen, viewers", "spp min / mean / max", time,
             "against uniform");
     for (uint32_t i = 0; i < q->row_count; i++)
         print_row(out, &q->settings[i], &q->rows[i]);
@@ -182,7 +184,8 @@ static void add_row(cJSON *list, const struct pt_quote_setting *setting, const s
                     uint32_t count, int *failed)
 {
     cJSON *o = base_json_object(list, NULL, failed), *blocks;
-    base_json_number(o, "visible", setting->visible, failed);
+    if (setting->parameter)
+        base_json_number(o, setting->parameter, setting->value, failed);
     base_json_text(o, "name", setting->name, failed);
     base_json_bool(o, "as_asked", row->asked, failed);
     base_json_number(o, "spp_min", row->spp_min, failed);

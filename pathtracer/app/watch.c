@@ -26,7 +26,7 @@ static int speaks_utf8(void)
 
 static void tell_quality(const struct pt_open *o, char *text, size_t room)
 {
-    static const char *const names[] = {"visible", "threshold"};
+    static const char *const names[] = {"error", "visible", "threshold"};
     const char *value = NULL;
     double number;
     for (size_t i = 0; i < sizeof names / sizeof names[0] && !value && o->criterion; i++) {

@@ -90,6 +90,8 @@ struct lull_host_quote_asked {
     struct lull_host_said *said;           /* owns; [blocks] */
     struct lull_host_said *first;          /* owns; [blocks] what it said when it was asked first */
     struct lull_host_quote_block *blocks;  /* owns; the answer */
+    double *errors;                        /* owns; [blocks] that it heard of at said->spp; of rows by error alone */
+    double limit;                          /* the error at which a row by error stops; 0: another row */
     int other;                             /* not the frame's criterion: its checks take their own time */
     double asked_s;                        /* wall seconds that it was asked */
     uint64_t asked;                        /* blocks */

@@ -39,7 +39,7 @@ double lull_host_mask_factor(uint32_t step) { return pow(WHITE_SCALE, (double)st
 static int32_t scale_dial(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count, uint32_t step,
                           char value[32], struct lull_pair *pair, struct lull_error *err)
 {
-    static const char *const names[] = {"visible", "threshold"};
+    static const char *const names[] = {"error", "visible", "threshold"};
     const char *known = NULL; /* a parameter that has no value */
     for (size_t d = 0; d < sizeof names / sizeof names[0]; d++) {
         const struct lull_param *p;

@@ -37,6 +37,7 @@ void lull_host_quote_end(struct lull_host_quote *q)
         free(q->asked[i].said);
         free(q->asked[i].first);
         free(q->asked[i].blocks);
+        free(q->asked[i].errors);
     }
     if (q) {
         free(q->asked);
@@ -89,6 +90,21 @@ int32_t lull_host_quote_add(struct lull_host_quote *q, const struct lull_pair *c
     return code == LULL_OK ? lull_host_join(q->frame, *made, err) : code;
 }
 
+int32_t lull_host_quote_add_error(struct lull_host_quote *q, double limit, struct lull_error *err)
+{
+    int32_t code = lull_host_given(err, "quote", q, NULL);
+    if (code == LULL_OK && !(limit > 0.0 && limit < INFINITY))
+        code = lull_error_set(err, LULL_E_INVALID, "an error of %g: expected more than 0", limit);
+    if (code == LULL_OK)
+        code = add_row(q, 0, err);
+    if (code != LULL_OK)
+        return code;
+    struct lull_host_quote_asked *a = &q->asked[q->count - 1];
+    a->limit = limit;
+    a->errors = calloc(q->frame->blocks.count, sizeof *a->errors);
+    return a->errors ? LULL_OK : no_memory(err);
+}
+
 int32_t lull_host_quote_add_other(struct lull_host_quote *q, struct lull_host_criterion *criterion, struct lull_error *err)
 {
     int32_t code = lull_host_given(err, "quote", q, "criterion", criterion, NULL);
@@ -121,9 +137,47 @@ static void note_answer(struct lull_host_said *said, const struct lull_host_bloc
     }
 }
 
-static int32_t ask_row(const struct lull_host_quote *q, struct lull_host_quote_asked *a, const struct lull_host_view *view,
+/* Errors fall by half an octave for each of the samples where they are noise, slower where they are a denoiser's. */
+static const double LEAST_FALL = 0.25, FALL_OF_NOISE = 0.5;
+
+/* A row by error: between two checks, and beyond the last, the error is a power of the samples. */
+static void note_error(struct lull_host_quote_asked *a, uint32_t index, const struct lull_host_block *b, double error,
+                       uint64_t spp_min)
+{
+    struct lull_host_said *said = &a->said[index];
+    if (said->stopped || b->spp <= said->spp)
+        return;
+    const double spp = (double)b->spp, before = a->errors[index], limit = a->limit * lull_host_mask_factor(b->step);
+    const int has_before = said->spp > 0 && before > 0.0;
+    double fall = FALL_OF_NOISE;
+    if (has_before && error > 0.0)
+        fall = fmin(fmax(log2(before / error) / log2(spp / (double)said->spp), LEAST_FALL), FALL_OF_NOISE);
+    double stop = error > 0.0 ? spp * pow(error / limit, 1.0 / fall) : isnan(error) ? (double)NAN : 0.0;
+    const int stopped = error <= limit && b->spp >= spp_min;
+    const double least = has_before ? (double)said->spp : b->checks > 1 ? 0.0 : spp; /* checks before the quote began */
+    if (stopped)
+        stop = fmax(fmin(fmax(stop, least), spp), (double)spp_min);
+    *said = (struct lull_host_said){.spp = b->spp, .predicted = stop, .stopped = stopped};
+    a->errors[index] = error;
+}
+
+static void note_errors(const struct lull_host_quote *q, const uint32_t *due, uint32_t count,
+                        const struct lull_decision *decisions)
+{
+    const struct lull_host_blocks *blocks = &q->frame->blocks;
+    for (uint32_t i = 0; i < q->count; i++)
+        for (uint32_t k = 0; k < count && q->asked[i].limit > 0.0; k++) {
+            struct lull_host_quote_asked *a = &q->asked[i];
+            note_error(a, due[k], &blocks->list[due[k]], decisions[k].error, blocks->spp_min);
+            if (a->first[due[k]].spp == 0)
+                a->first[due[k]] = a->said[due[k]];
+        }
+}
+
+static int32_t ask_row(const struct lull_host_quote *q, uint32_t row, const struct lull_host_view *view,
                        const uint32_t *due, uint32_t count, struct lull_error *err)
 {
+    struct lull_host_quote_asked *a = &q->asked[row];
     const struct lull_host_blocks *blocks = &q->frame->blocks;
     if (!a->criterion || count == 0 || (blocks->flags & LULL_HOST_UNIFORM))
         return LULL_OK;
@@ -144,6 +198,8 @@ static int32_t ask_row(const struct lull_host_quote *q, struct lull_host_quote_a
         if (a->first[due[k]].spp == 0)
             a->first[due[k]] = a->said[due[k]];
     }
+    if (code == LULL_OK && q->rows[row].asked)
+        note_errors(q, due, count, decisions);
     free(decisions);
     free(final);
     return code;
@@ -152,7 +208,7 @@ static int32_t ask_row(const struct lull_host_quote *q, struct lull_host_quote_a
 void lull_host_quote_ask(struct lull_host_quote *q, const struct lull_host_view *view, const uint32_t *due, uint32_t count)
 {
     for (uint32_t i = 0; i < q->count; i++)
-        ask_row(q, &q->asked[i], view, due, count, NULL);
+        ask_row(q, i, view, due, count, NULL);
 }
 
 static int32_t ask_all(const struct lull_host_quote *q, const struct lull_host_view *view, struct lull_error *err)
@@ -164,7 +220,7 @@ static int32_t ask_all(const struct lull_host_quote *q, const struct lull_host_v
         if (blocks->list[i].spp > 0)
             due[n++] = i;
     for (uint32_t i = 0; i < q->count && code == LULL_OK; i++)
-        code = ask_row(q, &q->asked[i], view, due, n, err);
+        code = ask_row(q, i, view, due, n, err);
     free(due);
     return code;
 }

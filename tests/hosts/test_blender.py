@@ -323,6 +323,9 @@ def test_addon():
         assert scene.lull.chosen(scene).parameters == {}  # the criterion's own
         scene.lull.visible, scene.lull.parameters = .5, "growth=2"
         assert scene.lull.chosen(scene).parameters == {"visible": "0.5", "growth": "2"}
+        scene.lull.quality = "draft"
+        assert scene.lull.chosen(scene).parameters == {"error": "4", "growth": "2"}
+        scene.lull.quality = "final"
         scene.lull.parameters = "visible=.1"
         assert scene.lull.chosen(scene).parameters == {"visible": ".1"}
         scene.lull.parameters, scene.lull.denoise = "", True

@@ -823,15 +823,17 @@ def test_quote():
     while not quote.pilot_done(d):
         d.step()
     rows = quote.rows(d)
-    assert [r.value for r in rows] == [.9, .5, .35, .05] and [r.chosen for r in rows] == [False, False, True, False]
-    assert all(a.spp[1] < b.spp[1] and a.time_s < b.time_s for a, b in zip(rows, rows[1:])), rows
+    assert [(r.parameter, r.value) for r in rows] == [("error", 8), ("error", 4), ("error", 2), ("visible", .35), ("visible", .05)]
+    assert [r.chosen for r in rows] == [False, False, False, True, False]
+    assert all(a.spp[1] <= b.spp[1] and a.time_s <= b.time_s for a, b in zip(rows, rows[1:])), rows
+    assert rows[1].spp[1] < rows[2].spp[1] < rows[3].spp[1] / 3, rows
     assert d.run().outcome == "done" and [b.spp for b in f.blocks] == [b.spp for b in plain.blocks]
     taken = d.totals.samples / f.view.pixels
-    assert .7 < rows[2].spp[1] / taken < 1.4, (rows[2], taken)
-    assert quote.line(d).startswith("visible 0.35 takes about ") and "; visible 0.9 would take about " in quote.line(d)
+    assert .7 < rows[3].spp[1] / taken < 1.4, (rows[3], taken)
+    assert quote.line(d).startswith("visible 0.35 takes about ") and "; error 2 would take about " in quote.line(d)
     f.close()
     f.criterion.close()
-    assert len(quote.rows(d)) == 4  # of a render that is over, too
+    assert len(quote.rows(d)) == 5  # of a render that is over, too
     own = quote.chosen(d)
     twice = own._replace(spp=tuple(2 * n for n in own.spp), time_s=own.time_s + 100)
     assert quote.pilots(24) == [0, 8, 16, 23] and quote.pilots(1) == [0] and quote.pilots(9) == [0, 8]
@@ -924,8 +926,9 @@ def test_denoised_stops():
         assert d.run().outcome == "done" and "criterion" in {b.reason for b in f.blocks}, [b.reason for b in f.blocks]
         assert (lull.denoise(f).error == [b.error for b in f.blocks]).all()
         rows = quote.rows(d)
-        assert [(r.name, r.value, r.chosen) for r in rows] == [("denoised", .35, True), ("noisy", .35, False)], rows
-        assert rows[0].spp[1] < rows[1].spp[1] and quote.line(d) == ""
+        assert [(r.name, r.value, r.chosen) for r in rows] == [("rough", 8, False), ("draft", 4, False), ("good", 2, False),
+                                                               ("denoised", .35, True), ("noisy", .35, False)], rows
+        assert all(a.spp[1] <= b.spp[1] for a, b in zip(rows, rows[1:])) and quote.line(d) == ""
         f.close()
         assert lull.denoise(f).weight.shape == (32, 32)  # of a frame that is over, too
 

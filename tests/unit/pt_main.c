@@ -428,7 +428,7 @@ static int set_up_quote(void **state)
     render.totals->render_s = 50.5;
     render.totals->criterion_s = 60.75;
     quote = (struct pt_quote){
-        .row_count = 3, .rows = rows, .threads = 2, .settings = {{0.5, "draft"}, {0.125, "as asked"}, {0.05, "final"}}};
+        .row_count = 3, .rows = rows, .threads = 2, .settings = {{"error", 4, "draft"}, {"visible", 0.125, "as asked"}, {"visible", 0.05, "strict"}}};
     for (int k = 0; k < 3; k++)
         fill_row(&rows[k], k);
     return pool ? 0 : -1;
@@ -456,7 +456,8 @@ static char *tell_quote(struct approve_case *c)
     FILE *out = open_memstream(&text, &size);
     assert_non_null(out);
     rows[1].unknown = strstr(c->text, "unknown") ? 2 : 0;
-    quote.settings[1].visible = strstr(c->text, "uniform") ? (double)NAN : strstr(c->text, "default") ? 0.25 : 0.125;
+    quote.settings[1].parameter = strstr(c->text, "uniform") ? NULL : "visible";
+    quote.settings[1].value = strstr(c->text, "default") ? 0.25 : 0.125;
     quote.settings[1].name = strstr(c->text, "default") ? "default" : "as asked";
     rows[1].unmet = strstr(c->text, "met") ? 0 : 1;
     quote.threads = strstr(c->text, "one-thread") ? 1 : 2;
@@ -664,7 +665,7 @@ static void quotes_as_pictures(void **state)
     struct base_err err = {0};
     char path[64];
     snprintf(path, sizeof path, "/tmp/pt_main_%ld.png", (long)getpid());
-    quote.settings[1].visible = 0.125;
+    quote.settings[1].value = 0.125;
     for (int k = 0; k < 2; k++) {
         struct pic_canvas map;
         double values[7];

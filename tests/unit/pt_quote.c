@@ -128,6 +128,31 @@ static void rows_follow_the_law(void **state)
     end(&pilot);
 }
 
+/* A row by error asks nobody, and says what the criterion says of itself: the law stops at 0.5, its 0.25 visible. Beyond the
+ * last check and between two checks the law is found from two errors; a coarse limit is met at the first check. */
+static void rows_by_error_follow_the_law(void **state)
+{
+    (void)state;
+    static const double limits[3] = {8, 1, 0.5};
+    struct base_err err = {0};
+    struct lull_error e = {.struct_size = sizeof e};
+    struct run pilot;
+    start(&pilot, "0.25", 100);
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(lull_host_quote_add_error(pilot.quote->told, limits[i], &e), LULL_OK);
+    assert_int_equal(go(&pilot), PT_RENDER_PILOT);
+    assert_int_equal(pt_quote_finish(pilot.quote, pilot.render, &err), 0);
+    assert_int_equal(pilot.quote->row_count, 6);
+    for (int i = 0; i < 3; i++)
+        for (uint32_t k = 0; k < pilot.render->blocks->count; k++) {
+            const double law = law_spp(&pilot.render->blocks->list[k], limits[i] / 2);
+            const double expected = fmax(law, (double)pilot.render->blocks->spp_min);
+            assert_true(fabs(pilot.quote->rows[3 + i].blocks[k].stop.spp / expected - 1.0) < 0.03);
+        }
+    assert_int_equal(lull_host_quote_add_error(pilot.quote->told, 0.0, &e), LULL_E_INVALID);
+    end(&pilot);
+}
+
 static void sums_are_those_of_the_blocks(void **state)
 {
     (void)state;
@@ -160,11 +185,11 @@ static void what_was_asked_has_a_row(void **state)
     struct run run;
     start(&run, "0.1", 64);
     assert_int_equal(run.quote->row_count, 4);
-    assert_true(run.quote->settings[2].visible == 0.1 && run.quote->told->rows[2].asked &&
-                run.quote->settings[3].visible == 0.05);
+    assert_true(run.quote->settings[2].value == 0.1 && run.quote->told->rows[2].asked &&
+                run.quote->settings[3].value == 0.05);
     end(&run);
     start(&run, "0.01", 64);
-    assert_true(run.quote->row_count == 4 && run.quote->settings[3].visible == 0.01 && run.quote->told->rows[3].asked);
+    assert_true(run.quote->row_count == 4 && run.quote->settings[3].value == 0.01 && run.quote->told->rows[3].asked);
     end(&run);
 }
 
@@ -377,7 +402,7 @@ static char *quote_of(struct approve_case *c)
         fprintf(
             out,
             "row %g asked %d spp %.9g %.9g %.9g from %.9g to %.9g thread %.9g %.9g %.9g wall %.9g %.9g %.9g of uniform %.9g",
-            run.quote->settings[i].visible, row->asked, row->spp_min, row->spp_mean, row->spp_max, row->spp_mean_low,
+            run.quote->settings[i].value, row->asked, row->spp_min, row->spp_mean, row->spp_max, row->spp_mean_low,
             row->spp_mean_high, row->thread_s, row->thread_low_s, row->thread_high_s, row->wall_s, row->wall_low_s,
             row->wall_high_s, row->against_uniform);
         fprintf(out, " unknown %u unmet %u capped %u\n", row->unknown, row->unmet, row->capped);
@@ -404,6 +429,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rows_follow_the_law),
+        cmocka_unit_test(rows_by_error_follow_the_law),
         cmocka_unit_test(sums_are_those_of_the_blocks),
         cmocka_unit_test(what_was_asked_has_a_row),
         cmocka_unit_test(another_criterion_takes_its_own_time),

@@ -12,12 +12,13 @@
 #include "plugin/criteria.h"
 #include "plugin/denoised/block_view.h"
 #include "plugin/denoised/cover.h"
+#include "plugin/limit.h"
 #include "plugin/moving.h"
 #include "plugin/translate.h"
 
 static const double LEAST_STEP = 1.4142135623730951, CONFIRM_STEP = 1.25; /* of samples, from check to check */
 
-enum { P_VISIBLE, P_FIRST_SPP, P_GROWTH, P_PICTURE, P_QUALITY, P_LIBRARY, P_FPS, P_PPD, P_COUNT };
+enum { P_VISIBLE, P_ERROR, P_FIRST_SPP, P_GROWTH, P_PICTURE, P_QUALITY, P_LIBRARY, P_FPS, P_PPD, P_COUNT };
 enum {
     REQUIRED = LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF),
     AUXILIARY = LULL_PLANE_BIT(LULL_PLANE_ALBEDO) | LULL_PLANE_BIT(LULL_PLANE_NORMAL)
@@ -26,6 +27,7 @@ enum {
 static const struct lull_param params[P_COUNT] = {
     [P_VISIBLE] = LULL_KIT_FLOAT("visible", "0.35", 1e-4, 0.9999,
                                  "stop when at most this share of viewers would still see an error of the denoised picture"),
+    [P_ERROR] = GP_PARAM_ERROR,
     [P_FIRST_SPP] = LULL_KIT_INT("first-spp", "64", 2, 1e15, "samples per pixel before the first judgement"),
     [P_GROWTH] = LULL_KIT_FLOAT("growth", "2", 1.5, 100, "largest ratio of samples between two checks of a block"),
     [P_PICTURE] = LULL_KIT_CHOICE("picture", "blend", "blend|denoised",
@@ -418,7 +420,7 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     }
     atomic_flag_clear(&in->warned);
     in->observer = ggn_observer_default;
-    in->stop_error = ggn_observer_error_at(&in->observer, in->kit.value[P_VISIBLE]);
+    in->stop_error = gp_stop_error(&in->kit, &in->observer, P_VISIBLE, P_ERROR);
     gp_temporal_init(&in->temporal, &in->kit, P_FPS, P_PPD);
     in->kit.need.halo = GD_REACH;
     in->kit.need.checks_hint = 5;

@@ -86,6 +86,9 @@ LULL_EXPORT void lull_host_quote_end(struct lull_host_quote *quote);
  * nothing where the frame has none. asked: it stands for the render itself, whose own stops and checks are followed. */
 LULL_EXPORT int32_t lull_host_quote_add(struct lull_host_quote *quote, const struct lull_pair *changed, int32_t asked,
                                         struct lull_error *err);
+/* One more row: the render's criterion, stopped at an error of `limit` > 0, told from the errors that the row which stands
+ * for the render is answered (lull_decision.error). No instance of its own, so nothing is asked twice. */
+LULL_EXPORT int32_t lull_host_quote_add_error(struct lull_host_quote *quote, double limit, struct lull_error *err);
 /* One more row: any other criterion, which is the quote's from now on, even after a failure. */
 LULL_EXPORT int32_t lull_host_quote_add_other(struct lull_host_quote *quote, struct lull_host_criterion *criterion,
                                               struct lull_error *err);

@@ -229,17 +229,20 @@ class HostFrame:
                  answers)
         return list(answers[:count])
 
-    def quote(self, threads: int, name: str, values: Sequence[float], own: float,
+    def quote(self, threads: int, settings: Sequence[tuple[str, float]], own: tuple[str, float],
               other: Optional[Criterion] = None) -> list[abi.HostQuoteRow]:
-        """What the frame costs with other values of a parameter, `own` being the criterion's: struct lull_host_quote_row for
-        each, without its blocks; also after close(). threads: of the renderer. other: has a row, too, the last one, and is
-        used up."""
+        """What the frame costs by other settings of the quality parameter, (name, value), `own` being the criterion's: struct
+        lull_host_quote_row for each, without its blocks; also after close(). threads: of the renderer. other: has a row, too,
+        the last one, and is used up."""
         view, rows, count = self.view_of(None), C.POINTER(abi.HostQuoteRow)(), C.c_uint32()
         with self._asking() if self._is_open() else contextlib.nullcontext():
             quote = Handle("lull_host_quote_end", self.handle)
             call("host_quote_begin", self.handle.pointer, threads, C.byref(quote.pointer))
-            for value in values:
-                call("host_quote_add", quote.pointer, C.byref(abi.Pair(name.encode(), repr(value).encode())), value == own)
+            for name, value in settings:
+                if name == "error" and (name, value) != own:
+                    call("host_quote_add_error", quote.pointer, C.c_double(value))
+                else:
+                    call("host_quote_add", quote.pointer, C.byref(abi.Pair(name.encode(), repr(value).encode())), (name, value) == own)
             if other:
                 with other.alone() as pointer:
                     assert other.handle  # else alone() has raised

@@ -10,9 +10,9 @@ from .criterion import Criterion, load
 from .driver import Driver, Result, Watcher
 from .library import LullError, Parameter
 
-# The quality parameter `visible` by name, with the criterion's own default; others are asked at twice and at four times
-# their value.
-NAMED = {0.9: "coarse", 0.5: "draft", 0.05: "final"}
+# Settings by name, as lull-render tells them: how many times what is just seen, coarse to fine, and shares of viewers.
+TIMES = {8.0: "rough", 4.0: "draft", 2.0: "good", 1.0: "just seen", 0.5: "strict"}
+SHARES = {0.5: "draft", 0.05: "strict"}
 
 
 class Row(NamedTuple):
@@ -34,20 +34,26 @@ def pilot_done(driver: Driver, spp: int = 128, seconds: float = 30.0) -> bool:
     return not asked or min(asked) >= spp or min(asked) > 0 and driver.totals.elapsed_s >= seconds
 
 
-def _dial_of(criterion: Criterion) -> tuple[Parameter, float]:
+def _quality_of(criterion: Criterion) -> tuple[Parameter, float]:
     """What a mask scales and a quote varies; KeyError when the criterion has no such parameter, or no value for it."""
-    for parameter in filter(None, map(criterion.info.parameter, ("visible", "threshold"))):
+    for parameter in filter(None, map(criterion.info.parameter, ("error", "visible", "threshold"))):
         if (value := criterion.parameters.get(parameter.name, parameter.default)) is not None:
             return parameter, float(value)
     raise KeyError
 
 
-def _settings(parameter: Parameter, value: float) -> list[tuple[float, str]]:
-    names = dict(NAMED) if parameter.name == "visible" else {4 * value: "coarse", 2 * value: "draft"}
+def _settings(criterion: Criterion, parameter: Parameter, value: float) -> list[tuple[str, float, str]]:
+    """(parameter, value, name), coarse to fine; of thresholds twice and four times the value."""
+    coarser = [("error", v, name) for v, name in TIMES.items() if v > 1] if criterion.info.parameter("error") else []
+    names = {"error": dict(TIMES), "visible": dict(SHARES)}.get(parameter.name, {4 * value: "rough", 2 * value: "draft"})
+    if parameter.name == "error":
+        coarser = []
+    elif coarser:
+        del names[0.5]
     if parameter.name == "visible" and parameter.default is not None:
         names.setdefault(float(parameter.default), "default")
     names.setdefault(value, "chosen")
-    return sorted(((v, name) for v, name in names.items() if parameter.min <= v <= parameter.max), reverse=True)
+    return coarser + [(parameter.name, v, names[v]) for v in sorted(names, reverse=True) if parameter.min <= v <= parameter.max]
 
 
 def _is_dear(driver: Driver) -> bool:
@@ -60,17 +66,18 @@ def rows(driver: Driver) -> list[Row]:
     be asked. Every active block has been checked once at least."""
     frame, noisy = driver.frame, None
     try:
-        parameter, chosen = _dial_of(frame.criterion)
-        settings = _settings(parameter, chosen)
+        parameter, chosen = _quality_of(frame.criterion)
+        own = parameter.name, chosen
+        settings = _settings(frame.criterion, parameter, chosen)
         if _is_dear(driver):
-            noisy = load("observer", threads=frame.criterion.threads, log=frame.criterion.log)
-            settings = [(chosen, "denoised"), (_dial_of(noisy)[1], "noisy")]
-        values = [value for value, _ in settings[:1 if noisy else None]]
-        costs = frame.quote(driver.threads, parameter.name, values, chosen, noisy)
+            noisy = load("observer", threads=frame.criterion.threads, log=frame.criterion.log, **{parameter.name: chosen})
+            settings = [s for s in settings if s[0] == "error" and s[1] > 1 and s[:2] != own] + [(*own, "denoised")]
+            settings.sort(key=lambda s: -s[1] if s[0] == "error" else 0)
+        costs = frame.quote(driver.threads, [s[:2] for s in settings], own, noisy)
     except (LullError, KeyError):
         return []
-    return [Row(parameter.name, value, name, (cost.spp_min, cost.spp_mean, cost.spp_max), cost.wall_s, cost.unknown > 0,
-                bool(cost.asked)) for (value, name), cost in zip(settings, costs)]
+    return [Row(name, value, text, (cost.spp_min, cost.spp_mean, cost.spp_max), cost.wall_s, cost.unknown > 0, bool(cost.asked))
+            for (name, value, text), cost in zip(settings + [(*own, "noisy")] * (noisy is not None), costs)]
 
 
 def telling(tell: Callable[[str], None]) -> Watcher:
@@ -98,10 +105,10 @@ def table(driver: Driver) -> str:
     found = rows(driver)
     if not found:
         return f"criterion {driver.frame.criterion.info.id} has no quality parameter whose cost could be told"
-    lines = [f"{found[0].parameter:>9}               spp min / mean / max        time"]
+    lines = ["  setting                   spp min / mean / max        time"]
     for r in found:
         counts = " / ".join(f"{n:7,.0f}" for n in r.spp)
-        lines.append(f"{r.value:9.4g}  {r.name:8}  {counts}   {'at most ' if r.at_most else ''}{time_text(r.time_s)}"
+        lines.append(f"{r.parameter:>9} {r.value:<5.4g}  {r.name:9} {counts}   {'at most ' if r.at_most else ''}{time_text(r.time_s)}"
                      f"{'  <- chosen' if r.chosen else ''}")
     return "\n".join(lines)
 
@@ -142,6 +149,6 @@ def line(driver: Driver) -> str:
     if own is None:
         return ""
     parts = [f"{r.parameter} {r.value:g} would take {'at most ' if r.at_most else 'about '}{time_text(r.time_s)}"
-             for r in reversed(found) if r.value > own.value]
+             for r in reversed(found[:found.index(own)])]
     takes = f"takes {'at most' if own.at_most else 'about'} {time_text(own.time_s)}"
     return "; ".join([f"{own.parameter} {own.value:g} {takes}, {own.spp[1]:,.0f} spp", *parts])

@@ -65,6 +65,8 @@ def parser() -> argparse.ArgumentParser:
                    "--denoise denoised)")
     p.add_argument("-p", "--param", action="append", default=[], metavar="KEY=VALUE", help="parameter of the criterion")
     p.add_argument("--visible", metavar="SHARE", help="stop when at most this share of viewers would still see noise")
+    p.add_argument("--error", metavar="TIMES", help="stop when the error is at most so many times what is just seen, e.g. 4 for a "
+                   "draft, 2 for a good picture; instead of --visible")
     p.add_argument("--denoise", default="", choices=denoising.KINDS, metavar="[=blend|full]", help="keep the denoised "
                    "picture, and stop blocks by what is seen of it: blend (default) keeps as much of the noisy one as the "
                    "denoiser is wrong, full none; needs Open Image Denoise 2")
@@ -176,6 +178,8 @@ def _settings(options: argparse.Namespace, scene: bpy.types.Scene, frame: Option
     parameters = dict(pair.split("=", 1) for pair in options.param)
     if options.visible is not None:
         parameters["visible"] = options.visible
+    if options.error is not None:
+        parameters["error"] = options.error
     settings = Settings(options.criterion, parameters, options.spp_min, options.spp_max, options.time_budget, options.block,
                         mask=options.mask, output=options.output, preview=options.preview, stop_map=options.stop_map,
                         report=options.report, page=options.html, checkpoint=options.checkpoint,

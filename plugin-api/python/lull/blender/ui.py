@@ -23,6 +23,7 @@ REFUSED = (HostError, LullError, ValueError, OSError, RuntimeError)
 _items: list[tuple[str, str, str]] = []  # kept: Blender does not copy the texts of dynamic enums
 _running = False  # a render is in the making: its settings are not to be shown, since it lends some of the scene's
 _visible: dict[str, float] = {}  # criteria whose quality parameter is the share of viewers, with their default, 0 = none
+_by_error: set[str] = set()  # criteria that can stop at a multiple of what is just seen
 
 
 def _criteria(_self: object, _context: object) -> list[tuple[str, str, str]]:
@@ -31,6 +32,7 @@ def _criteria(_self: object, _context: object) -> list[tuple[str, str, str]]:
         found.sort(key=lambda c: (c.id != "observer", c.id))
         _items.extend((c.id, c.name, c.description) for c in found)
         _visible.update((c.id, float(p.default or 0)) for c in found if (p := c.parameter("visible")))
+        _by_error.update(c.id for c in found if c.parameter("error"))
         if not _items:
             _items.append(("none", "none found", f"No criteria in {', '.join(search_path())}: set LULL_PLUGIN_PATH"))
     return _items
@@ -45,6 +47,10 @@ def _choose_criterion(settings: bpy.types.PropertyGroup, _context: object) -> No
 class LullSettings(bpy.types.PropertyGroup):
     """Kept with the scene."""
     criterion: EnumProperty(name="Criterion", items=_criteria, description="What decides that a block may stop")
+    quality: EnumProperty(name="Quality", default="final", items=[
+        ("draft", "Draft", "The error is at most 4 times what is just seen: about a sixteenth of the samples"),
+        ("good", "Good", "At most 2 times what is just seen: about a quarter of the samples"),
+        ("final", "Final", "Nothing is seen, by the share of viewers below")])
     share: FloatProperty(options={"HIDDEN"})  # as chosen; 0 = not at all
     visible: FloatProperty(name="Visible To", min=0, max=.9999, subtype="FACTOR", precision=3,
                            get=lambda self: self.share or _visible.get(self.criterion, 0.0),
@@ -73,6 +79,8 @@ class LullSettings(bpy.types.PropertyGroup):
         if bad := [p for p in pairs if "=" not in p]:
             raise ValueError(f"parameter {bad[0]}: expected KEY=VALUE")
         quality = {"visible": f"{self.share:.6g}"} if self.share and self.criterion in _visible else {}
+        if self.criterion in _by_error and self.quality != "final":
+            quality = {"error": {"draft": "4", "good": "2"}[self.quality]}
         settings = Settings(self.criterion, {**quality, **dict(p.split("=", 1) for p in pairs)}, self.spp_min,
                             block=self.block or None, mask=bpy.path.abspath(self.mask) if self.mask else "",
                             denoise=self.kept if self.denoise else "")
@@ -272,7 +280,9 @@ class LULL_PT_render(bpy.types.Panel):
         if _running:
             layout.label(text="Esc: stop and keep", icon="INFO")
         else:
-            quality = ("visible",) if settings.criterion in _visible else ()
+            quality = ("quality",) if settings.criterion in _by_error else ()
+            if settings.criterion in _visible and (settings.quality == "final" or not quality):
+                quality += ("visible",)
             for properties in (((settings, "criterion"), *((settings, d) for d in quality), (settings, "parameters")),
                                ((settings, "spp_min"), (cycles, "samples"), (cycles, "time_limit")),
                                ((settings, "denoise"), *(((settings, "kept"),) if settings.denoise else ())),
