@@ -53,8 +53,7 @@ int ggn_feature_set_make(struct ggn_feature_set *t, const struct ggn_baseline *b
     if (t->first)
         t->first[s->n_blocks] = rows;
     t->x = malloc(rows * t->size * sizeof *t->x);
-    int rc = !t->first || !t->x ? base_fail_nomem(err, "baseline")
-                                : ggn_eval_each_block(s, threads, extract_block, &j, err);
+    int rc = !t->first || !t->x ? base_fail_nomem(err, "baseline") : ggn_eval_each_block(s, threads, extract_block, &j, err);
     if (rc)
         ggn_feature_set_release(t);
     return rc;

@@ -243,14 +243,10 @@ static void put_block(const struct replay *r, const struct ggn_eval_block *b, cJ
     const struct {
         const char *key;
         const double *values;
-    } columns[] = {{"spp", s->spp},
-                   {"seconds", s->seconds},
-                   {"dammertz", s->dammertz},
-                   {"half_unsettled", s->half_unsettled},
-                   {"rse", s->rse},
-                   {"rse_unsettled", s->rse_unsettled},
-                   {"flip", s->flip},
-                   {"ssim", s->ssim},
+    } columns[] = {{"spp", s->spp},           {"seconds", s->seconds},
+                   {"dammertz", s->dammertz}, {"half_unsettled", s->half_unsettled},
+                   {"rse", s->rse},           {"rse_unsettled", s->rse_unsettled},
+                   {"flip", s->flip},         {"ssim", s->ssim},
                    {"relmse", s->relmse}};
     base_json_number(to, "view", b->view, failed);
     base_json_number(to, "id", b->label.id, failed);

@@ -17,9 +17,10 @@ void ggn_method_release(struct ggn_method *m)
 int ggn_method_init(struct ggn_method *m, const struct ggn_eval_set *s, const char *name, int with_correction,
                     struct base_err *err)
 {
-    *m = (struct ggn_method){
-        .passes = 1, .cut = (double)NAN, .score = malloc(s->n * sizeof *m->score),
-        .correction = with_correction ? calloc(s->n, sizeof *m->correction) : NULL};
+    *m = (struct ggn_method){.passes = 1,
+                             .cut = (double)NAN,
+                             .score = malloc(s->n * sizeof *m->score),
+                             .correction = with_correction ? calloc(s->n, sizeof *m->correction) : NULL};
     snprintf(m->name, sizeof m->name, "%s", name);
     if (m->score && (m->correction || !with_correction))
         return 0;

@@ -11,7 +11,8 @@
 #include "observer/observer.h"
 
 #define GP_PARAM_ERROR \
-    LULL_KIT_FLOAT("error", NULL, 0.1, 100, "stop when the error is at most so many times what is just seen, instead of visible")
+    LULL_KIT_FLOAT("error", NULL, 0.1, 100, \
+                   "stop when the error is at most so many times what is just seen, instead of visible")
 
 static inline double gp_stop_error(const struct lull_kit *kit, const struct ggn_observer *observer, int visible, int error)
 {

@@ -299,8 +299,8 @@ const struct base_option pt_cli_options[] = {
      .help = "Stop a block when at most this share of viewers would still see noise, of criteria that can tell (observer "
              "and denoised: default 0.35, ggn: the model's own)"},
     {"error", 0, "TIMES", .set = set_error,
-     .help = "Stop a block when its error is at most so many times what is just seen, e.g. 4 for a draft, 2 for a good picture; "
-             "instead of --visible (observer and denoised)"},
+     .help = "Stop a block when its error is at most so many times what is just seen, e.g. 4 for a draft, 2 for a good "
+             "picture; instead of --visible (observer and denoised)"},
     {"mask", 0, "FILE.png", TO(mask), .input = BASE_FILE, .words = png,
      .help = "A grey picture of the image's size: lighter regions are rendered better. White takes a quarter of the quality "
              "parameter (error, visible or threshold), black leaves it; the lightest pixel of a block counts"},

@@ -153,8 +153,7 @@ void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *
     const struct lull_host_quote_row *asked = asked_row(q);
     char time[64], took[32], load[32];
     snprintf(time, sizeof time, "time, %d thread%s", q->threads, q->threads > 1 ? "s" : "");
-    fprintf(out, "%-26s  %-26s  %-30s  %s\n", "times just seen, viewers", "spp min / mean / max", time,
-            "against uniform");
+    fprintf(out, "%-26s  %-26s  %-30s  %s\n", "times just seen, viewers", "spp min / mean / max", time, "against uniform");
     for (uint32_t i = 0; i < q->row_count; i++)
         print_row(out, &q->settings[i], &q->rows[i]);
     if (asked->unknown > 0)

@@ -50,7 +50,8 @@ static int add_falling(struct pt_quote *q, const struct pt_quote_setting *rows, 
 static int add_rows(struct pt_quote *q, const struct lull_param *visible, const struct lull_param *error,
                     struct pt_quote_setting asked, struct base_err *err)
 {
-    struct pt_quote_setting shares[] = {{"visible", 0.5, "draft"}, {"visible", 0.25, "default"}, {"visible", 0.05, "strict"}};
+    struct pt_quote_setting shares[] = {
+        {"visible", 0.5, "draft"}, {"visible", 0.25, "default"}, {"visible", 0.05, "strict"}};
     const int by_error = asked.parameter && strcmp(asked.parameter, "error") == 0;
     int met = !asked.parameter, coarser = 1, rc = met ? add_row(q, asked, 1, err) : 0;
     if (!visible || rc)

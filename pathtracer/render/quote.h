@@ -1,7 +1,8 @@
 /*
  * What accuracy costs in this scene, before it is rendered: the quote of lull/host.h, told from a pilot, the first waves of
- * the render itself. Its rows differ in the criterion's quality parameter: how many times what is just seen (`error`), or how many
- * viewers may still see noise (`visible`). Neither the film nor the render's own instance changes. Not thread-safe.
+ * the render itself. Its rows differ in the criterion's quality parameter: how many times what is just seen (`error`), or
+ * how many viewers may still see noise (`visible`). Neither the film nor the render's own instance changes. Not
+ * thread-safe.
  */
 #ifndef PT_RENDER_QUOTE_H
 #define PT_RENDER_QUOTE_H

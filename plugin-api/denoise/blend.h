@@ -20,8 +20,8 @@ void lull_blend_weights(const struct lull_estimate *estimate, int width, int hei
 
 /* alpha from the neighbourhood alone, without the 5x5 pixels in its middle. The maps as they are before they are pooled;
  * scratch: [3][height][width]. Weights that a pixel's own samples have chosen make its error look small, by a third of the
- * mean square in the scenes of docs/results/denoised.md: what crosses a blend with the other half crosses one of these, whose own
- * error is larger by a few per cent. */
+ * mean square in the scenes of docs/results/denoised.md: what crosses a blend with the other half crosses one of these,
+ * whose own error is larger by a few per cent. */
 void lull_blend_weights_blind(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha);
 
 /* Takes the specks from denoised halves [n][3]. */

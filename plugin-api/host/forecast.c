@@ -4,7 +4,8 @@
 #include <stdlib.h>
 
 /* Half an interval that holds 8 of 10 blocks, in octaves of samples: luck in the last checks, and so much more for each
- * octave that the prediction looks ahead. Fitted to 43 blocks of seven renders and 61 of 33 recordings (docs/results/quote.md). */
+ * octave that the prediction looks ahead. Fitted to 43 blocks of seven renders and 61 of 33 recordings
+ * (docs/results/quote.md). */
 static const double NEAR = 0.15, PER_OCTAVE = 0.08, UNMET = 1.0;
 
 static double half_width(const struct lull_host_said *said, double end)

@@ -186,9 +186,9 @@ uint64_t lull_host_next_check(const struct lull_host_blocks *blocks, uint64_t sp
 
 /* --- forecast.c ------------------------------------------------------------------------------------------------------ */
 
-/* Predictions are taken as they are: from a hundred samples on they were neither low nor high (docs/results/quote.md). The interval
- * widens with the octaves from the samples at hand to the predicted ones, and to an octave either way for a block that is
- * `unmet`. It does not stop before `spp`: samples that it has or gets in any case, 0 … spp_max. */
+/* Predictions are taken as they are: from a hundred samples on they were neither low nor high (docs/results/quote.md). The
+ * interval widens with the octaves from the samples at hand to the predicted ones, and to an octave either way for a block
+ * that is `unmet`. It does not stop before `spp`: samples that it has or gets in any case, 0 … spp_max. */
 struct lull_host_stop_at lull_host_expect(const struct lull_host_said *said, uint64_t spp, uint64_t spp_max);
 /* Of a block of a render that is going on. A stopped block: where it did. */
 struct lull_host_stop_at lull_host_expect_block(const struct lull_host_blocks *blocks, const struct lull_host_block *block);

@@ -174,8 +174,8 @@ static void note_errors(const struct lull_host_quote *q, const uint32_t *due, ui
         }
 }
 
-static int32_t ask_row(const struct lull_host_quote *q, uint32_t row, const struct lull_host_view *view,
-                       const uint32_t *due, uint32_t count, struct lull_error *err)
+static int32_t ask_row(const struct lull_host_quote *q, uint32_t row, const struct lull_host_view *view, const uint32_t *due,
+                       uint32_t count, struct lull_error *err)
 {
     struct lull_host_quote_asked *a = &q->asked[row];
     const struct lull_host_blocks *blocks = &q->frame->blocks;

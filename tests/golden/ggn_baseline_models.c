@@ -626,6 +626,18 @@ static void looks_at_tiles(void **state)
 
 /* --- learning from scenes ------------------------------------------------------------------------------------------------- */
 
+/* Where a row of scores below the cut ends first, else the last level. */
+static double stop_of(const struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_eval_block *b)
+{
+    int row = 0;
+    for (size_t i = b->first; i < b->end; i++) {
+        row = m->score[i] < m->cut ? row + 1 : 0;
+        if (row >= m->passes)
+            return s->spp[i];
+    }
+    return b->cap;
+}
+
 static void put_method(FILE *f, const struct ggn_method *m, const struct ggn_baseline *b, const struct ggn_eval_set *s)
 {
     const struct ggn_policy *p = &b->policy;
@@ -636,7 +648,7 @@ static void put_method(FILE *f, const struct ggn_method *m, const struct ggn_bas
     for (int k = 0; k < s->n_blocks; k++) {
         fprintf(f, "block %d", k);
         if (!b->lstm)
-            fprintf(f, " stops at %g", m->stop[k]);
+            fprintf(f, " stops at %g", stop_of(m, s, &s->blocks[k]));
         fputc(':', f);
         for (size_t i = s->blocks[k].first; i < s->blocks[k].end; i++)
             fprintf(f, " %.4f", m->score[i]);

@@ -10,7 +10,7 @@
 #include "plugin/denoised/cover.h"
 
 enum { SIDE = 200, COLUMNS = 4, BLOCKS = 16 };
-static const struct lull_rect area = {0, 0, SIDE * COLUMNS, SIDE * COLUMNS};
+static const struct lull_rect area = {0, 0, SIDE *COLUMNS, SIDE *COLUMNS};
 
 static struct lull_rect core_of(uint32_t id)
 {

@@ -427,8 +427,11 @@ static int set_up_quote(void **state)
     render.totals->samples = 4321;
     render.totals->render_s = 50.5;
     render.totals->criterion_s = 60.75;
-    quote = (struct pt_quote){
-        .row_count = 3, .rows = rows, .threads = 2, .settings = {{"error", 4, "draft"}, {"visible", 0.125, "as asked"}, {"visible", 0.05, "strict"}}};
+    quote =
+        (struct pt_quote){.row_count = 3,
+                          .rows = rows,
+                          .threads = 2,
+                          .settings = {{"error", 4, "draft"}, {"visible", 0.125, "as asked"}, {"visible", 0.05, "strict"}}};
     for (int k = 0; k < 3; k++)
         fill_row(&rows[k], k);
     return pool ? 0 : -1;

@@ -25,10 +25,7 @@ struct lull_rect gd_box_around(const struct lull_rect *core, const struct lull_r
     return box;
 }
 
-int64_t gd_area_of(const struct lull_rect *rect)
-{
-    return ((int64_t)rect->x1 - rect->x0) * ((int64_t)rect->y1 - rect->y0);
-}
+int64_t gd_area_of(const struct lull_rect *rect) { return ((int64_t)rect->x1 - rect->x0) * ((int64_t)rect->y1 - rect->y0); }
 
 static struct lull_rect around_both(const struct lull_rect *a, const struct lull_rect *b)
 {

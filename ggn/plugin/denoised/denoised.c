@@ -86,9 +86,8 @@ static double error_of(struct lull_instance *in, struct gd_block_view *seen, con
                                     "denoised: COLOR and HALF are the same in a block that is not of one colour: HALF must "
                                     "hold a fixed half of the samples",
                                     tally);
-    const struct ggn_kept_errors e =
-        gd_block_view_errors(seen, &in->look, &in->kit, b, in->kit.value[P_PICTURE] == 0,
-                             gp_is_moving(&in->kit, P_FPS) ? &in->temporal : NULL);
+    const struct ggn_kept_errors e = gd_block_view_errors(seen, &in->look, &in->kit, b, in->kit.value[P_PICTURE] == 0,
+                                                          gp_is_moving(&in->kit, P_FPS) ? &in->temporal : NULL);
     now->halves = ggn_observer_error(&in->observer, e.halves, pixels);
     now->crossed = ggn_observer_error(&in->observer, e.crossed, pixels);
     return fmax(now->halves, now->crossed);
@@ -184,8 +183,7 @@ static void judge_task(void *arg, uint64_t task, uint32_t worker)
     lull_kit_task(&some->batch, some->members[task], worker);
 }
 
-static int32_t judge_all(const struct lull_kit_batch *batch, const uint32_t *members, uint32_t count,
-                         struct lull_error *err)
+static int32_t judge_all(const struct lull_kit_batch *batch, const uint32_t *members, uint32_t count, struct lull_error *err)
 {
     const struct lull_host *host = batch->in->kit.host;
     struct some some = {*batch, members};

@@ -132,8 +132,7 @@ static void read_part(struct gd_look *look, struct lull_rect rect, const struct 
         for (int32_t i = 0; i < s.count; i++) {
             const int32_t x = s.x + i - look->box.x0;
             const size_t at = (size_t)(s.y - look->box.y0) * row + (size_t)x;
-            const int good =
-                lull_denoised_put(pair, at, s.value[LULL_PLANE_COLOR][i], s.value[LULL_PLANE_HALF][i], n, h);
+            const int good = lull_denoised_put(pair, at, s.value[LULL_PLANE_COLOR][i], s.value[LULL_PLANE_HALF][i], n, h);
             tally->valid += good;
             tally->bad += !good;
             if (!good)
@@ -152,8 +151,8 @@ void gd_look_begin(struct gd_look *look, const struct gd_form *form, const struc
 {
     struct lull_kit_tally around = {0};
     look->box = *box;
-    look->known = view->all ? common(common(*box, form->area), (struct lull_rect){view->x0, view->y0, view->x1, view->y1})
-                            : *core;
+    look->known =
+        view->all ? common(common(*box, form->area), (struct lull_rect){view->x0, view->y0, view->x1, view->y1}) : *core;
     lull_denoised_begin(&look->pair, box->x1 - box->x0, box->y1 - box->y0);
     for (uint32_t i = 0; view->all && i < view->all_count; i++) {
         const struct lull_block *other = lull_kit_at(view->all, view->all_stride, i);

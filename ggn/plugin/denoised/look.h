@@ -18,8 +18,8 @@
 /* Pixels beyond a block's edges that its answer depends on, at most. */
 enum { GD_REACH = LULL_OIDN_HALO + LULL_OIDN_GRID - 1 };
 
-struct gd_form {                /* of a frame */
-    struct lull_rect area;      /* around all blocks */
+struct gd_form {           /* of a frame */
+    struct lull_rect area; /* around all blocks */
     uint32_t blocks;
     int32_t width, height;      /* of the largest blocks */
     int64_t most;               /* pixels of the largest rectangle */

@@ -125,8 +125,8 @@ struct lull_host_config {
     uint64_t check_step;       /* checks stand at multiples of so many samples, or at spp_max; 0 reads as 1 */
 
     /* A grey plane of the whole picture in [0, 1] (f32 or f64, 1 channel, LULL_NORM_ONE), read by lull_host_begin; NULL:
-     * none. White takes a quarter of the criterion's quality parameter, which is `error` or `visible` if that has a value, else
-     * `threshold`; black leaves it, grey g takes 4^-g of it, in steps of an eighth. The lightest pixel of a block counts. */
+     * none. White takes a quarter of the criterion's quality parameter, the first of `error`, `visible` and `threshold` that
+     * has a value; black leaves it, grey g takes 4^-g of it, in steps of an eighth. The lightest pixel of a block counts. */
     const struct lull_plane *mask;
 };
 
