@@ -105,7 +105,7 @@ static void write_live(struct pt_watch *w, const struct pt_render *render, struc
     const struct pt_progress_now progress = pt_progress_of(&w->progress.pace, render);
     struct pt_output_info info = *w->info;
     info.progress = &progress;
-    for (int i = PT_STOP_MAPS; i < PT_PATHS && path_of(w, i); i++)
+    for (enum pt_path i = PT_STOP_MAPS; i < PT_PATHS && path_of(w, i); i++)
         pt_output_stop_map(path_of(w, i), render, &info, err);
     if (path_of(w, PT_REPORT))
         pt_output_report(path_of(w, PT_REPORT), render, &info, err);
