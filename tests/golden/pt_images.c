@@ -168,7 +168,8 @@ static uint64_t add_approximations(uint64_t hash)
 {
 #ifdef __SSE__
     for (float x = 0.51f; x < 4.0f; x *= 1.013f)
-        hash = add_bits(add_bits(hash, _mm_cvtss_f32(_mm_rcp_ss(_mm_set_ss(x)))), _mm_cvtss_f32(_mm_rsqrt_ss(_mm_set_ss(x))));
+        hash =
+            add_bits(add_bits(hash, _mm_cvtss_f32(_mm_rcp_ss(_mm_set_ss(x)))), _mm_cvtss_f32(_mm_rsqrt_ss(_mm_set_ss(x))));
 #endif
     return hash;
 }

@@ -88,8 +88,8 @@ static struct met hot(double x, double y, const double u[3])
 }
 
 /* Under defocus and motion albedo is noisy, and both halves are denoised with the same: that part of their error is common
- * to them and to the noise that they are held against. What is believed is too low then; two looks in a row see it all the
- * same by estimates below zero, and the first ones do not stop. */
+ * to them and to the noise that they are held against. What is believed is too low then; two looks in a row see it in most
+ * blocks all the same by estimates below zero, and the first ones do not stop: one block of motion does at its second look. */
 static const struct subject {
     const char *name;
     meeting *meet;
@@ -97,7 +97,7 @@ static const struct subject {
     double kept;          /* what may be left where none stops it: of a sample of 10^6 a grey point */
     uint64_t least, most; /* samples at which a block stops */
 } subjects[] = {{"stripes", stripes, 1.1, 3, 256, SPP_MAX}, {"defocus", defocus, 2, 3, 100, SPP_MAX},
-                {"motion", motion, 2, 3, 100, SPP_MAX},     {"fog", fog, 1.1, 3, 64, SPP_MAX},
+                {"motion", motion, 2, 3, 80, SPP_MAX},      {"fog", fog, 1.1, 3, 64, SPP_MAX},
                 {"black", black, 0.01, 3, 80, 80},          {"white", white, 0.01, 3, 80, 80},
                 {"hot", hot, 1.1, 4.5, 80, SPP_MAX}};
 
