@@ -29,6 +29,7 @@ cat >decide <<'O'
 --block 16
 --criterion fixed
 --visible 0.1
+--error 2
 --mask mask.png
 --param visible=0.4
 --spp-min 8
