@@ -80,7 +80,7 @@ os.killpg(demo.pid, signal.SIGINT)
 said = demo.communicate()[0]
 files = sorted(os.listdir(sys.argv[1]))
 print(demo.returncode, files, said)
-price, picture = said.index("viewers who still see noise"), said.index("demo: rendering it")
+price, picture = said.index("times just seen, viewers"), said.index("demo: rendering it")
 assert demo.returncode == 130 and price < picture < said.index("demo: interrupted")
 assert files == ["demo.exr", "demo.html", "demo.png", "report.json", "stop-map.csv", "stop-map.png"], files
 P
