@@ -197,8 +197,10 @@ def test_quote():
     with contextlib.redirect_stdout(output):
         assert command(*common, "-q", "--quote", "--checkpoint", tmp("quote.npz")) == (0, "")
     table = output.getvalue().splitlines()
-    assert "spp min / mean / max" in table[0] and [float(r.split()[0]) for r in table[1:]] == [.9, .5, .35, .2, .05], table
-    assert "chosen" in table[4] and not os.path.exists("quote.exr")
+    settings = [tuple(r.split()[:2]) for r in table[1:]]
+    assert "spp min / mean / max" in table[0] and settings == [
+        ("error", "8"), ("error", "4"), ("error", "2"), ("visible", "0.35"), ("visible", "0.2"), ("visible", "0.05")], table
+    assert "chosen" in table[5] and not os.path.exists("quote.exr")
     means = [float(r.split("/")[1].replace(",", "")) for r in table[1:]]
     assert means == sorted(means) and means[0] < means[-1], table
     assert command(*common, "-q", "--checkpoint", tmp("quote.npz"), "--resume", "-o", tmp("after.exr")) == (0, "")

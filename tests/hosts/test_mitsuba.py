@@ -246,7 +246,7 @@ def test_quote():
         mean = float(next(t for t in table.splitlines() if "<- chosen" in t).split("/")[1].replace(",", ""))
         assert .5 < mean / p.spp.mean() < 2, (mean, p.spp.mean())  # it predicts, it does not know
         assert len(lines) == 1 and lines[0].startswith("visible 0.35 takes "), lines
-        assert "visible 0.5 would take " in lines[0], lines
+        assert "error 2 would take " in lines[0], lines
 
 
 def test_denoise():
