@@ -13,10 +13,7 @@
 #include "base/threads.h"
 #include "job/message.h"
 
-/* Longest wait between two looks whether everybody is still there; how long a roll call lasts. */
-static const double LOOK_S = 0.05, ROLL_CALL_S = 1.0;
-/* Waits between two looks whether a collective is over. */
-static const double FIRST_NAP_S = 2e-5, LONGEST_NAP_S = 5e-4;
+static const double LOOK_S = 0.05; /* longest wait between two looks whether everybody is still there */
 
 /* --- opening -------------------------------------------------------------------------------------------------------- */
 
@@ -192,8 +189,7 @@ static int hear_farewell(struct job *job, int rank, const void *message, size_t 
                      f->text[0] ? f->text : "ended too early");
 }
 
-/* The next message from the transport; as job_receive. */
-static int receive_new(struct job *job, double wait_s, int *rank, struct job_message **message, size_t *size)
+int job_receive(struct job *job, double wait_s, int *rank, struct job_message **message, size_t *size)
 {
     void *data = NULL;
     int got = job->transport->calls->receive(job->transport, wait_s, rank, &data, size, &job->failed);
@@ -204,52 +200,17 @@ static int receive_new(struct job *job, double wait_s, int *rank, struct job_mes
     const uint32_t kind = *size < sizeof **message ? JOB_FAREWELL : (*message)->kind;
     job->traffic.messages++;
     job->traffic.bytes += *size;
-    if (kind != JOB_PRESENT && kind != JOB_END && kind != JOB_FAREWELL)
+    if (kind != JOB_END && kind != JOB_FAREWELL)
         return 1;
     int rc = 0;
     if (worker && kind == JOB_END) {
         job->over = 1;
         job->status = (int)(*message)->serial;
-    } else if (worker && kind == JOB_PRESENT) {
-        rc = job_send_head(job, 0, JOB_PRESENT, 0);
-    } else if (kind == JOB_PRESENT) {
-        job->workers[*rank].present = 1;
     } else {
         rc = worker ? job_nonsense(job, *rank) : hear_farewell(job, *rank, data, *size);
     }
     free(data);
     return rc;
-}
-
-int job_receive(struct job *job, double wait_s, int *rank, struct job_message **message, size_t *size)
-{
-    struct job_kept *k = job->kept;
-    if (!k)
-        return receive_new(job, wait_s, rank, message, size);
-    *rank = k->rank;
-    *message = k->message;
-    *size = k->size;
-    job->kept = k->next;
-    free(k);
-    return 1;
-}
-
-/* Keeps what comes within wait_s for later, unless it is about presence or ends. */
-static int keep_new(struct job *job, double wait_s)
-{
-    struct job_kept new = {0}, **last = &job->kept;
-    int got = receive_new(job, wait_s, &new.rank, &new.message, &new.size);
-    if (got <= 0)
-        return got;
-    while (*last)
-        last = &(*last)->next;
-    *last = malloc(sizeof new);
-    if (!*last) {
-        free(new.message);
-        return base_fail_nomem(&job->failed, "messages");
-    }
-    **last = new;
-    return 1;
 }
 
 /* --- the handshake --------------------------------------------------------------------------------------------------- */
@@ -312,78 +273,6 @@ int job_handshake(struct job *job, const char *settings, int threads, struct bas
     return job_failed(job, err);
 }
 
-/* --- collectives --------------------------------------------------------------------------------------------------- */
-
-/* A collective lasts too long: asks who waits for it too, and gives up the first who does not say so. */
-static int call_roll(struct job *job)
-{
-    const double start_s = base_clock_wall_s();
-    int rank, absent = 1;
-    for (rank = 1; rank < job->transport->count && !job->failed.code; rank++) {
-        job->workers[rank].present = 0;
-        job_send_head(job, rank, JOB_PRESENT, 0);
-    }
-    while (!job->failed.code && absent < job->transport->count && base_clock_wall_s() - start_s < ROLL_CALL_S) {
-        keep_new(job, LOOK_S);
-        for (absent = 1; absent < job->transport->count && job->workers[absent].present;)
-            absent++;
-    }
-    return job->failed.code || absent == job->transport->count ? job->failed.code
-                                                               : job_give_up(job, absent, 2 * job->timeout_s);
-}
-
-/* A worker that waits for a collective. Rank 0 may have ended after its own part, in order or not: then the rest comes
- * soon. */
-static int wait_on(struct job *job, double *since_s)
-{
-    if (!job->over)
-        *since_s = base_clock_wall_s();
-    else if (job->status != 0 && base_clock_wall_s() - *since_s > ROLL_CALL_S)
-        base_fail(&job->failed, BASE_EIO, "rank 0 has ended"); /* nobody reads it: rank 0 says why */
-    return job->failed.code;
-}
-
-/* While nothing has come of a collective. */
-static int attend(struct job *job, double nap_s, double *since_s)
-{
-    keep_new(job, nap_s);
-    if (job->failed.code || job->transport->rank > 0)
-        return job->failed.code ? job->failed.code : wait_on(job, since_s);
-    if (job->interrupted && *job->interrupted && job_find_dead(job, NULL))
-        return job->failed.code;
-    if (job->timeout_s <= 0 || base_clock_wall_s() - *since_s <= job->timeout_s)
-        return 0;
-    *since_s = base_clock_wall_s(); /* if all are there it is slow, no more */
-    return call_roll(job);
-}
-
-/* Waits until the collective that has been begun is over. */
-static int finish(struct job *job, size_t bytes)
-{
-    const double start_s = base_clock_wall_s();
-    double since_s = start_s, nap_s = FIRST_NAP_S;
-    int done = job->failed.code;
-    while (done == 0) {
-        done = job->transport->calls->test(job->transport, &job->failed);
-        if (done == 0)
-            done = attend(job, nap_s, &since_s);
-        nap_s = nap_s < LONGEST_NAP_S ? 2 * nap_s : nap_s;
-    }
-    job->lost |= done < 0; /* the collective cannot be left */
-    job->traffic.messages++;
-    job->traffic.bytes += bytes;
-    job->traffic.waiting_s += base_clock_wall_s() - start_s;
-    return job->failed.code;
-}
-
-int job_broadcast(struct job *job, void *data, size_t size)
-{
-    if (!job || job->failed.code)
-        return job ? job->failed.code : 0;
-    job->transport->calls->broadcast(job->transport, data, size, &job->failed);
-    return finish(job, size);
-}
-
 /* --- the end ---------------------------------------------------------------------------------------------------------- */
 
 /* A worker: its last message, and the end that rank 0 says. */
@@ -443,11 +332,6 @@ int job_close(struct job *job, int status, const char *text, struct base_err *er
         job->transport->calls->abort(job->transport, job->transport->rank > 0 ? job->status : status);
     status = job->transport->rank > 0 ? 0 : status;
     job->transport->calls->close(job->transport);
-    for (struct job_kept *k = job->kept, *next; k; k = next) {
-        next = k->next;
-        free(k->message);
-        free(k);
-    }
     free(job->workers);
     free(job);
     return status;

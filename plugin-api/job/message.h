@@ -11,7 +11,6 @@ enum job_kind {
     JOB_TASK,     /* from rank 0: a job_task */
     JOB_ANSWER,   /* to rank 0: a job_task with the answers in the place of the items */
     JOB_DONE,     /* from rank 0: no more tasks of this farm */
-    JOB_PRESENT,  /* from rank 0: do you wait for the collective? A worker that does sends the same back */
     JOB_END,      /* from rank 0, the last one: no more at all */
     JOB_FAREWELL, /* to rank 0, the last one: a job_farewell */
 };
@@ -41,19 +40,10 @@ enum { JOB_HELD = 2 }; /* the one that a worker works on and the next */
 struct job_worker {
     int threads; /* 0: not heard of yet */
     int gone;    /* it has said its farewell */
-    int present; /* it has answered JOB_PRESENT */
     struct job_farewell farewell;
     struct job_held held[JOB_HELD]; /* in the order in which they were sent */
     int held_count;
     double since_s; /* wall time since which it owes an answer */
-};
-
-/* A message that came while a process waited for a collective: its sender was quicker. */
-struct job_kept {
-    struct job_kept *next;
-    struct job_message *message; /* owns */
-    size_t size;
-    int rank;
 };
 
 struct job {
@@ -63,8 +53,7 @@ struct job {
     struct job_worker *workers; /* owns; [count] at rank 0, 0 unused */
     int threads;                /* of all workers */
     uint32_t serial;            /* farms so far */
-    struct job_kept *kept;      /* owns, in the order of arrival */
-    int lost;                   /* somebody is gone for good or stays in a collective: there is no orderly end */
+    int lost;                   /* somebody is gone for good: there is no orderly end */
     int over, status;           /* rank 0 has said the end; with which status, of a worker */
     struct job_traffic traffic;
     struct base_err failed;
@@ -72,8 +61,8 @@ struct job {
 
 /* Takes `message`, from malloc. */
 int job_send(struct job *job, int rank, void *message, size_t size);
-/* The next message, waiting for up to wait_s: 1 with *message to free, 0 none, negative a failure. Not those about presence
- * and ends: a worker's farewell with a reason is a failure, the end of the job sets job->over. */
+/* The next message, waiting for up to wait_s: 1 with *message to free, 0 none, negative a failure. Not those about
+ * ends: a worker's farewell with a reason is a failure, the end of the job sets job->over. */
 int job_receive(struct job *job, double wait_s, int *rank, struct job_message **message, size_t *size);
 /* A message of its head alone. */
 int job_send_head(struct job *job, int rank, enum job_kind kind, uint32_t serial);

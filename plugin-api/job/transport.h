@@ -28,10 +28,6 @@ struct job_transport_calls {
     int (*send)(struct job_transport *t, int rank, void *data, size_t size, struct base_err *err);
     /* 1: a message, *data is the caller's to free; 0: none came within wait_s; negative: an error. */
     int (*receive)(struct job_transport *t, double wait_s, int *rank, void **data, size_t *size, struct base_err *err);
-    /* Collectives, one at a time: begun by all in the same order, over when `test` answers 1. Everybody gets the bytes of
-     * rank 0. */
-    int (*broadcast)(struct job_transport *t, void *data, size_t size, struct base_err *err);
-    int (*test)(struct job_transport *t, struct base_err *err);
     /* Waits until all processes have called it. */
     void (*close)(struct job_transport *t);
     /* Ends every process now; returns if it cannot. */

@@ -38,7 +38,6 @@ struct mpi {
     struct sending *sent; /* owns; [room] */
     size_t count, room;
     struct arrival coming;
-    MPI_Request collective;
 };
 
 static void forget_sent(struct mpi *m)
@@ -132,24 +131,6 @@ static int receive_message(struct job_transport *face, double wait_s, int *rank,
     }
 }
 
-static int begin_broadcast(struct job_transport *face, void *data, size_t size, struct base_err *err)
-{
-    struct mpi *m = (struct mpi *)face;
-    if (size > INT_MAX || MPI_Ibcast(data, (int)size, MPI_BYTE, 0, m->world, &m->collective) != MPI_SUCCESS)
-        return base_fail(err, BASE_EIO, "MPI cannot share %zu bytes", size);
-    return 0;
-}
-
-static int test_collective(struct job_transport *face, struct base_err *err)
-{
-    struct mpi *m = (struct mpi *)face;
-    int done = 0;
-    forget_sent(m);
-    if (MPI_Test(&m->collective, &done, MPI_STATUS_IGNORE) != MPI_SUCCESS)
-        return base_fail(err, BASE_EIO, "MPI has lost the other processes");
-    return done != 0;
-}
-
 static void release(struct mpi *m)
 {
     free(m->sent);
@@ -189,8 +170,6 @@ static int introduce(struct mpi *m, struct base_err *err)
 {
     static const struct job_transport_calls calls = {.send = send_message,
                                                      .receive = receive_message,
-                                                     .broadcast = begin_broadcast,
-                                                     .test = test_collective,
                                                      .close = close_all,
                                                      .abort = abort_all};
     struct job_process self = {.pid = (long)getpid()};

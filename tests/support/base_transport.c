@@ -14,18 +14,10 @@ struct message {
     size_t size;
 };
 
-/* A collective that a process has begun. */
-struct collective {
-    void *data;
-    size_t size;
-    int done;
-};
-
 struct end {
     struct job_transport face; /* first */
     struct base_transport *all;
     struct message *first, *last; /* guarded by the lock of all, with all below */
-    struct collective collective;
 };
 
 struct base_transport {
@@ -33,7 +25,7 @@ struct base_transport {
     pthread_cond_t arrival;
     struct job_process list[BASE_TRANSPORT_MAX];
     struct end ends[BASE_TRANSPORT_MAX];
-    int count, aborted, begun;        /* begun: processes in the collective under way */
+    int count, aborted;
     void (*nothing_came)(void *data); /* of rank 0, with data; NULL: nobody listens */
     void *data;
 };
@@ -88,43 +80,6 @@ static int receive_message(struct job_transport *face, double wait_s, int *rank,
     return 1;
 }
 
-/* All have begun it: everybody gets the bytes of rank 0. */
-static void perform(struct base_transport *all)
-{
-    const struct collective *c = &all->ends[0].collective;
-    for (int r = 0; r < all->count; r++) {
-        struct collective *to = &all->ends[r].collective;
-        if (to->size != c->size)
-            abort(); /* the test's processes are out of step */
-        if (r > 0 && c->size > 0)
-            memcpy(to->data, c->data, c->size);
-        to->done = 1;
-    }
-    all->begun = 0;
-}
-
-static int begin_broadcast(struct job_transport *face, void *data, size_t size, struct base_err *err)
-{
-    struct end *end = (struct end *)face;
-    (void)err;
-    pthread_mutex_lock(&end->all->lock);
-    end->collective = (struct collective){data, size, 0};
-    if (++end->all->begun == end->all->count)
-        perform(end->all);
-    pthread_mutex_unlock(&end->all->lock);
-    return 0;
-}
-
-static int test_collective(struct job_transport *face, struct base_err *err)
-{
-    struct end *end = (struct end *)face;
-    (void)err;
-    pthread_mutex_lock(&end->all->lock);
-    int done = end->collective.done;
-    pthread_mutex_unlock(&end->all->lock);
-    return done;
-}
-
 static void leave(struct job_transport *face) { (void)face; }
 
 static void count_abort(struct job_transport *face, int status)
@@ -140,8 +95,6 @@ struct base_transport *base_transport_create(int count)
 {
     static const struct job_transport_calls calls = {.send = send_message,
                                                      .receive = receive_message,
-                                                     .broadcast = begin_broadcast,
-                                                     .test = test_collective,
                                                      .close = leave,
                                                      .abort = count_abort};
     struct base_transport *all = calloc(1, sizeof *all);

@@ -1,4 +1,4 @@
-/* The processes of a job: collectives and farms, whoever is late; who differs, ends early, is silent or dead is named. The processes
+/* The processes of a job: farms, whoever is late; who differs, ends early, is silent or dead is named. The processes
  * are threads of the test. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -63,41 +63,12 @@ static void all_well(const struct seat *seats, int count)
 
 static void nap(int ms) { nanosleep(&(struct timespec){.tv_nsec = ms * 1000000L}, NULL); }
 
-/* --- collectives ------------------------------------------------------------------------------------------------------- */
-
-/* Low ranks are late. */
-static void hear(struct seat *s)
-{
-    const int rank = job_rank(s->job), count = job_count(s->job);
-    for (int round = 0; round < 3 && !s->rc; round++) {
-        int word = rank == 0 ? 42 + round : 0;
-        nap(count - rank);
-        s->rc = job_broadcast(s->job, &word, sizeof word) || job_broadcast(s->job, NULL, 0) || word != 42 + round;
-    }
-    struct job_traffic t = job_traffic(s->job);
-    s->rc |= t.messages < 6 || t.bytes < 3 * sizeof(int) || !(t.waiting_s >= 0);
-}
-
-static void collectives_reach_everybody(void **state)
-{
-    const int counts[] = {2, 3, 8};
-    for (size_t k = 0; k < sizeof counts / sizeof counts[0]; k++) {
-        struct seat seats[BASE_TRANSPORT_MAX];
-        assert_int_equal(together(seats, counts[k], hear, 0), 0);
-        all_well(seats, counts[k]);
-    }
-    (void)state;
-}
-
 static void nobody_else_is_a_job_too(void **state)
 {
-    double d[2] = {3, 4};
     struct base_err err = {0};
-    assert_int_equal(job_broadcast(NULL, d, sizeof d), 0);
     assert_int_equal(job_handshake(NULL, "a=1\n", 1, &err), 0);
     assert_int_equal(job_find_dead(NULL, &err), 0);
     assert_int_equal(job_close(NULL, 5, "", &err), 5);
-    assert_true(d[0] == 3 && d[1] == 4);
     (void)state;
 }
 
@@ -177,9 +148,10 @@ static void farm_twice(struct seat *s)
         s->rc = job_share(s->job, c->threads, &farm, &service, &s->err);
         for (uint64_t i = 0; i < farm.count && !s->rc && job_rank(s->job) == 0; i++)
             s->rc = c->square[i] != i * i;
-        if (!s->rc)
-            s->rc = job_broadcast(s->job, c->square, sizeof c->square);
     }
+    const struct job_traffic t = job_traffic(s->job);
+    if (!s->rc && s->job)
+        s->rc = t.messages < 2 || t.bytes < 2 * sizeof(struct job_message) || !(t.waiting_s >= 0);
     base_threads_destroy(c->threads);
     free(c);
 }
@@ -290,57 +262,6 @@ static void who_does_not_say_hello_is_named(void **state)
     }
 }
 
-/* Rank 1 fails while the others wait in a collective, which they cannot leave in order. */
-static void fail_early(struct seat *s)
-{
-    int word = 1;
-    if (job_rank(s->job) == 1) {
-        nap(20);
-        s->rc = 1;
-        s->said = "disk full";
-        return;
-    }
-    s->rc = job_broadcast(s->job, &word, sizeof word);
-    job_failed(s->job, &s->err);
-}
-
-static void who_fails_in_a_collective_says_why(void **state)
-{
-    (void)state;
-    struct base_transport *transport = base_transport_create(2);
-    struct seat seats[2] = {{.work = fail_early}, {.work = fail_early}};
-    for (int r = 0; r < 2; r++)
-        assert_int_equal(job_create(base_transport_of(transport, r), &seats[r].job, NULL), 0);
-    pthread_create(&seats[0].thread, NULL, sit, &seats[0]);
-    struct job_farewell *f = calloc(1, sizeof *f); /* rank 1, without waiting for an end that an abort takes the place of */
-    *f = (struct job_farewell){.head.kind = JOB_FAREWELL, .status = 2, .text = "disk full"};
-    job_send(seats[1].job, 0, f, sizeof *f);
-    pthread_join(seats[0].thread, NULL);
-    assert_string_equal(seats[0].err.text, "rank 1 on host here: disk full");
-    assert_int_equal(seats[0].status, 2);
-    assert_int_equal(base_transport_aborted(transport), 1);
-    free(seats[1].job->workers);
-    free(seats[1].job);
-    base_transport_destroy(transport);
-}
-
-/* Rank 1 has had its part of the last collective and goes, while rank 2 is late. */
-static void finish_and_go(struct seat *s)
-{
-    int word = 7;
-    nap(job_rank(s->job) == 2 ? 20 : 0);
-    s->rc = job_broadcast(s->job, &word, sizeof word);
-    job_failed(s->job, &s->err);
-}
-
-static void who_has_done_its_part_may_go(void **state)
-{
-    (void)state;
-    struct seat seats[3];
-    assert_int_equal(together(seats, 3, finish_and_go, 0), 0);
-    all_well(seats, 3);
-}
-
 static void fail_after_work(struct seat *s)
 {
     nap(job_rank(s->job) == 2 ? 20 : 1);
@@ -359,19 +280,14 @@ static void the_job_has_the_status_of_who_failed(void **state)
     (void)state;
 }
 
-/* Rank 1 never comes; rank 2 waits in the collective too and says so. */
-static void wait_in_collective(struct seat *s)
-{
-    double d = 1;
-    s->rc = job_broadcast(s->job, &d, sizeof d);
-    job_failed(s->job, &s->err);
-}
+/* Rank 1 never comes. */
+static void wait_for_all(struct seat *s) { s->rc = job_handshake(s->job, "a=1\n", 1, &s->err); }
 
 static void who_is_silent_is_given_up(void **state)
 {
     (void)state;
     struct base_transport *transport = base_transport_create(3);
-    struct seat seats[3] = {{.work = wait_in_collective}, {0}, {.work = wait_in_collective}};
+    struct seat seats[3] = {{.work = wait_for_all}, {0}, {.work = wait_for_all}};
     for (int r = 0; r < 3; r += 2) {
         assert_int_equal(job_create(base_transport_of(transport, r), &seats[r].job, NULL), 0);
         job_watch(seats[r].job, 0.2, NULL);
@@ -386,36 +302,7 @@ static void who_is_silent_is_given_up(void **state)
     struct job_transport *t = base_transport_of(transport, 0);
     t->calls->send(t, 2, end, sizeof *end, NULL);
     pthread_join(seats[2].thread, NULL);
-    assert_int_equal(seats[2].rc, BASE_EIO);
-    base_transport_destroy(transport);
-}
-
-static void a_slow_collective_is_waited_for(void **state)
-{
-    (void)state;
-    struct base_transport *transport = base_transport_create(2);
-    struct job_transport *t = base_transport_of(transport, 1);
-    struct seat first = {.work = wait_in_collective};
-    double d = 2;
-    assert_int_equal(job_create(base_transport_of(transport, 0), &first.job, NULL), 0);
-    job_watch(first.job, 0.1, NULL);
-    assert_int_equal(pthread_create(&first.thread, NULL, sit, &first), 0);
-    for (int asked = 0; asked < 2;) { /* a roll call twice: present, but slow */
-        int rank;
-        void *data;
-        size_t size;
-        if (t->calls->receive(t, 0.05, &rank, &data, &size, NULL) > 0) {
-            asked += ((struct job_message *)data)->kind == JOB_PRESENT;
-            t->calls->send(t, 0, data, size, NULL);
-        }
-    }
-    t->calls->broadcast(t, &d, sizeof d, NULL);
-    struct job_farewell *f = calloc(1, sizeof *f);
-    f->head.kind = JOB_FAREWELL;
-    t->calls->send(t, 0, f, sizeof *f, NULL);
-    pthread_join(first.thread, NULL);
-    assert_int_equal(first.status, 0);
-    assert_true(d == 1);
+    assert_int_equal(seats[2].rc, 0);
     base_transport_destroy(transport);
 }
 
@@ -445,18 +332,14 @@ static void who_is_dead_is_named(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(collectives_reach_everybody),
         cmocka_unit_test(nobody_else_is_a_job_too),
         cmocka_unit_test(a_farm_does_every_item_once),
         cmocka_unit_test(a_bad_item_ends_the_farm),
         cmocka_unit_test(an_answer_that_is_refused_names_who_gave_it),
         cmocka_unit_test(who_differs_is_named_with_the_line),
         cmocka_unit_test(who_does_not_say_hello_is_named),
-        cmocka_unit_test(who_fails_in_a_collective_says_why),
-        cmocka_unit_test(who_has_done_its_part_may_go),
         cmocka_unit_test(the_job_has_the_status_of_who_failed),
         cmocka_unit_test(who_is_silent_is_given_up),
-        cmocka_unit_test(a_slow_collective_is_waited_for),
         cmocka_unit_test(who_is_dead_is_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
