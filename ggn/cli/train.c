@@ -63,8 +63,6 @@ static const struct base_option list[] = {
          "buffers at the recorded levels; preset lull only (0)"},
     {"scalars", 0, "N", TO(plan.scalars), 0, 1, .role = BASE_DECIDES,
      .help = "1: with --residual, also tell the network what was measured (lull 1)"},
-    {"painted", 0, "N", TO(plan.painted), 0, 63, .role = BASE_DECIDES,
-     .help = "with --residual: series per block that are painted with a pattern and exposed otherwise (lull 1)"},
     {"synthetic", 0, "N", TO(plan.synthetic), 0, 63, .role = BASE_DECIDES,
      .help = "synthetic sequences per block, made from its half buffers (lull 1)"},
     {"extend", 0, "N", TO(plan.extend), 0, 1, .role = BASE_DECIDES,

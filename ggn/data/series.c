@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <zlib.h>
 
 #include "model/window.h"
 #include "sequence/simulate.h"
@@ -56,6 +57,28 @@ struct ggn_level_series *ggn_series_set_append(struct ggn_series_set *set, struc
     struct ggn_level_series *c = &set->series[set->n++];
     *c = (struct ggn_level_series){0};
     return c;
+}
+
+uint32_t ggn_series_set_crc(const struct ggn_series_set *set)
+{
+    const size_t values = ggn_series_set_values(set);
+    uLong crc = crc32(0, NULL, 0);
+
+    for (int i = 0; i < set->n; i++) {
+        const struct ggn_level_series *c = &set->series[i];
+        const double what[] = {c->split, c->block, c->n_levels, c->has_label ? c->label.threshold : -1};
+        crc = crc32_z(crc, (const Bytef *)what, sizeof what);
+        if (c->n_levels > 0)
+            crc = crc32_z(crc, c->noisy, (size_t)c->n_levels * values);
+        if (c->reference)
+            crc = crc32_z(crc, c->reference, values);
+        for (int k = 0; c->noise_map && k < c->n_levels; k++) {
+            crc = crc32_z(crc, &c->has_noise_map[k], 1);
+            if (c->has_noise_map[k]) /* otherwise nobody has written it */
+                crc = crc32_z(crc, c->noise_map + (size_t)k * (values / 3), values / 3);
+        }
+    }
+    return (uint32_t)crc;
 }
 
 /* --- series --- */

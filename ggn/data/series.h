@@ -76,12 +76,6 @@ int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uin
  * stays: its levels have noise of their own. */
 int ggn_series_set_extend(struct ggn_series_set *set, uint32_t seed, struct base_err *err);
 
-/* Adds `per_series` synthetic series for each training series that has a full level, as of surfaces that no scene has: light
- * and noise of the recording times a pattern (tiles, stripes, dots, leaves, brushed metal, cloth, print; 2 to 64 px; any
- * contrast) and an exposure of up to two stops either way. Labelled where the law's r falls below `level`. Needs the
- * measures. */
-int ggn_series_set_paint(struct ggn_series_set *set, int per_series, double level, uint32_t seed, struct base_err *err);
-
 /* Makes every labelled series that has a full level anew, its levels `ratio` > 1 apart and up to SEQ_SIMULATED_CAP: from
  * the two halves alone, so that series with and without a reference are made alike. The same seed gives the same series. */
 int ggn_series_set_simulate(struct ggn_series_set *set, double ratio, uint32_t seed, struct base_err *err);
@@ -93,6 +87,9 @@ void ggn_series_set_pace(const struct ggn_series_set *set, struct ggn_policy *po
 int ggn_series_set_count(const struct ggn_series_set *set, enum ggn_split split, int real_only);
 /* Values of one image: 3·H·W. */
 size_t ggn_series_set_values(const struct ggn_series_set *set);
+
+/* CRC-32 of the images and labels. */
+uint32_t ggn_series_set_crc(const struct ggn_series_set *set);
 
 /* Makes room for n levels, or for more. */
 int ggn_series_grow(const struct ggn_series_set *set, struct ggn_level_series *series, int n, struct base_err *err);

@@ -145,9 +145,3 @@ double ggn_inference_logit(struct ggn_inference *j, const uint8_t *const *noisy,
     }
     return highest;
 }
-
-const float *ggn_inference_feature_map(const struct ggn_inference *j, int which, int *row)
-{
-    *row = input(j, GGN_NET_D)->row;
-    return ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, which);
-}

@@ -30,8 +30,5 @@ void ggn_inference_denoise(struct ggn_inference *inference, const uint8_t *noisy
  * overflow on this window. */
 double ggn_inference_logit(struct ggn_inference *inference, const uint8_t *const *noisy, const uint16_t *const *denoised,
                            const uint8_t *noise_map, const float *scalars, int width, int height);
-/* The noise feature map of the last tile that was judged, for pictures: 0 of the denoised window, 1 of the noisy one. Rows
- * are *row apart. Borrowed until the next call. */
-const float *ggn_inference_feature_map(const struct ggn_inference *inference, int which, int *row);
 
 #endif

@@ -14,68 +14,42 @@ enum { SIMULATED = 49 };
 
 static double simulated_spp(int i) { return SEQ_SIMULATED_CAP * exp2(0.25 * (i - (SIMULATED - 1))); }
 
-/* What is measured: a part of one block, or several blocks of one size side by side as one larger block. */
 struct planes {
-    const struct seq_block *blocks; /* borrows; [down][across] */
-    int across, down;
-    int x0, y0, width, height;       /* the part; whole where there are several blocks */
-    size_t pixels;                   /* of the part */
-    float *one;                      /* [2][3][pixels of one block]: mean and half difference */
-    float *mean, *difference, *work; /* [3][P], linear; one allocation with the others, `one` owns it */
+    const struct seq_block *block; /* borrows */
+    int width, height;
+    size_t pixels;
+    float *mean, *difference, *work; /* [3][P], linear; one allocation with the others, `mean` owns it */
     float *lightness[3];             /* [P] */
     double *texture, *scratch;       /* [patches]; one allocation, `texture` owns it */
 };
 
 static void planes_release(struct planes *p)
 {
-    free(p->one);
+    free(p->mean);
     free(p->texture);
     *p = (struct planes){0};
 }
 
-/* The caller has set blocks, across, down and the part. */
-static int planes_allocate(struct planes *p, struct base_err *err)
+static int planes_init(struct planes *p, const struct seq_block *block, struct base_err *err)
 {
-    size_t n = (size_t)p->width * (size_t)p->height, whole = (size_t)p->blocks->width * p->blocks->height;
-    size_t patches = ggn_visible_patches(p->width, p->height);
-    p->pixels = n;
-    p->one = malloc((6 * whole + 12 * n) * sizeof *p->one);
-    p->texture = malloc((patches + ggn_visibility_scratch(p->width)) * sizeof *p->texture);
-    if (!p->one || !p->texture) {
+    const int width = (int)block->width, height = (int)block->height;
+    const size_t n = (size_t)block->width * block->height, patches = ggn_visible_patches(width, height);
+    *p = (struct planes){.block = block,
+                         .width = width,
+                         .height = height,
+                         .pixels = n,
+                         .mean = malloc(12 * n * sizeof *p->mean),
+                         .texture = malloc((patches + ggn_visibility_scratch(width)) * sizeof *p->texture)};
+    if (!p->mean || !p->texture) {
         planes_release(p);
         return base_fail_nomem(err, "observer");
     }
     p->scratch = p->texture + patches;
-    p->mean = p->one + 6 * whole;
     p->difference = p->mean + 3 * n;
     p->work = p->mean + 6 * n;
     for (int i = 0; i < 3; i++)
         p->lightness[i] = p->mean + (9 + (size_t)i) * n;
     return 0;
-}
-
-/* Room for `across` x `down` whole blocks. */
-static int planes_init(struct planes *p, const struct seq_block *blocks, int across, int down, struct base_err *err)
-{
-    *p = (struct planes){.blocks = blocks,
-                         .across = across,
-                         .down = down,
-                         .width = across * (int)blocks->width,
-                         .height = down * (int)blocks->height};
-    return planes_allocate(p, err);
-}
-
-/* Puts part `which` of p->one, of block k, where it belongs in planes [3][P]. */
-static void place(const struct planes *p, int k, size_t which, float *to)
-{
-    const size_t w = p->blocks->width, h = p->blocks->height, row = (size_t)p->width;
-    const int alone = p->across * p->down == 1;
-    const size_t columns = alone ? row : w, rows = alone ? (size_t)p->height : h;
-    const size_t x = w * (size_t)(k % p->across), y = h * (size_t)(k / p->across);
-    for (size_t c = 0; c < 3; c++)
-        for (size_t i = 0; i < rows; i++)
-            memcpy(to + c * p->pixels + (y + i) * row + x,
-                   p->one + ((3 * which + c) * h + (size_t)p->y0 + i) * w + (size_t)p->x0, columns * sizeof *to);
 }
 
 /* L* of mean + scale * difference. */
@@ -104,28 +78,10 @@ static void see_texture(struct planes *p)
     ggn_visible_texture(p->lightness[0], p->lightness[1], p->width, p->height, p->scratch, p->texture);
 }
 
-/* Mean and half difference of the level at spp, which every block has. */
+/* Mean and half difference of the level at spp. */
 static int read_level(struct planes *p, uint32_t spp, struct base_err *err)
 {
-    for (int k = 0; k < p->across * p->down; k++) {
-        const struct seq_block *b = &p->blocks[k];
-        int rc = seq_halves(b, seq_level(b, spp), p->one, p->one + 3 * (size_t)b->width * b->height, err);
-        if (rc)
-            return rc;
-        place(p, k, 0, p->mean);
-        place(p, k, 1, p->difference);
-    }
-    return 0;
-}
-
-static int all_have_halves(const struct planes *p, uint32_t spp)
-{
-    for (int k = 0; k < p->across * p->down; k++) {
-        const struct seq_record *r = seq_level(&p->blocks[k], spp);
-        if (!r || !seq_has_halves(r))
-            return 0;
-    }
-    return 1;
+    return seq_halves(p->block, seq_level(p->block, spp), p->mean, p->difference, err);
 }
 
 static void append(struct ggn_curve *c, double spp, double seen)
@@ -138,15 +94,15 @@ static void append(struct ggn_curve *c, double spp, double seen)
  * of few samples is skewed to bright. */
 static int add_recorded_halves(struct ggn_curve *c, struct planes *p, uint32_t full_spp, struct base_err *err)
 {
-    for (uint32_t i = 0; i < p->blocks->n_levels; i++) {
-        uint32_t spp = p->blocks->levels[i].spp;
-        if (spp >= full_spp || !all_have_halves(p, spp))
+    for (uint32_t i = 0; i < p->block->n_levels; i++) {
+        const struct seq_record *r = &p->block->levels[i];
+        if (r->spp >= full_spp || !seq_has_halves(r))
             continue;
-        int rc = read_level(p, spp, err);
+        int rc = seq_halves(p->block, r, p->mean, p->difference, err);
         if (rc)
             return rc;
         read_halves(p, 1.0);
-        append(c, spp, visible(p, 0.5f));
+        append(c, r->spp, visible(p, 0.5f));
     }
     return 0;
 }
@@ -155,7 +111,7 @@ static int add_recorded_halves(struct ggn_curve *c, struct planes *p, uint32_t f
  * that it stands for. */
 static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, struct base_err *err)
 {
-    const uint32_t full = seq_full_level(p->blocks)->spp;
+    const uint32_t full = seq_full_level(p->block)->spp;
     const int first = c->n == 0;
     int rc = read_level(p, full, err);
     if (!rc && first) {
@@ -181,7 +137,7 @@ static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, stru
 /* The picture at each recorded level against the reference. */
 static int add_levels(struct ggn_curve *c, struct planes *p, int independent, struct base_err *err)
 {
-    const struct seq_block *b = p->blocks;
+    const struct seq_block *b = p->block;
     const struct seq_record *last = &b->levels[b->n_levels - 1];
     double n_r = b->reference->spp;
     int rc = seq_mean(b, b->reference, p->mean, err);
@@ -215,17 +171,6 @@ static int curve_init(struct ggn_curve *c, const struct seq_block *block, struct
     return c->spp && c->visible ? 0 : base_fail_nomem(err, "observer");
 }
 
-/* Hands over the curve, or releases it. */
-static int finish(int rc, struct ggn_curve *c, struct planes *p, struct ggn_curve *out)
-{
-    planes_release(p);
-    if (rc)
-        ggn_curve_release(c);
-    else
-        *out = *c;
-    return rc;
-}
-
 int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, int reference_independent,
                    struct ggn_curve *curve, struct base_err *err)
 {
@@ -239,47 +184,17 @@ int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, 
         return base_fail(err, BASE_EINVAL, "block %u has no reference: record one, or use --source halves", block->id);
     int rc = curve_init(&c, block, err);
     if (!rc)
-        rc = planes_init(&p, block, 1, 1, err);
+        rc = planes_init(&p, block, err);
     if (!rc && source == GGN_FROM_LEVELS)
         rc = add_levels(&c, &p, reference_independent, err);
     if (!rc && (source == GGN_FROM_HALVES || (reference_independent && seq_full_level(block))))
         rc = add_halves(&c, &p, c.n > 0 ? 1.07 * c.spp[c.n - 1] : 0.0, err);
-    return finish(rc, &c, &p, curve);
-}
-
-int ggn_curve_part(const struct seq_block *block, int x0, int y0, int width, int height, struct ggn_curve *curve,
-                   struct base_err *err)
-{
-    struct ggn_curve c;
-    struct planes p = {.blocks = block, .across = 1, .down = 1, .x0 = x0, .y0 = y0, .width = width, .height = height};
-    if (x0 < 0 || y0 < 0 || width < 1 || height < 1 || x0 + width > (int)block->width || y0 + height > (int)block->height)
-        return base_fail(err, BASE_EINVAL, "block %u has no part %dx%d at %d, %d", block->id, width, height, x0, y0);
-    if (!seq_full_level(block))
-        return base_fail(err, BASE_EINVAL, "block %u has no full level with a half-buffer difference", block->id);
-    int rc = curve_init(&c, block, err);
-    if (!rc)
-        rc = planes_allocate(&p, err);
-    if (!rc)
-        rc = add_halves(&c, &p, 0.0, err);
-    return finish(rc, &c, &p, curve);
-}
-
-int ggn_curve_joined(const struct seq_block *blocks, int across, int down, struct ggn_curve *curve, struct base_err *err)
-{
-    struct ggn_curve c;
-    struct planes p = {0};
-    for (int k = 0; k < across * down; k++) {
-        const struct seq_record *full = seq_full_level(&blocks[k]), *first = seq_full_level(&blocks[0]);
-        if (!full || full->spp != first->spp || blocks[k].width != blocks->width || blocks[k].height != blocks->height)
-            return base_fail(err, BASE_EINVAL, "blocks %u and %u have no full levels of the same size and samples",
-                             blocks[0].id, blocks[k].id);
-    }
-    int rc = curve_init(&c, blocks, err);
-    if (!rc)
-        rc = planes_init(&p, blocks, across, down, err);
-    if (!rc)
-        rc = add_halves(&c, &p, 0.0, err);
-    return finish(rc, &c, &p, curve);
+    planes_release(&p);
+    if (rc)
+        ggn_curve_release(&c);
+    else
+        *curve = c;
+    return rc;
 }
 
 /* What is seen of mean +- difference. */
@@ -293,7 +208,7 @@ static double see_both(struct planes *p)
 int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible_out, struct base_err *err)
 {
     struct planes p;
-    int rc = planes_init(&p, block, 1, 1, err);
+    int rc = planes_init(&p, block, err);
     if (!rc)
         rc = read_level(&p, level->spp, err);
     if (!rc)
@@ -306,7 +221,7 @@ int ggn_curve_means(const struct seq_block *block, const struct seq_record *earl
                     double *visible_out, struct base_err *err)
 {
     struct planes p;
-    int rc = planes_init(&p, block, 1, 1, err);
+    int rc = planes_init(&p, block, err);
     if (!rc)
         rc = seq_mean(block, earlier, p.difference, err);
     if (!rc)

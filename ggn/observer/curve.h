@@ -25,12 +25,6 @@ struct ggn_curve {
 /* BASE_EINVAL: GGN_FROM_HALVES without a full level, GGN_FROM_LEVELS without a reference. */
 int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, int reference_independent,
                    struct ggn_curve *curve, struct base_err *err);
-/* The curve of a part of the block, as of a smaller block, from its halves. BASE_EINVAL also when it is not inside. */
-int ggn_curve_part(const struct seq_block *block, int x0, int y0, int width, int height, struct ggn_curve *curve,
-                   struct base_err *err);
-/* The curve of across x down blocks of one size side by side, row by row, as of one larger block, from their halves.
- * BASE_EINVAL also when their full levels have different samples. */
-int ggn_curve_joined(const struct seq_block *blocks, int across, int down, struct ggn_curve *curve, struct base_err *err);
 void ggn_curve_release(struct ggn_curve *curve);
 
 /* Visible noise of one recorded level as the criterion `observer` sees it in the renderer: from the level's own two halves

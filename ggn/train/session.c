@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "base/pi.h"
-#include "data/agree.h"
 #include "nn/hash.h"
 #include "observer/observer.h"
 
@@ -60,7 +59,7 @@ static int check_plan(const struct ggn_session *s, struct base_err *err)
     if (!paper && (s->crop < 16 || s->crop > s->set.width || s->crop > s->set.height))
         return base_fail(err, BASE_EINVAL, "crop %d is not in 16..%d, the side of the blocks", s->crop, side_of(s));
     if (paper && (p->noise_map > 0 || p->reach > 0))
-        return base_fail(err, BASE_EINVAL, "preset paper has neither noise pictures, averaged weights nor a residual");
+        return base_fail(err, BASE_EINVAL, "preset paper has neither noise pictures nor a residual");
     if (p->noise_map > 0 && !(p->reach > 0))
         return base_fail(err, BASE_EINVAL, "a noise picture is of the visible noise: --picture goes with --residual");
     if (p->k_r < 3)
@@ -100,8 +99,6 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
         rc = ggn_series_set_add_synthetic(&s->set, p->synthetic, p->seed, err);
     if (!rc && p->extend)
         rc = ggn_series_set_extend(&s->set, p->seed, err);
-    if (!rc && p->reach > 0 && p->painted > 0)
-        rc = ggn_series_set_paint(&s->set, p->painted, ggn_observer_default.level, p->seed, err);
     if (rc)
         return rc;
     struct ggn_window_options train = {

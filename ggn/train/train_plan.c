@@ -25,7 +25,6 @@ struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset)
         .flips = lull,
         .jitter = lull ? 0.3 : 0,
         .scalars = lull,
-        .painted = lull,
         .synthetic = lull ? 1 : 0,
         .extend = lull,
         .validation_windows = 400,

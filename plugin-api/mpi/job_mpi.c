@@ -168,10 +168,8 @@ const char *job_mpi_library(void)
 /* Everybody tells everybody who it is. */
 static int introduce(struct mpi *m, struct base_err *err)
 {
-    static const struct job_transport_calls calls = {.send = send_message,
-                                                     .receive = receive_message,
-                                                     .close = close_all,
-                                                     .abort = abort_all};
+    static const struct job_transport_calls calls = {
+        .send = send_message, .receive = receive_message, .close = close_all, .abort = abort_all};
     struct job_process self = {.pid = (long)getpid()};
     MPI_Comm_rank(m->world, &m->face.rank);
     MPI_Comm_size(m->world, &m->face.count);

@@ -21,7 +21,6 @@
 #include <cjson/cJSON.h>
 
 #include "base/files.h"
-#include "data/agree.h"
 #include "model/container.h"
 #include "model/model.h"
 #include "support/approve.h"

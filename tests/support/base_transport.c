@@ -93,10 +93,8 @@ static void count_abort(struct job_transport *face, int status)
 
 struct base_transport *base_transport_create(int count)
 {
-    static const struct job_transport_calls calls = {.send = send_message,
-                                                     .receive = receive_message,
-                                                     .close = leave,
-                                                     .abort = count_abort};
+    static const struct job_transport_calls calls = {
+        .send = send_message, .receive = receive_message, .close = leave, .abort = count_abort};
     struct base_transport *all = calloc(1, sizeof *all);
     if (!all)
         return NULL;

@@ -155,75 +155,23 @@ static const struct seq_record *full_of(const struct seq_block *b)
     return r;
 }
 
-/* A part is judged as a block of its size would be: by hand from the cropped halves; the whole is a part too. */
-static void parts(void **state)
-{
-    (void)state;
-    enum { X = 17, Y = 9, PW = 40, PH = 30, AT = 20 };
-    static float mean[3 * P], d[3 * P], cut[2][3 * PW * PH];
-    struct ggn_curve whole, all, part;
-    struct base_err err = {0};
-    struct seq_block b = make_block(0.3, 0.2, 11, 0);
-    const struct seq_record *full = full_of(&b);
-    assert_int_equal(ggn_curve_make(&b, GGN_FROM_HALVES, 1, &whole, &err), 0);
-    assert_int_equal(ggn_curve_part(&b, 0, 0, W, H, &all, &err), 0);
-    assert_int_equal(ggn_curve_part(&b, X, Y, PW, PH, &part, &err), 0);
-    assert_memory_equal(whole.visible, all.visible, (size_t)all.n * sizeof *all.visible);
-    assert_int_equal(seq_mean(&b, full, mean, &err), 0);
-    assert_int_equal(seq_half(&b, full, d, &err), 0);
-    for (int c = 0; c < 3; c++)
-        for (int k = 0; k < PW * PH; k++) {
-            int at = c * P + (Y + k / PW) * W + X + k % PW;
-            cut[0][c * PW * PH + k] = mean[at];
-            cut[1][c * PW * PH + k] = d[at];
-        }
-    assert_true(part.spp[AT] > full->spp);
-    assert_near(seen_by_hand(cut[0], cut[1], PW, PH, sqrt(full->spp / part.spp[AT])), part.visible[AT],
-                1e-5 * part.visible[AT]);
-    assert_int_equal(ggn_curve_part(&b, X, Y, W, PH, &all, &err), BASE_EINVAL);
-    assert_non_null(strstr(err.text, "has no part"));
-    ggn_curve_release(&whole);
-    ggn_curve_release(&all);
-    ggn_curve_release(&part);
-    seq_block_release(&b);
-}
-
-/* Blocks side by side are judged as one: by hand from their planes beside each other; one block alone is itself. */
-static void joined(void **state)
+/* A level that halves stand for, by hand from their planes. */
+static void simulated_by_hand(void **state)
 {
     (void)state;
     enum { AT = 20 };
-    static float planes[2][3 * P], pair[2][3 * 2 * P];
+    static float mean[3 * P], d[3 * P];
+    struct ggn_curve c;
     struct base_err err = {0};
-    struct seq_block b[2] = {make_block(0.3, 0.2, 11, 0), make_block(0.6, 0.1, 12, 0)};
-    struct ggn_curve whole, one, two;
-    assert_int_equal(ggn_curve_make(&b[0], GGN_FROM_HALVES, 1, &whole, &err), 0);
-    assert_int_equal(ggn_curve_joined(b, 1, 1, &one, &err), 0);
-    assert_memory_equal(whole.visible, one.visible, (size_t)one.n * sizeof *one.visible);
-    assert_int_equal(ggn_curve_joined(b, 2, 1, &two, &err), 0);
-    for (int k = 0; k < 2; k++) {
-        assert_int_equal(seq_mean(&b[k], full_of(&b[k]), planes[0], &err), 0);
-        assert_int_equal(seq_half(&b[k], full_of(&b[k]), planes[1], &err), 0);
-        for (int what = 0; what < 2; what++)
-            for (int v = 0; v < 3 * P; v++)
-                pair[what][v / P * 2 * P + v % P / W * 2 * W + k * W + v % W] = planes[what][v];
-    }
-    assert_true(two.spp[AT] > full_of(&b[0])->spp);
-    assert_near(seen_by_hand(pair[0], pair[1], 2 * W, H, sqrt(full_of(&b[0])->spp / two.spp[AT])), two.visible[AT],
-                1e-5 * two.visible[AT]);
-    const int levels_of_both = two.recorded;
-    ggn_curve_release(&two);
-    b[1].levels[0].spp += 1; /* one has no such level: it is left out */
-    assert_int_equal(ggn_curve_joined(b, 2, 1, &two, &err), 0);
-    assert_int_equal(two.recorded, levels_of_both - 1);
-    ggn_curve_release(&two);
-    b[1].levels[full_of(&b[1]) - b[1].levels].spp += 1; /* another level than the first block's */
-    assert_int_equal(ggn_curve_joined(b, 2, 1, &two, &err), BASE_EINVAL);
-    assert_non_null(strstr(err.text, "same size and samples"));
-    ggn_curve_release(&whole);
-    ggn_curve_release(&one);
-    for (int k = 0; k < 2; k++)
-        seq_block_release(&b[k]);
+    struct seq_block b = make_block(0.3, 0.2, 11, 0);
+    const struct seq_record *full = full_of(&b);
+    assert_int_equal(ggn_curve_make(&b, GGN_FROM_HALVES, 1, &c, &err), 0);
+    assert_int_equal(seq_mean(&b, full, mean, &err), 0);
+    assert_int_equal(seq_half(&b, full, d, &err), 0);
+    assert_true(c.spp[AT] > full->spp);
+    assert_near(seen_by_hand(mean, d, W, H, sqrt(full->spp / c.spp[AT])), c.visible[AT], 1e-5 * c.visible[AT]);
+    ggn_curve_release(&c);
+    seq_block_release(&b);
 }
 
 /* Every place of a curve: which levels there are, and what lies between them. */
@@ -307,10 +255,13 @@ static void levels_by_hand(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(thresholds),      cmocka_unit_test(scaling),
-        cmocka_unit_test(noisy_reference), cmocka_unit_test(beyond_the_last_level),
-        cmocka_unit_test(needs),           cmocka_unit_test(parts),
-        cmocka_unit_test(joined),          cmocka_unit_test(levels_of_curves),
+        cmocka_unit_test(thresholds),
+        cmocka_unit_test(scaling),
+        cmocka_unit_test(noisy_reference),
+        cmocka_unit_test(beyond_the_last_level),
+        cmocka_unit_test(needs),
+        cmocka_unit_test(simulated_by_hand),
+        cmocka_unit_test(levels_of_curves),
         cmocka_unit_test(levels_by_hand),
     };
     return cmocka_run_group_tests_name("observer curves", tests, NULL, NULL);

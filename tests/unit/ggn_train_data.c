@@ -247,34 +247,6 @@ static void measures_are_the_law(void **state)
     (void)state;
 }
 
-/* Painted series are labelled where their own noise falls below the level, and none looks like another. */
-static void painted_series_are_labelled_by_the_law(void **state)
-{
-    const double level = 0.26;
-    char own[] = "/tmp/ggn_painted.XXXXXX";
-    struct ggn_series_set set;
-    struct base_err err = {0};
-    double low = INFINITY, high = 0;
-
-    load_measured(&set, own);
-    const int recorded = set.n, trained = ggn_series_set_count(&set, GGN_SPLIT_TRAIN, 1);
-    assert_int_equal(ggn_series_set_paint(&set, 2, level, 5, &err), 0);
-    assert_int_equal(set.n, recorded + 2 * trained);
-    for (int i = recorded; i < set.n; i++) {
-        const struct ggn_level_series *c = &set.series[i];
-        assert_true(c->synthetic && c->split == GGN_SPLIT_TRAIN && c->has_label && !c->reference);
-        for (int k = 0; k < c->n_levels; k++)
-            if (!c->label.censored && fabs(log2(c->spp[k] / c->label.threshold)) > 1e-6)
-                assert_int_equal(c->measure[k].visible > level, c->spp[k] < c->label.threshold);
-        low = fmin(low, c->measure[4].texture);
-        high = fmax(high, c->measure[4].texture);
-    }
-    assert_true(high - low > 1); /* of contrasts that the recordings do not have */
-    ggn_series_set_release(&set);
-    remove_all(own);
-    (void)state;
-}
-
 /* Flips and gains as of the images, and nothing for the share of samples that goes without. */
 static void pictures_are_augmented_with_their_window(void **state)
 {
@@ -355,7 +327,6 @@ int main(int argc, char **argv)
         cmocka_unit_test(synthetic_noise_has_the_variance_of_rendered_noise),
         cmocka_unit_test(extended_levels_continue_the_recording),
         cmocka_unit_test(measures_are_the_law),
-        cmocka_unit_test(painted_series_are_labelled_by_the_law),
         cmocka_unit_test(simulated_levels_lie_as_far_apart_as_asked),
         cmocka_unit_test(windows_are_labelled_by_their_last_image),
         cmocka_unit_test(augmentation_moves_whole_windows),
