@@ -171,11 +171,54 @@ static void apply_one(const struct lull_host_blocks *blocks, struct lull_host_bl
     }
 }
 
+/* --- a time budget ---------------------------------------------------------------------------------------------------
+ *
+ * Time that does not suffice for every block is spent where noise is seen most: only blocks of about the largest error are
+ * asked, and so go on; the others wait at their checks. About the same is what half as many samples again make up for, and
+ * nobody goes further than that unasked.
+ */
+static const double BUDGET_STEP = 1.5;
+
+static int spends_a_budget(const struct lull_host_frame *f)
+{
+    return f->config.time_budget_s > 0.0 && !(f->blocks.flags & LULL_HOST_UNIFORM);
+}
+
+/* The error of a block now: that of its last answer, falling as 1/sqrt(spp); white in a mask asks for a quarter of it.
+ * INFINITY: it was never asked; NaN: its criterion tells none. */
+static double error_now(const struct lull_host_block *b)
+{
+    if (!b->asked)
+        return (double)INFINITY;
+    return b->error * sqrt((double)b->asked_spp / (double)b->spp) * exp2(2.0 * b->step / LULL_HOST_STEPS);
+}
+
+static int can_go_on(const struct lull_host_blocks *blocks, const struct lull_host_block *b)
+{
+    return b->reason == LULL_REASON_NONE && b->spp < blocks->spp_max;
+}
+
+/* The error below which blocks wait; 0 without a time budget, or where errors are not known. */
+static double waits_below(const struct lull_host_frame *f)
+{
+    double largest = 0.0;
+    for (uint32_t i = 0; spends_a_budget(f) && i < f->blocks.count; i++)
+        if (can_go_on(&f->blocks, &f->blocks.list[i]))
+            largest = fmax(largest, error_now(&f->blocks.list[i]));
+    return largest / sqrt(BUDGET_STEP);
+}
+
 void lull_host_apply(struct lull_host_frame *f, const uint32_t *due, uint32_t count, const struct lull_decision *decisions)
 {
     lull_host_note(f, due, count, decisions);
-    for (uint32_t k = 0; k < count; k++)
-        apply_one(&f->blocks, &f->blocks.list[due[k]], &decisions[k]);
+    for (uint32_t k = 0; k < count; k++) {
+        struct lull_host_block *b = &f->blocks.list[due[k]];
+        struct lull_decision d = decisions[k];
+        const double most = BUDGET_STEP * (double)b->spp;
+        if (spends_a_budget(f) && (double)d.next_spp > most)
+            d.next_spp = (uint64_t)most;
+        apply_one(&f->blocks, b, &d);
+    }
 }
 
 /* Checks may take config.max_check_overhead of the elapsed time: beyond it they are left out until rendering caught up. */
@@ -201,12 +244,15 @@ uint32_t lull_host_due(struct lull_host_frame *f, uint32_t *due, uint8_t *final)
     int reopens =
         f->criterion && !(blocks->flags & LULL_HOST_UNIFORM) && (f->criterion->table->capabilities & LULL_CAP_REOPENS);
     int skip = !f->criterion || too_expensive(f), wait = waits(blocks);
+    const double below = waits_below(f);
     uint32_t n = 0, active = 0;
     for (uint32_t i = 0; i < blocks->count; i++) {
         struct lull_host_block *b = &blocks->list[i];
         int is_active = b->reason == LULL_REASON_NONE;
         int again = reopens && b->reason == LULL_REASON_CRITERION && b->spp < blocks->spp_max;
         if (!is_active && !again)
+            continue;
+        if (can_go_on(blocks, b) && error_now(b) < below)
             continue;
         int last = is_active && b->spp >= blocks->spp_max;
         if (last && wait)

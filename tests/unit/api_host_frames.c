@@ -359,6 +359,42 @@ static void the_first_limit_wins(void **state)
     end();
 }
 
+/* Blocks of very different noise, 1/sqrt(spp): where the time ends, all of it is seen alike, four times less of it where a
+ * mask is white. Of block 3 no error is known, as it is with every criterion that tells none. */
+static void a_time_budget_goes_where_noise_is_seen_most(void **state)
+{
+    (void)state;
+    static const double noise[BLOCKS] = {100, 10, 40, (double)NAN};
+    begin(0, 0);
+    frame->config.time_budget_s = 1e9;
+    lull_host_blocks_of(frame)->spp_max = 1000000;
+    list[1].step = LULL_HOST_STEPS;
+    criterion->dialled[LULL_HOST_STEPS] = criterion->dialled[0];
+    uint64_t given = 0, before;
+    do {
+        before = given;
+        for (int i = 0; i < BLOCKS; i++) {
+            if (list[i].spp >= list[i].next_spp)
+                continue;
+            given += list[i].next_spp - list[i].spp;
+            assert_true(list[i].spp == 0 ||
+                        list[i].next_spp <= list[i].spp + list[i].spp / 2 + 1); /* nobody goes far unasked */
+            list[i].spp = list[i].next_spp;
+            answer[i].error = noise[i] / sqrt((double)list[i].spp);
+            answer[i].next_spp = 1000000; /* where it expects to stop */
+        }
+        assert_true(given > before);
+        assert_int_equal(lull_host_check(frame, &view, &fault), LULL_OK);
+    } while (given < 200000);
+    const double seen[3] = {list[0].error, 4 * list[1].error, list[2].error};
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            assert_true(seen[i] <= 1.51 * seen[k]);
+    assert_true(list[0].spp > 2 * list[2].spp && list[3].spp >= list[0].spp);
+    criterion->dialled[LULL_HOST_STEPS] = NULL;
+    end();
+}
+
 /* A criterion answers about the frame that was opened last, and about no other. */
 static void one_frame_at_a_time(void **state)
 {
@@ -605,6 +641,7 @@ int main(void)
         cmocka_unit_test(checks_may_be_too_dear),
         cmocka_unit_test(uniform_frames_are_asked_once),
         cmocka_unit_test(the_first_limit_wins),
+        cmocka_unit_test(a_time_budget_goes_where_noise_is_seen_most),
         cmocka_unit_test(one_frame_at_a_time),
         cmocka_unit_test(a_frame_is_forecast),
         cmocka_unit_test(states_go_on),

@@ -119,7 +119,7 @@ struct lull_host_config {
     double rgb_to_xyz[9];      /* all 0: linear sRGB */
     uint64_t spp_min, spp_max; /* 1 <= spp_min <= spp_max <= 2^31 - 1 */
     uint64_t seed;
-    double time_budget_s;      /* seconds that rendering and checks may take together; 0: any */
+    double time_budget_s; /* seconds that rendering and checks may take together, spent where errors are largest; 0: any */
     double max_check_overhead; /* share of these seconds that checks may take; 0: any. Others are left out */
     double max_seam;           /* most ratio of samples of neighbouring blocks, at least 1; 0: any (lull_host_reopen) */
     uint64_t check_step;       /* checks stand at multiples of so many samples, or at spp_max; 0 reads as 1 */
