@@ -143,7 +143,7 @@ void lc_guard_free(void *memory, size_t mapped);
 
 enum lc_ask { LC_ASK_ALL, LC_ASK_TWICE, LC_ASK_REVERSED, LC_ASK_SINGLY, LC_ASK_CONCURRENTLY };
 
-/* How a session asks. All zero: no host, all due blocks in one call, tight structs. */
+/* How a session asks. All zero, or NULL in the place of one: no host, all due blocks in one call, tight structs. */
 struct lc_manner {
     const struct lull_host *host;
     struct lc_layout layout;
@@ -197,11 +197,19 @@ int lc_session_steps(struct lc_session *s, int steps);
 int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const uint32_t *ids, uint32_t count,
                        struct lull_decision *decisions, struct lull_error *err);
 int lc_session_image(struct lc_session *s, struct lc_image *image);
+/* The asking about all blocks as they are, LC_JUDGED at most; answers into decisions by id. Returns whether there were any,
+ * each held against the header's rules; else "evaluate WHAT: …" is reported. */
+enum { LC_JUDGED = 16 };
+int lc_session_judge(struct lc_session *s, const struct lc_image *image, struct lull_decision decisions[LC_JUDGED],
+                     const char *what);
 void lc_session_close(struct lc_session *s);
 
 /* The whole session in one manner: its log. Not 0 if it failed (which is reported). */
 int lc_run(struct lc *c, const struct lc_manner *manner, struct lc_log *log);
 void lc_log_release(struct lc_log *log);
+/* Such a session, whose log is held against the expected one. Negative if it failed, 1 if it
+ * differs; both are reported. */
+int lc_run_as(struct lc *c, const struct lc_manner *manner, const struct lc_log *expected, int exact, const char *what);
 /* Reports the first difference as "what: …". exact: bit for bit; else the actions and, within 0.1 %, the numbers. */
 int lc_log_compare(struct lc *c, const struct lc_log *expected, const struct lc_log *got, int exact, const char *what);
 

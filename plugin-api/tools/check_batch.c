@@ -6,21 +6,19 @@
 
 static void compare_manners(struct lc *c, const struct lc_manner *a, const struct lc_manner *b, const char *what)
 {
-    struct lc_log expected, got;
-    if (lc_run(c, a, &expected) == 0 && lc_run(c, b, &got) == 0) {
-        lc_log_compare(c, &expected, &got, lc_deterministic(c), what);
-        lc_log_release(&got);
-    }
+    struct lc_log expected;
+    if (lc_run(c, a, &expected) == 0)
+        lc_run_as(c, b, &expected, 1, what);
     lc_log_release(&expected);
 }
 
 static void check_repeat(struct lc *c)
 {
-    struct lc_manner plain = {0}, twice = {.ask = LC_ASK_TWICE};
+    struct lc_manner twice = {.ask = LC_ASK_TWICE};
     if (!lc_deterministic(c))
         lc_note(c, "not deterministic: compared with a tolerance");
-    compare_manners(c, &plain, &plain, "the same session once more");
-    compare_manners(c, &plain, &twice, "each question twice");
+    compare_manners(c, NULL, NULL, "the same session once more");
+    compare_manners(c, NULL, &twice, "each question twice");
     if (c->req.block_width == 0 && c->req.block_height == 0)
         return;
     struct lc_manner nominal = {.nominal = 1}, nominal_singly = {.nominal = 1, .ask = LC_ASK_SINGLY};
@@ -34,9 +32,9 @@ static void check_batch(struct lc *c)
         lc_skip(c, "it does not declare BATCH_INVARIANT");
         return;
     }
-    struct lc_manner plain = {0}, reversed = {.ask = LC_ASK_REVERSED}, singly = {.ask = LC_ASK_SINGLY};
-    compare_manners(c, &plain, &reversed, "blocks in reverse order");
-    compare_manners(c, &plain, &singly, "one block per call");
+    struct lc_manner reversed = {.ask = LC_ASK_REVERSED}, singly = {.ask = LC_ASK_SINGLY};
+    compare_manners(c, NULL, &reversed, "blocks in reverse order");
+    compare_manners(c, NULL, &singly, "one block per call");
 }
 
 /* Two instances whose calls alternate, on different pictures. */

@@ -60,8 +60,7 @@ static void failing_create(struct lc *c)
 static void short_session(struct lc *c)
 {
     struct lc_session s;
-    struct lc_manner plain = {0};
-    if (lc_session_open(&s, c, &plain) != 0)
+    if (lc_session_open(&s, c, NULL) != 0)
         return;
     lc_session_steps(&s, 1);
     lc_session_restart(&s);
@@ -124,8 +123,7 @@ static void check_evaluate_allocates(struct lc *c)
         return;
     }
     struct lc_session s;
-    struct lc_manner plain = {0};
-    if (lc_session_open(&s, c, &plain) != 0)
+    if (lc_session_open(&s, c, NULL) != 0)
         return;
     lc_session_steps(&s, 2); /* libraries underneath may allocate on first use */
     lc_film_advance(&s.film, 0, s.spp);
@@ -151,8 +149,7 @@ static void check_time(struct lc *c)
     int32_t h = c->req.block_height > 0 ? (int32_t)c->req.block_height : 200;
     struct lc_film film;
     struct lc_session s;
-    struct lc_manner plain = {0};
-    if (lc_film_init(&film, 2 * w, h, w, h, 1) != 0 || lc_session_open_film(&s, c, &plain, &film) != 0)
+    if (lc_film_init(&film, 2 * w, h, w, h, 1) != 0 || lc_session_open_film(&s, c, NULL, &film) != 0)
         return;
     lc_session_steps(&s, LC_STEPS);
     if (s.evaluated > 0)

@@ -143,12 +143,10 @@ static void check_null(struct lc *c)
 
     /* a host that offers nothing, not even a number of workers */
     struct lull_host bare = {.struct_size = sizeof bare, .api_minor = LULL_API_MINOR};
-    struct lc_log nothing, empty;
-    struct lc_manner no_host = {.host = NULL}, bare_host = {.host = &bare};
-    if (lc_run(c, &no_host, &nothing) == 0 && lc_run(c, &bare_host, &empty) == 0)
-        lc_log_compare(c, &nothing, &empty, lc_deterministic(c), "NULL host against a host of NULLs");
+    struct lc_log nothing;
+    if (lc_run(c, NULL, &nothing) == 0)
+        lc_run_as(c, &(struct lc_manner){.host = &bare}, &nothing, 1, "NULL host against a host of NULLs");
     lc_log_release(&nothing);
-    lc_log_release(&empty);
 }
 
 static void check_requirements(struct lc *c)

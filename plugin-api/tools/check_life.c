@@ -10,8 +10,8 @@
 static void finish_and_compare(struct lc *c, struct lc_session *s, const char *what)
 {
     struct lc_log expected;
-    struct lc_manner plain = {.host = s->manner.host};
-    if (lc_session_steps(s, LC_STEPS - (int)s->step) == 0 && lc_run(c, &plain, &expected) == 0) {
+    const struct lc_manner same_host = {.host = s->manner.host};
+    if (lc_session_steps(s, LC_STEPS - (int)s->step) == 0 && lc_run(c, &same_host, &expected) == 0) {
         lc_log_compare(c, &expected, &s->log, lc_deterministic(c), what);
         lc_log_release(&expected);
     }
@@ -20,12 +20,10 @@ static void finish_and_compare(struct lc *c, struct lc_session *s, const char *w
 
 static int32_t evaluate_nothing(struct lc_session *s)
 {
-    struct lull_view view = {.struct_size = sizeof view, .x1 = s->film.width, .y1 = s->film.height};
     struct lc_image image;
     if (lc_session_image(s, &image) != 0)
         return 1;
-    view = image.view;
-    int32_t status = s->check->criterion->evaluate(s->instance, &view, NULL, sizeof(struct lull_block), NULL,
+    int32_t status = s->check->criterion->evaluate(s->instance, &image.view, NULL, sizeof(struct lull_block), NULL,
                                                    sizeof(struct lull_decision), 0, NULL);
     lc_image_release(&image);
     return status;
@@ -34,8 +32,7 @@ static int32_t evaluate_nothing(struct lc_session *s)
 static void check_order(struct lc *c)
 {
     struct lc_session s;
-    struct lc_manner plain = {0};
-    if (lc_session_open(&s, c, &plain) != 0)
+    if (lc_session_open(&s, c, NULL) != 0)
         return;
     struct lull_frame frame;
     lc_film_frame(&s.film, &frame, s.planes);
@@ -60,7 +57,7 @@ static void check_order(struct lc *c)
     c->criterion->destroy(fresh);
 
     struct lc_session open;
-    if (lc_session_open(&open, c, &plain) == 0) {
+    if (lc_session_open(&open, c, NULL) == 0) {
         lc_session_steps(&open, 2);
         open.open = 0; /* destroyed with its frame open */
         lc_session_close(&open);
@@ -70,8 +67,7 @@ static void check_order(struct lc *c)
 static void check_zero_blocks(struct lc *c)
 {
     struct lc_session s;
-    struct lc_manner plain = {0};
-    if (lc_session_open(&s, c, &plain) != 0)
+    if (lc_session_open(&s, c, NULL) != 0)
         return;
     for (int i = 0; i < 3; i++) {
         LC_EXPECT(c, evaluate_nothing(&s) == LULL_OK, "evaluate of no block fails");
@@ -84,10 +80,9 @@ static void run_frame(struct lc *c, int32_t width, int32_t height, int32_t block
 {
     struct lc_film film;
     struct lc_session s;
-    struct lc_manner plain = {0};
     if (lc_film_init(&film, width, height, block_w, block_h, 1) != 0)
         return;
-    if (lc_session_open_film(&s, c, &plain, &film) == 0) {
+    if (lc_session_open_film(&s, c, NULL, &film) == 0) {
         lc_session_steps(&s, LC_STEPS);
         lc_session_close(&s);
     } else {
@@ -133,8 +128,7 @@ static void check_block_size(struct lc *c)
 static void check_invalid(struct lc *c)
 {
     struct lc_session s;
-    struct lc_manner plain = {0};
-    if (lc_session_open(&s, c, &plain) != 0)
+    if (lc_session_open(&s, c, NULL) != 0)
         return;
     lc_session_steps(&s, 2);
     struct lull_frame good, bad;
@@ -174,8 +168,7 @@ static void check_invalid(struct lc *c)
 static void check_restart(struct lc *c)
 {
     struct lc_session s;
-    struct lc_manner plain = {0};
-    if (lc_session_open(&s, c, &plain) != 0)
+    if (lc_session_open(&s, c, NULL) != 0)
         return;
     lc_session_steps(&s, 3);
     if (lc_session_restart(&s) == 0)
@@ -193,26 +186,18 @@ static void check_restart(struct lc *c)
 static void check_final(struct lc *c)
 {
     struct lc_session s;
-    struct lc_manner plain = {0};
-    if (lc_session_open(&s, c, &plain) != 0)
+    if (lc_session_open(&s, c, NULL) != 0)
         return;
     int reopens = (c->criterion->capabilities & LULL_CAP_REOPENS) != 0;
-    uint32_t ids[16];
-    struct lull_decision d[16];
-    uint32_t count = s.film.block_count < 16 ? s.film.block_count : 16;
+    struct lull_decision d[LC_JUDGED];
+    struct lc_image image;
     lc_session_steps(&s, 2);
-    for (uint32_t i = 0; i < count; i++) {
+    for (uint32_t i = 0; i < s.film.block_count; i++) {
         lc_film_advance(&s.film, i, s.spp << (i % 2));
         s.film.blocks[i].flags = LULL_BLOCK_FINAL | (reopens ? LULL_BLOCK_STOPPED : 0);
-        ids[i] = i;
     }
-    struct lc_image image;
-    struct lull_error err = {.struct_size = sizeof err};
     if (lc_session_image(&s, &image) == 0) {
-        int32_t status = lc_session_ask(&s, &image, ids, count, d, &err);
-        if (LC_EXPECT(c, status == LULL_OK, "evaluate of final blocks: %d, %s", status, err.message))
-            for (uint32_t i = 0; i < count; i++)
-                lc_decision_check(c, &s.film.blocks[i], &d[i]);
+        lc_session_judge(&s, &image, d, "of final blocks");
         lc_image_release(&image);
     }
     lc_session_close(&s);

@@ -540,26 +540,34 @@ static void call_evaluate(struct misuse *m)
 
 /* --- lull.state/1 ------------------------------------------------------------------------------------------------------ */
 
-static void call_save(struct misuse *m)
+/* What is wrong with a call about a stream, in words: none, a short struct, one that cannot work, and what fails in the end.
+ * Returns which: 0 no instance, then these. */
+static uint32_t spoil_stream(struct misuse *m, uint32_t full_size, uint32_t *size, const char *const words[4])
 {
-    struct lc_buffer b = {.limit = m->saved.size > 0 ? draw(m, (uint32_t)m->saved.size) : 0};
-    struct lull_writer writer = {.context = &b, .write = lc_buffer_write};
-    const uint32_t which = draw(m, 5), size = which == 2 ? too_small(m, sizeof writer) : (uint32_t)sizeof writer;
+    const uint32_t which = draw(m, 5);
+    *size = which == 2 ? too_small(m, full_size) : full_size;
     make_up(m, m->s.instance);
     if (!m->open)
         wrong(m, CODE(LULL_E_STATE), "no frame is open");
     if (which == 0)
         wrong(m, INVALID, "no instance"), m->instance = NULL;
-    else if (which == 1)
-        wrong(m, INVALID, "no writer");
-    else if (which == 2)
-        wrong(m, VERSION, "a short writer");
-    else if (which == 3)
-        wrong(m, INVALID, "a writer that cannot write"), writer.write = NULL;
+    else if (which < 4)
+        wrong(m, which == 2 ? VERSION : INVALID, words[which - 1]);
     else if (m->open && m->saved.size > 0)
-        wrong(m, REFUSED, "writing fails");
-    else if (m->open)
+        wrong(m, REFUSED, words[3]);
+    return which;
+}
+
+static void call_save(struct misuse *m)
+{
+    static const char *const words[] = {"no writer", "a short writer", "a writer that cannot write", "writing fails"};
+    struct lc_buffer b = {.limit = m->saved.size > 0 ? draw(m, (uint32_t)m->saved.size) : 0};
+    struct lull_writer writer = {.context = &b, .write = lc_buffer_write};
+    uint32_t size, which = spoil_stream(m, sizeof writer, &size, words);
+    if (m->codes == 0)
         return; /* there is nothing to be written */
+    if (which == 3)
+        writer.write = NULL;
     const struct lull_writer *at = place_struct(m, AT_STREAM, &writer, size);
     struct lull_error *err = announce(m, "save");
     int32_t status = m->state->save(m->instance, which == 1 ? NULL : at, err);
@@ -578,24 +586,13 @@ static void send_load(struct misuse *m, struct lc_buffer *b, int no_reader, int 
 
 static void call_load(struct misuse *m)
 {
+    static const char *const words[] = {"no reader", "a short reader", "a reader that cannot read", "a state cut short"};
     struct lc_buffer b = {.data = m->saved.data, .size = m->saved.size};
-    const uint32_t which = draw(m, 5);
-    const uint32_t size = which == 2 ? too_small(m, sizeof(struct lull_reader)) : (uint32_t)sizeof(struct lull_reader);
-    make_up(m, m->s.instance);
-    if (!m->open)
-        wrong(m, CODE(LULL_E_STATE), "no frame is open");
-    if (which == 0)
-        wrong(m, INVALID, "no instance"), m->instance = NULL;
-    else if (which == 1)
-        wrong(m, INVALID, "no reader");
-    else if (which == 2)
-        wrong(m, VERSION, "a short reader");
-    else if (which == 3)
-        wrong(m, INVALID, "a reader that cannot read");
-    else if (m->open && m->saved.size > 0)
-        wrong(m, REFUSED, "a state cut short"), b.size = draw(m, (uint32_t)m->saved.size);
-    else if (m->open)
+    uint32_t size, which = spoil_stream(m, sizeof(struct lull_reader), &size, words);
+    if (m->codes == 0)
         return;
+    if (which == 4 && m->open)
+        b.size = draw(m, (uint32_t)m->saved.size);
     send_load(m, &b, which == 1, which == 3, size);
 }
 
@@ -748,12 +745,11 @@ static void live(struct misuse *m, const struct lc_log *expected)
 static void check_misuse(struct lc *c)
 {
     struct misuse m = {.check = c, .random = c->seed, .state = c->criterion->get_extension(LULL_EXT_STATE)};
-    struct lc_manner plain = {0};
     struct lc_log expected;
     int room = 1;
     for (int i = 0; i < SLOTS; i++)
         room &= (m.slot[i] = lc_guard_alloc(SLOT_SIZE, &m.mapped[i])) != NULL;
-    if (LC_EXPECT(c, room, "out of memory") && lc_run(c, &plain, &expected) == 0) {
+    if (LC_EXPECT(c, room, "out of memory") && lc_run(c, NULL, &expected) == 0) {
         while (m.calls < c->misuse && !c->failed)
             live(&m, &expected);
         lc_log_release(&expected);

@@ -5,22 +5,16 @@
 #include "check.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include <stdio.h>
 
 static void compare_layouts(struct lc *c, const struct lc_layout *layouts, const char *const *names, size_t count, int exact)
 {
-    struct lc_manner plain = {0};
     struct lc_log expected;
-    if (lc_run(c, &plain, &expected) == 0)
+    if (lc_run(c, NULL, &expected) == 0)
         for (size_t i = 0; i < count; i++) {
-            struct lc_manner manner = {.layout = layouts[i]};
-            struct lc_log got;
-            if (lc_run(c, &manner, &got) == 0)
-                lc_log_compare(c, &expected, &got, exact && lc_deterministic(c), names[i]);
-            else
+            const struct lc_manner manner = {.layout = layouts[i]};
+            if (lc_run_as(c, &manner, &expected, exact, names[i]) < 0)
                 lc_note(c, "that was with %s", names[i]);
-            lc_log_release(&got);
         }
     lc_log_release(&expected);
 }
@@ -75,8 +69,7 @@ static void check_window(struct lc *c)
 {
     enum { DX = 1000, DY = 700 };
     struct lc_session s;
-    struct lc_manner plain = {0};
-    if (lc_session_open(&s, c, &plain) != 0)
+    if (lc_session_open(&s, c, NULL) != 0)
         return;
     c->criterion->end_frame(s.instance);
     struct lull_frame frame;
@@ -94,21 +87,12 @@ static void check_window(struct lc *c)
     if (LC_EXPECT(c, status == LULL_OK, "begin_frame of a crop: %d, %s", status, err.message) &&
         lc_session_image(&s, &image) == 0) {
         image.view.x0 += DX, image.view.x1 += DX, image.view.y0 += DY, image.view.y1 += DY;
-        struct lull_decision *d = calloc(s.film.block_count, sizeof *d);
-        uint32_t *ids = calloc(s.film.block_count, sizeof *ids);
-        for (uint32_t i = 0; i < s.film.block_count && ids; i++) {
+        struct lull_decision d[LC_JUDGED];
+        for (uint32_t i = 0; i < s.film.block_count; i++) {
             struct lull_block *b = &s.film.blocks[i];
             b->x0 += DX, b->x1 += DX, b->y0 += DY, b->y1 += DY;
-            ids[i] = i;
         }
-        if (d && ids) {
-            status = lc_session_ask(&s, &image, ids, s.film.block_count, d, &err);
-            LC_EXPECT(c, status == LULL_OK, "evaluate of a crop: %d, %s", status, err.message);
-            for (uint32_t i = 0; i < s.film.block_count && status == LULL_OK; i++)
-                lc_decision_check(c, &s.film.blocks[i], &d[i]);
-        }
-        free(d);
-        free(ids);
+        lc_session_judge(&s, &image, d, "of a crop");
         lc_image_release(&image);
     }
     lc_session_close(&s);
@@ -122,8 +106,7 @@ enum spoil { SPOIL_ABSENT, SPOIL_CUT, SPOIL_TYPE, SPOIL_NORMALISER, SPOIL_CHANNE
 static int32_t ask_spoilt(struct lc *c, unsigned plane, enum spoil spoil)
 {
     struct lc_session s;
-    struct lc_manner plain = {0};
-    if (lc_session_open(&s, c, &plain) != 0)
+    if (lc_session_open(&s, c, NULL) != 0)
         return 1;
     lc_film_advance(&s.film, 0, s.spp);
     struct lc_image image;
@@ -174,12 +157,10 @@ static void check_missing(struct lc *c)
     c->criterion->destroy(instance);
     lc_film_release(&film);
     struct lc_log log;
-    struct lc_manner required = {.required_only = 1};
-    lc_run(c, &required, &log);
+    lc_run(c, &(struct lc_manner){.required_only = 1}, &log);
     lc_log_release(&log);
     if (c->req.halo > 0) {
-        struct lc_manner no_all = {.no_all = 1};
-        lc_run(c, &no_all, &log);
+        lc_run(c, &(struct lc_manner){.no_all = 1}, &log);
         lc_log_release(&log);
     }
 }
@@ -206,32 +187,26 @@ static void check_broken_planes(struct lc *c)
 static uint32_t steps_with_value(struct lc *c, float value, int every)
 {
     struct lc_session s;
-    struct lc_manner plain = {0};
     uint32_t flags = ~UINT32_C(0);
-    if (lc_session_open(&s, c, &plain) != 0)
+    if (lc_session_open(&s, c, NULL) != 0)
         return flags;
-    uint32_t ids[16];
-    struct lull_decision d[16];
-    for (uint32_t i = 0; i < s.film.block_count && i < 16; i++)
-        ids[i] = i;
-    uint32_t count = s.film.block_count < 16 ? s.film.block_count : 16;
+    struct lull_decision d[LC_JUDGED];
+    char what[64];
+    snprintf(what, sizeof what, "with pixels of %g", (double)value);
     for (int step = 0; step < 4; step++, s.spp *= 4) {
         struct lc_image image;
-        for (uint32_t i = 0; i < count; i++)
+        for (uint32_t i = 0; i < s.film.block_count; i++)
             lc_film_advance(&s.film, i, s.spp);
         if (lc_session_image(&s, &image) != 0)
             break;
         for (int32_t i = 0; i < s.film.width * s.film.height; i += every)
             lc_image_poke(&image, i % s.film.width, i / s.film.width, value);
-        struct lull_error err = {.struct_size = sizeof err};
-        int32_t status = lc_session_ask(&s, &image, ids, count, d, &err);
+        int answered = lc_session_judge(&s, &image, d, what);
         lc_image_release(&image);
-        if (!LC_EXPECT(c, status == LULL_OK, "evaluate with pixels of %g: %d, %s", (double)value, status, err.message))
+        if (!answered)
             break;
-        for (uint32_t i = 0; i < count; i++) {
-            lc_decision_check(c, &s.film.blocks[i], &d[i]);
+        for (uint32_t i = 0; i < s.film.block_count && i < LC_JUDGED; i++)
             flags &= d[i].flags | (d[i].flags & LULL_DECISION_TOO_EARLY ? LULL_DECISION_BAD_INPUT : 0);
-        }
     }
     lc_session_close(&s);
     return flags;
@@ -274,11 +249,10 @@ static void run_painted(struct lc *c, void (*paint)(double *, double *, int32_t,
 {
     struct lc_film film;
     struct lc_session s;
-    struct lc_manner plain = {0};
     if (lc_film_init_for(&film, &c->req, 1, 0) != 0)
         return;
     film.paint = paint;
-    if (lc_session_open_film(&s, c, &plain, &film) != 0)
+    if (lc_session_open_film(&s, c, NULL, &film) != 0)
         return;
     lc_session_steps(&s, LC_STEPS);
     lc_session_close(&s);
@@ -318,33 +292,29 @@ static int grey_stops_at(struct lc *c, int fireflies)
 {
     struct lc_session s;
     struct lc_film film;
-    struct lc_manner plain = {0};
     int step = 0, action = LULL_CONTINUE, sized = c->req.block_width > 0 && c->req.block_height > 0;
     const int32_t w = sized ? (int32_t)c->req.block_width : BLOCK_SIDE;
     const int32_t h = sized ? (int32_t)c->req.block_height : BLOCK_SIDE;
     if (!LC_EXPECT(c, lc_film_init(&film, w, h, w, h, 1) == 0, "out of memory") ||
-        lc_session_open_film(&s, c, &plain, &film) != 0)
+        lc_session_open_film(&s, c, NULL, &film) != 0)
         return 0;
     s.film.paint = paint_grey;
     for (; step < LC_STEPS && action == LULL_CONTINUE; step += action == LULL_CONTINUE, s.spp *= 2) {
         struct lc_image image;
-        struct lull_decision d;
+        struct lull_decision d[LC_JUDGED];
         const struct lull_block *b = &s.film.blocks[0];
-        const uint32_t id = 0;
-        lc_film_advance(&s.film, id, s.spp);
+        lc_film_advance(&s.film, b->id, s.spp);
         if (lc_session_image(&s, &image) != 0)
             break;
         if (fireflies) {
             light_pixel(&image, b, (b->x1 - b->x0) / 4, 1);
             light_pixel(&image, b, (b->x1 - b->x0) / 2, 0);
         }
-        struct lull_error err = {.struct_size = sizeof err};
-        int32_t status = lc_session_ask(&s, &image, &id, 1, &d, &err);
+        int answered = lc_session_judge(&s, &image, d, "of a grey block");
         lc_image_release(&image);
-        if (!LC_EXPECT(c, status == LULL_OK, "evaluate of a grey block: %d, %s", status, err.message))
+        if (!answered)
             break;
-        lc_decision_check(c, b, &d);
-        action = d.action;
+        action = d[0].action;
     }
     lc_session_close(&s);
     return step;
@@ -374,23 +344,15 @@ static void check_no_samples(struct lc *c)
         struct lc_manner manner = {.layout = {.normaliser = normalisers[k]}};
         if (lc_session_open(&s, c, &manner) != 0)
             return;
-        uint32_t ids[16];
-        struct lull_decision d[16];
-        uint32_t count = s.film.block_count < 16 ? s.film.block_count : 16;
-        for (uint32_t i = 0; i < count; i++)
-            ids[i] = i;
-        struct lull_error err = {.struct_size = sizeof err};
+        struct lull_decision d[LC_JUDGED];
         for (uint64_t spp = 0; spp < 3; spp++) {
             struct lc_image image;
-            for (uint32_t i = 0; i < count; i++)
+            for (uint32_t i = 0; i < s.film.block_count; i++)
                 lc_film_advance(&s.film, i, spp * (i % 2)); /* even blocks stay without */
             if (lc_session_image(&s, &image) != 0)
                 break;
-            int32_t status = lc_session_ask(&s, &image, ids, count, d, &err);
+            lc_session_judge(&s, &image, d, "at 0 samples");
             lc_image_release(&image);
-            if (LC_EXPECT(c, status == LULL_OK, "evaluate at 0 samples: %d, %s", status, err.message))
-                for (uint32_t i = 0; i < count; i++)
-                    lc_decision_check(c, &s.film.blocks[i], &d[i]);
         }
         lc_session_steps(&s, 2);
         lc_session_close(&s);

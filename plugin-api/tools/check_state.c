@@ -89,12 +89,11 @@ static void damage(struct lc *c, const struct lull_state *state, struct lc_sessi
 
 static void run_state(struct lc *c, const struct lull_state *state)
 {
-    struct lc_manner plain = {0};
     struct lc_log expected;
     struct lc_session s;
-    if (lc_run(c, &plain, &expected) != 0)
+    if (lc_run(c, NULL, &expected) != 0)
         return;
-    if (lc_session_open(&s, c, &plain) != 0) {
+    if (lc_session_open(&s, c, NULL) != 0) {
         lc_log_release(&expected);
         return;
     }
@@ -126,12 +125,11 @@ static void run_state(struct lc *c, const struct lull_state *state)
 
 static void run_refused(struct lc *c, const struct lull_state *state)
 {
-    struct lc_manner plain = {0};
     struct lc_log expected;
     struct lc_session s;
-    if (lc_run(c, &plain, &expected) != 0)
+    if (lc_run(c, NULL, &expected) != 0)
         return;
-    if (lc_session_open(&s, c, &plain) == 0) {
+    if (lc_session_open(&s, c, NULL) == 0) {
         lc_session_steps(&s, 3);
         struct lc_buffer b = {.limit = UINT64_MAX};
         if (lc_state_save(state, &s, &b, NULL) == LULL_OK && b.size > 0) {

@@ -214,14 +214,11 @@ static void check_tails(struct lc *c)
 
 static void check_newer(struct lc *c)
 {
-    struct lc_manner plain = {0}, wide = {.slack = 40, .layout = {.extra_planes = 3, .plane_slack = 24}};
-    struct lc_log expected, got;
-    if (lc_run(c, &plain, &expected) == 0 && lc_run(c, &wide, &got) == 0)
-        lc_log_compare(c, &expected, &got, lc_deterministic(c), "wider structs and strides");
-    else
-        got = (struct lc_log){0};
+    struct lc_manner wide = {.slack = 40, .layout = {.extra_planes = 3, .plane_slack = 24}};
+    struct lc_log expected;
+    if (lc_run(c, NULL, &expected) == 0)
+        lc_run_as(c, &wide, &expected, 1, "wider structs and strides");
     lc_log_release(&expected);
-    lc_log_release(&got);
 
     /* pairs with a stride */
     struct {

@@ -8,14 +8,8 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
-static double now_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
+#include "base/clock.h"
 
 int lc_deterministic(const struct lc *c) { return (c->criterion->capabilities & LULL_CAP_DETERMINISTIC) != 0; }
 
@@ -252,7 +246,7 @@ static int32_t ask_concurrently(struct lc_session *s, const struct lc_image *ima
 int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const uint32_t *ids, uint32_t count,
                        struct lull_decision *decisions, struct lull_error *err)
 {
-    double start = now_s();
+    double start = base_clock_wall_s();
     int32_t status = LULL_OK;
     uint32_t *order = malloc((count + 1) * sizeof *order);
     if (!order)
@@ -269,9 +263,24 @@ int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const
     if (s->manner.ask == LC_ASK_TWICE && status == LULL_OK) /* the second answer is the one that is logged */
         status = ask_some(s, image, order, count, decisions, err);
     free(order);
-    s->evaluate_s += now_s() - start;
+    s->evaluate_s += base_clock_wall_s() - start;
     s->evaluated += count;
     return status;
+}
+
+int lc_session_judge(struct lc_session *s, const struct lc_image *image, struct lull_decision decisions[LC_JUDGED],
+                     const char *what)
+{
+    uint32_t ids[LC_JUDGED] = {0}, count = s->film.block_count < LC_JUDGED ? s->film.block_count : LC_JUDGED;
+    struct lull_error err = {.struct_size = sizeof err};
+    for (uint32_t i = 0; i < count; i++)
+        ids[i] = i;
+    int32_t status = lc_session_ask(s, image, ids, count, decisions, &err);
+    if (!LC_EXPECT(s->check, status == LULL_OK, "evaluate %s: %d, %s", what, status, err.message))
+        return 0;
+    for (uint32_t i = 0; i < count; i++)
+        lc_decision_check(s->check, &s->film.blocks[i], &decisions[i]);
+    return 1;
 }
 
 /* --- sessions ---------------------------------------------------------------------------------------------------------- */
@@ -321,10 +330,12 @@ static int begin(struct lc_session *s, uint32_t flags)
 
 int lc_session_open_film(struct lc_session *s, struct lc *c, const struct lc_manner *manner, struct lc_film *film)
 {
-    *s = (struct lc_session){.check = c, .manner = *manner, .film = *film};
+    *s = (struct lc_session){.check = c, .film = *film};
+    if (manner)
+        s->manner = *manner;
     *film = (struct lc_film){0};
-    s->planes = manner->required_only ? c->req.planes_required : c->planes;
-    s->instance = lc_create(c, manner->host);
+    s->planes = s->manner.required_only ? c->req.planes_required : c->planes;
+    s->instance = lc_create(c, s->manner.host);
     if (s->instance && begin(s, 0) == 0)
         return 0;
     lc_session_close(s);
@@ -335,7 +346,7 @@ int lc_session_open(struct lc_session *s, struct lc *c, const struct lc_manner *
 {
     struct lc_film film;
     *s = (struct lc_session){0};
-    if (lc_film_init_for(&film, &c->req, 1 + manner->seed, manner->nominal) != 0) {
+    if (lc_film_init_for(&film, &c->req, manner ? 1 + manner->seed : 1, manner && manner->nominal) != 0) {
         lc_fail(c, "out of memory");
         return -1;
     }
@@ -460,5 +471,15 @@ int lc_run(struct lc *c, const struct lc_manner *manner, struct lc_log *log)
     *log = s.log;
     s.log = (struct lc_log){0};
     lc_session_close(&s);
+    return result;
+}
+
+int lc_run_as(struct lc *c, const struct lc_manner *manner, const struct lc_log *expected, int exact, const char *what)
+{
+    struct lc_log got;
+    int result = lc_run(c, manner, &got);
+    if (result == 0)
+        result = lc_log_compare(c, expected, &got, exact && lc_deterministic(c), what) != 0;
+    lc_log_release(&got);
     return result;
 }
