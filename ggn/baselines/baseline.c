@@ -8,6 +8,7 @@
 #include <cjson/cJSON.h>
 
 #include "base/json.h"
+#include "base/options.h"
 #include "baselines/blas.h"
 #include "baselines/features.h"
 #include "baselines/lstm.h"
@@ -111,25 +112,6 @@ int ggn_baseline_save(const struct ggn_baseline *b, const char *path, enum ggn_t
     return rc;
 }
 
-static int get_number(const cJSON *root, const char *name, double min, double max, double *out, struct base_err *err)
-{
-    return base_json_get(root, name, min, max, out)
-               ? 0
-               : base_fail(err, BASE_EINVAL, "'%s' is missing or not a number in %g..%g", name, min, max);
-}
-
-static int get_int(const cJSON *root, const char *name, int min, int max, int *out, struct base_err *err)
-{
-    double value = 0;
-    int rc = get_number(root, name, min, max, &value, err);
-
-    if (!rc && value != floor(value))
-        rc = base_fail(err, BASE_EINVAL, "'%s' is not a whole number", name);
-    if (!rc)
-        *out = (int)value;
-    return rc;
-}
-
 /* Room for the weights, not before the file is known to be as large. */
 static int make_room(struct ggn_baseline *b, const cJSON *root, const struct ggn_container *c, struct base_err *err)
 {
@@ -143,11 +125,11 @@ static int make_room(struct ggn_baseline *b, const cJSON *root, const struct ggn
                : 2 * n > c->size ? base_fail(err, BASE_EINVAL, "the file is too small for a network of this size")
                                  : base_fail_nomem(err, "baseline");
     }
-    rc = get_int(root, "support", 1, SUPPORT_MAX, &support, err);
+    rc = base_json_need_int(root, "support", 1, SUPPORT_MAX, &support, err);
     if (!rc)
-        rc = get_number(root, "gamma", 1e-12, 1e12, &numbers.gamma, err);
+        rc = base_json_need(root, "gamma", 1e-12, 1e12, &numbers.gamma, err);
     if (!rc)
-        rc = get_number(root, "rho", -1e12, 1e12, &numbers.rho, err);
+        rc = base_json_need(root, "rho", -1e12, 1e12, &numbers.rho, err);
     if (!rc && 2 * (size_t)support * (size_t)b->features > c->size)
         rc = base_fail(err, BASE_EINVAL, "the file is too small for %d vectors", support);
     if (!rc)
@@ -166,26 +148,24 @@ static int parse(struct ggn_baseline *b, const cJSON *root, const struct ggn_con
     const cJSON *method = cJSON_GetObjectItemCaseSensitive(root, "method");
     struct ggn_baseline b_read = {0};
     struct part parts[4];
+    const char *name = cJSON_IsString(method) ? method->valuestring : "";
+    const int found = base_word_index(ggn_baseline_names, name, strlen(name));
     int w = 0, h = 0, window = 0, n;
 
-    int found = 0;
-
-    while (cJSON_IsString(method) && found < GGN_BASELINES && strcmp(method->valuestring, ggn_baseline_names[found]) != 0)
-        found++;
-    if (!cJSON_IsString(type) || strcmp(type->valuestring, "baseline") != 0 || !cJSON_IsString(method) ||
-        found == GGN_BASELINES || (kind != GGN_BASELINES && kind != (enum ggn_baseline_kind)found))
+    if (!cJSON_IsString(type) || strcmp(type->valuestring, "baseline") != 0 || found < 0 ||
+        (kind != GGN_BASELINES && kind != (enum ggn_baseline_kind)found))
         return base_fail(err, BASE_EINVAL, "not a baseline%s%s", kind != GGN_BASELINES ? " for " : "",
                          kind != GGN_BASELINES ? ggn_baseline_names[kind] : "");
     kind = (enum ggn_baseline_kind)found;
-    int rc = get_int(root, "width", 1, SIDE_MAX, &w, err);
+    int rc = base_json_need_int(root, "width", 1, SIDE_MAX, &w, err);
     if (!rc)
-        rc = get_int(root, "height", 1, SIDE_MAX, &h, err);
+        rc = base_json_need_int(root, "height", 1, SIDE_MAX, &h, err);
     if (!rc)
-        rc = get_int(root, "window", 1, GGN_WINDOW_MAX, &window, err);
+        rc = base_json_need_int(root, "window", 1, GGN_WINDOW_MAX, &window, err);
     if (!rc)
         rc = ggn_baseline_init(&b_read, kind, w, h, window, err);
     if (!rc)
-        rc = get_int(root, "first", 0, GGN_SUB_BLOCK - 2, &b_read.first, err);
+        rc = base_json_need_int(root, "first", 0, GGN_SUB_BLOCK - 2, &b_read.first, err);
     if (!rc)
         rc = ggn_policy_parse(cJSON_GetObjectItemCaseSensitive(root, "policy"), &b_read.policy, err);
     if (!rc)

@@ -6,6 +6,7 @@
 
 #include "baselines/blas.h"
 #include "nn/hash.h"
+#include "nn/loss.h"
 
 enum { LAYERS = 3, BATCH = 64 };
 static const int widths[LAYERS] = {512, 128, 32};
@@ -314,9 +315,6 @@ static void adam(struct ggn_lstm *l)
     }
 }
 
-/* max(z, 0) − y·z + log(1 + e^−|z|) */
-static double cross_entropy(double z, int y) { return fmax(z, 0.0) - y * z + log1p(exp(-fabs(z))); }
-
 double ggn_lstm_epoch(struct ggn_lstm *l, const double *const *sequences, const unsigned char *label, size_t n,
                       uint32_t epoch)
 {
@@ -343,7 +341,7 @@ double ggn_lstm_epoch(struct ggn_lstm *l, const double *const *sequences, const 
         forward(l, batch, 1, logit);
         for (int r = 0; r < batch; r++) {
             int y = label[order[at + (size_t)r]];
-            loss += weight[y] * cross_entropy((double)logit[r], y);
+            loss += weight[y] * ggn_bce((double)logit[r], y);
             d[r] = (float)weight[y] * (sigmoid(logit[r]) - (float)y) / (float)batch;
         }
         backward(l, batch, d);
@@ -370,5 +368,5 @@ double ggn_lstm_gradient(struct ggn_lstm *l, const double *sequence, int label, 
     d = sigmoid(logit) - (float)label;
     backward(l, 1, &d);
     memcpy(grad, l->grad, l->n * sizeof *grad);
-    return cross_entropy((double)logit, label);
+    return ggn_bce((double)logit, label);
 }

@@ -33,12 +33,11 @@ static const struct base_option list[] = {
 
 static int kind_of(const char *name, enum ggn_baseline_kind *kind, struct base_err *err)
 {
-    for (int k = 0; k < GGN_BASELINES; k++)
-        if (!strcmp(name, ggn_baseline_names[k])) {
-            *kind = (enum ggn_baseline_kind)k;
-            return 0;
-        }
-    return base_fail(err, BASE_EINVAL, "'%.80s' is none of svd-entropy, attributes, noise-mask", name);
+    const int k = base_word_index(ggn_baseline_names, name, strlen(name));
+    if (k < 0)
+        return base_fail(err, BASE_EINVAL, "'%.80s' is none of svd-entropy, attributes, noise-mask", name);
+    *kind = (enum ggn_baseline_kind)k;
+    return 0;
 }
 
 static int save(const struct options *o, const struct ggn_baseline *b, const struct ggn_eval_set *s,

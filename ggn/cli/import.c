@@ -102,9 +102,9 @@ int ggn_cmd_import(int argc, char **argv)
         rc = ggn_thresholds_read(o.thresholds, o.block, &thresholds, &err);
         so.thresholds = &thresholds;
     }
-    int made = !rc && mkdir(o.out, 0777) == 0;
-    if (!rc && !made && errno != EEXIST)
-        rc = base_fail(&err, BASE_EIO, "%s: %s", o.out, strerror(errno));
+    int made = 0;
+    if (!rc)
+        rc = base_make_folder(o.out, &made, &err);
     if (!rc)
         rc = ggn_import_is_view(o.dir) ? import_one(&o, &so, o.dir, &err) : import_all(&o, &so, &err);
     ggn_thresholds_release(&thresholds);

@@ -205,30 +205,12 @@ static int read_picture(const struct view *v, const char *file, struct pic_image
     return rc;
 }
 
-/* The layer of the first half of the samples; *there 0: the file has none. */
-static int read_layer(const struct view *v, const char *file, struct pic_image *p, int *there, struct base_err *err)
+/* The layer of the first half of the samples. */
+static int read_layer(const struct view *v, const char *file, struct pic_image *p, struct base_err *err)
 {
-    static const char names[] = "RGB";
-    struct pic_image channel[3] = {{0}};
-    char path[4400], name[16];
-    int rc = 0, n = 0;
+    char path[4400];
     snprintf(path, sizeof path, "%s/%s", v->dir, file);
-    for (; n < 3 && !rc; n += !rc) {
-        snprintf(name, sizeof name, "%s.%c", HALF, names[n]);
-        rc = pic_read_channel(path, name, &channel[n], err);
-    }
-    *there = n > 0 || rc != BASE_EINVAL;
-    const size_t pixels = rc ? 0 : (size_t)channel[0].width * (size_t)channel[0].height;
-    float *rgb = rc ? NULL : malloc(3 * pixels * sizeof *rgb);
-    if (!rc && !rgb)
-        rc = base_fail_nomem(err, path);
-    for (size_t i = 0; i < 3 * pixels && !rc; i++)
-        rgb[i] = channel[i % 3].f32[i / 3];
-    if (!rc)
-        *p = (struct pic_image){
-            .width = channel[0].width, .height = channel[0].height, .channels = 3, .is_float_file = 1, .f32 = rgb};
-    for (int c = 0; c < n; c++)
-        pic_release(&channel[c]);
+    int rc = pic_read_layer(path, HALF, p, err);
     if (!rc && (rc = check_finite(path, p, err)) != 0)
         pic_release(p);
     return rc;
@@ -248,14 +230,14 @@ static void pair_release(struct pair *p)
 
 static int read_pair(const struct view *v, const struct level *level, struct pair *p, struct base_err *err)
 {
-    int there = 1, rc = read_picture(v, level->file, &p->all, err);
+    int rc = read_picture(v, level->file, &p->all, err);
     if (rc)
         return rc;
     p->has_half = level->half[0] || v->has_layers;
     if (level->half[0])
         rc = read_picture(v, level->half, &p->half, err);
     else if (v->has_layers)
-        rc = read_layer(v, level->file, &p->half, &there, err);
+        rc = read_layer(v, level->file, &p->half, err);
     if (!rc && p->has_half && (p->half.width != p->all.width || p->half.height != p->all.height))
         rc = base_fail(err, BASE_EINVAL, "%s/%s: %dx%d, its half has %dx%d", v->dir, level->file, p->all.width,
                        p->all.height, p->half.width, p->half.height);
@@ -267,12 +249,9 @@ static int read_pair(const struct view *v, const struct level *level, struct pai
 static int has_layers(const struct view *v)
 {
     struct pic_image half = {0};
-    int there = 0, rc = 1;
-    if (!strcmp(v->ending, ".exr") && !v->levels[0].half[0])
-        rc = read_layer(v, v->levels[0].file, &half, &there, NULL);
-    if (!rc)
-        pic_release(&half);
-    return !rc;
+    int has = !strcmp(v->ending, ".exr") && !v->levels[0].half[0] && !read_layer(v, v->levels[0].file, &half, NULL);
+    pic_release(&half);
+    return has;
 }
 
 /* Work on one row of blocks: all its builders fill level by level, so that each image is read once per row. */
@@ -518,9 +497,9 @@ int ggn_import_view(const char *dir, const char *out, const struct ggn_import_op
         v.has_layers = has_layers(&v);
         rc = init_manifest(&v, o, &m, err);
     }
-    int made = !rc && mkdir(out, 0777) == 0;
-    if (!rc && !made && errno != EEXIST)
-        rc = base_fail(err, BASE_EIO, "%s: %s", out, strerror(errno));
+    int made = 0;
+    if (!rc)
+        rc = base_make_folder(out, &made, err);
     if (!rc)
         rc = take_over(out, &m, err);
     for (uint32_t row = !rc ? m.n_blocks / (m.width / m.block) : 0; !rc && row < m.height / m.block; row++) {

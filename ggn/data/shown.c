@@ -39,7 +39,7 @@ static int make_folder(const struct ggn_shown_request *q, const struct ggn_shown
     snprintf(folder, sizeof folder, "v%d", index);
     if (!rc)
         rc = base_file_join(path, q->dir, folder, err);
-    return !rc ? base_make_folder(path, err) : rc;
+    return !rc ? base_make_folder(path, NULL, err) : rc;
 }
 
 static int make_view(const struct ggn_shown_request *q, const char *text, int index, struct ggn_shown *s,
@@ -78,7 +78,7 @@ int ggn_shown_make(const struct ggn_shown_request *q, struct ggn_shown *s, struc
     int kinds = q->n_kinds > 0 ? q->n_kinds : 1, n = q->n_views * kinds;
     if (n > GGN_SHOWN_MAX_VIEWS)
         return base_fail(err, BASE_EINVAL, "at most %d views, each kind counted", GGN_SHOWN_MAX_VIEWS);
-    int rc = base_make_folder(q->dir, err);
+    int rc = base_make_folder(q->dir, NULL, err);
     if (rc)
         return rc;
     s->views = calloc((size_t)n, sizeof *s->views);

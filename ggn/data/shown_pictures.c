@@ -76,36 +76,6 @@ static int list_pictures(const char *folder, struct picture **pictures, int *n, 
     return 0;
 }
 
-/* The three channels of a layer as a display shows them. */
-static int read_layer(const char *path, const char *layer, struct pic_image *image, struct base_err *err)
-{
-    struct pic_image rgb = {0};
-    int rc = 0;
-    for (int c = 0; c < 3 && !rc; c++) {
-        char channel[32];
-        struct pic_image one;
-        snprintf(channel, sizeof channel, "%s.%c", layer, "RGB"[c]);
-        rc = pic_read_channel(path, channel, &one, err);
-        if (rc)
-            break;
-        size_t n = (size_t)one.width * (size_t)one.height;
-        if (c == 0) {
-            rgb = (struct pic_image){.width = one.width, .height = one.height, .channels = 3, .f32 = malloc(3 * n * 4)};
-            rc = rgb.f32 ? 0 : base_fail_nomem(err, path);
-        }
-        for (size_t i = 0; i < n && !rc; i++)
-            rgb.f32[3 * i + (size_t)c] = one.f32[i];
-        pic_release(&one);
-    }
-    if (!rc)
-        rc = pic_encode(path, &rgb, err);
-    if (rc)
-        pic_release(&rgb);
-    else
-        *image = rgb;
-    return rc;
-}
-
 /* What a render with --denoise shows as this kind. */
 static int read_kind(const char *path, enum ggn_shown_kind kind, struct pic_image *image, struct base_err *err)
 {
@@ -119,7 +89,9 @@ static int read_kind(const char *path, enum ggn_shown_kind kind, struct pic_imag
             return pic_read_display(path, image, err);
         }
     } else {
-        rc = read_layer(path, ggn_shown_kind_names[kind], image, &why);
+        rc = pic_read_layer(path, ggn_shown_kind_names[kind], image, &why);
+        if (!rc && (rc = pic_encode(path, image, &why)) != 0)
+            pic_release(image);
     }
     return rc ? base_fail(err, rc, "%s (--kinds shows renders with --denoise)", why.text) : 0;
 }

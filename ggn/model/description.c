@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/json.h"
+#include "base/options.h"
 #include "model/measure.h"
 
 /* Hyper-parameters and calibration as tables, so that reading and writing cannot disagree. */
@@ -29,38 +30,17 @@ enum {
     N_CALIBRATION = sizeof calibration_field / sizeof calibration_field[0]
 };
 
-static int get_number(const cJSON *object, const char *name, double min, double max, double *out, struct base_err *err)
-{
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
-
-    if (!cJSON_IsNumber(item) || !(item->valuedouble >= min && item->valuedouble <= max))
-        return base_fail(err, BASE_EINVAL, "'%s' is missing or not a number in %g..%g", name, min, max);
-    *out = item->valuedouble;
-    return 0;
-}
-
-static int get_int(const cJSON *object, const char *name, int min, int max, int *out, struct base_err *err)
-{
-    double value = 0;
-    int rc = get_number(object, name, min, max, &value, err);
-
-    if (!rc && value != (double)(int)value)
-        rc = base_fail(err, BASE_EINVAL, "'%s' is not a whole number", name);
-    if (!rc)
-        *out = (int)value;
-    return rc;
-}
-
 static int get_preset(const cJSON *root, enum ggn_preset *out, struct base_err *err)
 {
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(root, "preset");
 
-    for (int i = 0; cJSON_IsString(item) && i < 2; i++)
-        if (!strcmp(item->valuestring, ggn_preset_names[i])) {
-            *out = (enum ggn_preset)i;
-            return 0;
-        }
-    return base_fail(err, BASE_EINVAL, "'preset' is neither \"paper\" nor \"lull\"");
+    const int i =
+        cJSON_IsString(item) ? base_word_index(ggn_preset_names, item->valuestring, strlen(item->valuestring)) : -1;
+
+    if (i < 0)
+        return base_fail(err, BASE_EINVAL, "'preset' is neither \"paper\" nor \"lull\"");
+    *out = (enum ggn_preset)i;
+    return 0;
 }
 
 static int parse_root(const cJSON *root, struct ggn_description *d, struct base_err *err)
@@ -72,18 +52,19 @@ static int parse_root(const cJSON *root, struct ggn_description *d, struct base_
         return base_fail(err, BASE_EINVAL, "not a model (its description has no \"kind\": \"model\")");
     int rc = get_preset(root, &d->hyper.preset, err);
     for (size_t i = 0; i < N_HYPER && !rc; i++)
-        rc = get_int(root, hyper_field[i].name, 1, 1 << 20, (int *)(void *)((char *)&d->hyper + hyper_field[i].at), err);
+        rc = base_json_need_int(root, hyper_field[i].name, 1, 1 << 20,
+                                (int *)(void *)((char *)&d->hyper + hyper_field[i].at), err);
     if (!rc && cJSON_HasObjectItem(root, "picture"))
-        rc = get_int(root, "picture", 0, 1, &d->hyper.noise_map, err);
+        rc = base_json_need_int(root, "picture", 0, 1, &d->hyper.noise_map, err);
     if (!rc && cJSON_HasObjectItem(root, "residual"))
-        rc = get_number(root, "residual", 0, GGN_REACH_MAX, &d->hyper.reach, err);
+        rc = base_json_need(root, "residual", 0, GGN_REACH_MAX, &d->hyper.reach, err);
     if (!rc && cJSON_HasObjectItem(root, "scalars"))
-        rc = get_int(root, "scalars", 0, GGN_SCALARS, &d->hyper.scalars, err);
+        rc = base_json_need_int(root, "scalars", 0, GGN_SCALARS, &d->hyper.scalars, err);
     for (size_t i = 0; i < N_CALIBRATION && !rc; i++)
-        rc = get_number(calibration, calibration_field[i].name, calibration_field[i].min, calibration_field[i].max,
-                        (double *)(void *)((char *)&d->calibration + calibration_field[i].at), err);
+        rc = base_json_need(calibration, calibration_field[i].name, calibration_field[i].min, calibration_field[i].max,
+                            (double *)(void *)((char *)&d->calibration + calibration_field[i].at), err);
     if (!rc)
-        rc = get_int(calibration, "consecutive", 1, 16, &d->calibration.consecutive, err);
+        rc = base_json_need_int(calibration, "consecutive", 1, 16, &d->calibration.consecutive, err);
     return rc;
 }
 

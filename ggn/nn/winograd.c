@@ -33,6 +33,17 @@ size_t ggn_wino_scratch(int n_in)
     return 36 * room + 16 * room + (size_t)GGN_WINO_OC * 36 * GGN_WINO_TILES + 36 * ((size_t)n_in * GGN_WINO_TILES + 16);
 }
 
+/* G on three values: out[6] with stride `stride`. */
+static inline __attribute__((always_inline)) void spread(float *restrict out, size_t stride, float a, float b, float c)
+{
+    out[0] = a * 0.25f;
+    out[stride] = ((a + c) + b) * (-1.0f / 6);
+    out[2 * stride] = ((a + c) - b) * (-1.0f / 6);
+    out[3 * stride] = (a * (1.0f / 24) + c * (1.0f / 6)) + b * (1.0f / 12);
+    out[4 * stride] = (a * (1.0f / 24) + c * (1.0f / 6)) - b * (1.0f / 12);
+    out[5 * stride] = c;
+}
+
 /* G g Gᵀ of `tile` weights side by side: in[9][tile], out[36] with stride `stride`. */
 static inline __attribute__((always_inline)) void pack_tile(float *restrict out, size_t stride, const float *restrict in,
                                                             const int tile)
@@ -40,25 +51,11 @@ static inline __attribute__((always_inline)) void pack_tile(float *restrict out,
     float half[6][3][GGN_TILE_MAX];
 
     for (int x = 0; x < 3; x++)
-        for (int o = 0; o < tile; o++) {
-            float a = in[x * tile + o], b = in[(3 + x) * tile + o], c = in[(6 + x) * tile + o];
-            half[0][x][o] = a * 0.25f;
-            half[1][x][o] = ((a + c) + b) * (-1.0f / 6);
-            half[2][x][o] = ((a + c) - b) * (-1.0f / 6);
-            half[3][x][o] = (a * (1.0f / 24) + c * (1.0f / 6)) + b * (1.0f / 12);
-            half[4][x][o] = (a * (1.0f / 24) + c * (1.0f / 6)) - b * (1.0f / 12);
-            half[5][x][o] = c;
-        }
+        for (int o = 0; o < tile; o++)
+            spread(&half[0][x][o], 3 * GGN_TILE_MAX, in[x * tile + o], in[(3 + x) * tile + o], in[(6 + x) * tile + o]);
     for (int i = 0; i < 6; i++, out += 6 * stride)
-        for (int o = 0; o < tile; o++) {
-            float a = half[i][0][o], b = half[i][1][o], c = half[i][2][o];
-            out[o] = a * 0.25f;
-            out[stride + (size_t)o] = ((a + c) + b) * (-1.0f / 6);
-            out[2 * stride + (size_t)o] = ((a + c) - b) * (-1.0f / 6);
-            out[3 * stride + (size_t)o] = (a * (1.0f / 24) + c * (1.0f / 6)) + b * (1.0f / 12);
-            out[4 * stride + (size_t)o] = (a * (1.0f / 24) + c * (1.0f / 6)) - b * (1.0f / 12);
-            out[5 * stride + (size_t)o] = c;
-        }
+        for (int o = 0; o < tile; o++)
+            spread(out + o, stride, half[i][0][o], half[i][1][o], half[i][2][o]);
 }
 
 void ggn_wino_pack(float *u, const float *packed, int n_in, int n_out, int tile_oc)

@@ -465,8 +465,8 @@ static void write_weights(const struct ggn_conv_grad *g, const float *u, int o, 
 void WINO(grad)(const struct ggn_conv_grad *g, float *scratch)
 {
     const int tiles_x = (g->w_px + 3) / 4, tiles_y = (g->h + 3) / 4;
-    const int parts = (tiles_x + GRAD_TILES - 1) / GRAD_TILES
-    , rows = tiles_x < GRAD_TILES
+    const int parts = (tiles_x + GRAD_TILES - 1) / GRAD_TILES;
+    const int rows = tiles_x < GRAD_TILES
     ? GRAD_TILES
     / tiles_x : 1;
     float *v = scratch, *m = v + XI * STRIDE, *u = m + XI * STRIDE, *strip = u + XI * CHANNELS * CHANNELS;

@@ -29,7 +29,7 @@ int pt_agree_identity(const struct pt_open *o, struct base_identity *to, struct 
     struct lull_error e = {.struct_size = sizeof e};
     int32_t code = o->render && o->criterion ? lull_host_save_history(o->criterion, &adder, &e) : LULL_OK;
     if (code != LULL_OK)
-        return pt_host_fail(code, &e, err);
+        return pt_host_result(code, &e, err);
     base_identity_add(to, "version", "%s", BASE_VERSION);
     base_identity_append(to, &o->identity);
     base_identity_add(to, "criterion-model-crc", "%08x", (unsigned)crc);

@@ -287,5 +287,5 @@ int pt_quote_map(const char *path, const struct pt_quote *q, const struct pt_ren
         values[i] = row->blocks[i].thread_s / (minutes ? 60.0 : 1.0);
     int32_t code = lull_host_value_map(r->blocks, values, minutes ? "min" : "s", path, &e);
     free(values);
-    return code == LULL_OK ? 0 : pt_output_fail(code, &e, err);
+    return pt_output_result(code, &e, err);
 }

@@ -66,7 +66,7 @@ int pt_checkpoint_save(const char *path, const struct pt_render *r, const struct
     int32_t code = lull_host_save(r->frame, &writer, &e);
     if (code != LULL_OK) {
         base_file_abort(&out);
-        return pt_host_fail(code, &e, err);
+        return pt_host_result(code, &e, err);
     }
     fwrite(&s.crc, 1, sizeof s.crc, out.file);
     return base_file_commit(&out, err);
@@ -123,7 +123,7 @@ static int take_state(struct source *s, struct lull_host_frame *frame, unsigned 
     struct lull_error e = {.struct_size = sizeof e};
     int32_t code = (others >> PT_ROLE_RULE & 1 ? lull_host_load_blocks : lull_host_load)(frame, s->data + s->at,
                                                                                          s->size - s->at, s->path, &e);
-    return code == LULL_OK ? 0 : pt_host_fail(code, &e, err);
+    return pt_host_result(code, &e, err);
 }
 
 int pt_checkpoint_load(const char *path, struct pt_render *r, const struct base_identity *identity, struct base_err *err)

@@ -5,9 +5,9 @@
 #include "base/version.h"
 #include "render/host_planes.h"
 
-int pt_host_fail(int32_t code, const struct lull_error *said, struct base_err *err)
+int pt_host_result(int32_t code, const struct lull_error *why, struct base_err *err)
 {
-    return base_fail(err, code == LULL_E_MEMORY ? BASE_ENOMEM : BASE_EINVAL, "%s", said->message);
+    return code == LULL_OK ? 0 : base_fail(err, code == LULL_E_MEMORY ? BASE_ENOMEM : BASE_EINVAL, "%s", why->message);
 }
 
 /* What a criterion's services stand on; lives as long as it. */
@@ -47,7 +47,7 @@ int pt_criterion_create(const struct lull_criterion *table, const struct lull_pa
                                           .parallel_for = run_tasks,
                                           .release = free};
     int32_t code = lull_host_create(&services, table, pairs, pair_count, out, &e);
-    return code == LULL_OK ? 0 : pt_host_fail(code, &e, err);
+    return pt_host_result(code, &e, err);
 }
 
 int pt_criterion_evaluate(struct lull_host_criterion *criterion, struct lull_host_frame *frame, const struct pt_film *film,
@@ -58,5 +58,5 @@ int pt_criterion_evaluate(struct lull_host_criterion *criterion, struct lull_hos
     struct pt_host_view show;
     int32_t code = lull_host_evaluate(criterion, frame, pt_host_show(film, lull_host_blocks_of(frame), &show), due, final,
                                       count, decisions, &e);
-    return code == LULL_OK ? 0 : pt_host_fail(code, &e, err);
+    return pt_host_result(code, &e, err);
 }

@@ -23,7 +23,7 @@ int pt_criterion_evaluate(struct lull_host_criterion *criterion, struct lull_hos
                           const uint32_t *due, uint32_t count, const uint8_t *final, struct lull_decision *decisions,
                           struct base_err *err);
 
-/* A failure of the host library in the path tracer's words: BASE_ENOMEM or BASE_EINVAL. */
-int pt_host_fail(int32_t code, const struct lull_error *said, struct base_err *err);
+/* What the host library returned, in the path tracer's words: 0, BASE_ENOMEM or BASE_EINVAL. */
+int pt_host_result(int32_t code, const struct lull_error *why, struct base_err *err);
 
 #endif

@@ -27,7 +27,7 @@ int pt_criterion_find(const char *spec, struct base_inputs *inputs, struct base_
     struct lull_found found;
     int32_t code = lull_open(&search, spec, &found, &e);
     if (code != LULL_OK)
-        return pt_host_fail(code, &e, err);
+        return pt_host_result(code, &e, err);
     int rc = inputs ? base_inputs_add(inputs, found.path, err) : 0;
     if (!rc)
         *out = found.criterion;

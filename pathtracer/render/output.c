@@ -229,17 +229,16 @@ int pt_output_preview(const char *path, const struct pt_render *r, const struct 
     return rc;
 }
 
-/* What could not be written is BASE_EIO. */
-int pt_output_fail(int32_t code, const struct lull_error *said, struct base_err *err)
+int pt_output_result(int32_t code, const struct lull_error *why, struct base_err *err)
 {
-    return code == LULL_E_IO ? base_fail(err, BASE_EIO, "%s", said->message) : pt_host_fail(code, said, err);
+    return code == LULL_E_IO ? base_fail(err, BASE_EIO, "%s", why->message) : pt_host_result(code, why, err);
 }
 
 int pt_output_stop_map(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
     int32_t code = lull_host_stop_map(r->blocks, path, info->scene, &e);
-    return code == LULL_OK ? 0 : pt_output_fail(code, &e, err);
+    return pt_output_result(code, &e, err);
 }
 
 /* --- report --------------------------------------------------------------------------------------------------------- */
@@ -330,7 +329,7 @@ int pt_output_report(const char *path, const struct pt_render *r, const struct p
     const struct lull_host_report report = describe(r, info, effects);
     struct lull_error e = {.struct_size = sizeof e};
     int32_t code = lull_host_report_write(r->frame, &report, path, &e);
-    return code == LULL_OK ? 0 : pt_output_fail(code, &e, err);
+    return pt_output_result(code, &e, err);
 }
 
 /* --- page ----------------------------------------------------------------------------------------------------------- */
@@ -358,7 +357,7 @@ int pt_output_page(const char *path, const struct pt_render *r, const struct pt_
     for (int i = 0; i < 3; i++)
         free(codes[i]);
     free(report);
-    return code == LULL_OK ? rc : pt_output_fail(code, &e, err);
+    return rc ? rc : pt_output_result(code, &e, err);
 }
 
 void pt_output_or_keep(pt_output_writer *write, const char *path, const struct pt_render *r,

@@ -50,8 +50,8 @@ pt_output_writer pt_output_page;
 void pt_output_or_keep(pt_output_writer *write, const char *path, const struct pt_render *render,
                        const struct pt_output_info *info, struct base_err *err);
 
-/* A failure of the host library to write a file. */
-int pt_output_fail(int32_t code, const struct lull_error *said, struct base_err *err);
+/* pt_host_result of what writes a file: BASE_EIO if it could not. */
+int pt_output_result(int32_t code, const struct lull_error *why, struct base_err *err);
 
 /* `path` ends in `.ending`, whatever the case. */
 int pt_output_has_ending(const char *path, const char *ending);

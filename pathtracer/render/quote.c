@@ -13,11 +13,6 @@ enum { COARSER = 3 }; /* of `times`, those coarser than what is just seen */
 static const struct pt_quote_setting times[] = {
     {"error", 8, "rough"}, {"error", 4, "draft"}, {"error", 2, "good"}, {"error", 1, "just seen"}, {"error", 0.5, "strict"}};
 
-static int told(int32_t code, const struct lull_error *said, struct base_err *err)
-{
-    return code == LULL_OK ? 0 : pt_host_fail(code, said, err);
-}
-
 static int add_row(struct pt_quote *q, struct pt_quote_setting setting, int asked, struct base_err *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
@@ -26,8 +21,8 @@ static int add_row(struct pt_quote *q, struct pt_quote_setting setting, int aske
     snprintf(value, sizeof value, "%.17g", setting.value);
     q->settings[q->row_count++] = setting;
     if (!asked && setting.parameter && strcmp(setting.parameter, "error") == 0)
-        return told(lull_host_quote_add_error(q->told, setting.value, &e), &e, err);
-    return told(lull_host_quote_add(q->told, setting.parameter ? &changed : NULL, asked, &e), &e, err);
+        return pt_host_result(lull_host_quote_add_error(q->told, setting.value, &e), &e, err);
+    return pt_host_result(lull_host_quote_add(q->told, setting.parameter ? &changed : NULL, asked, &e), &e, err);
 }
 
 /* Rows by falling value, the one that the options ask for among them unless it has its row already (*met). */
@@ -88,7 +83,7 @@ static int add_pictures(struct pt_quote *q, const struct pt_render *r, const str
         return rc;
     asked.name = "noisy";
     q->settings[q->row_count++] = asked;
-    return told(lull_host_quote_add_other(q->told, judge, &e), &e, err);
+    return pt_host_result(lull_host_quote_add_other(q->told, judge, &e), &e, err);
 }
 
 int pt_quote_create(const struct pt_render *r, const struct lull_pair *pairs, uint32_t pair_count,
@@ -107,7 +102,7 @@ int pt_quote_create(const struct pt_render *r, const struct lull_pair *pairs, ui
     if (!q)
         return base_fail_nomem(err, "quote");
     q->threads = pt_render_threads(r);
-    int rc = told(lull_host_quote_begin(r->frame, q->threads, &q->told, &e), &e, err);
+    int rc = pt_host_result(lull_host_quote_begin(r->frame, q->threads, &q->told, &e), &e, err);
     if (!rc)
         rc = noisy ? add_pictures(q, r, noisy, known[0], asked, log, err) : add_rows(q, known[1], known[0], asked, err);
     if (rc) {
@@ -136,5 +131,5 @@ int pt_quote_finish(struct pt_quote *q, struct pt_render *r, struct base_err *er
     struct lull_error e = {.struct_size = sizeof e};
     struct pt_host_view show;
     const struct lull_host_view *view = pt_host_show(&r->film, r->blocks, &show);
-    return told(lull_host_quote_finish(q->told, view, &q->rows, &q->row_count, &e), &e, err);
+    return pt_host_result(lull_host_quote_finish(q->told, view, &q->rows, &q->row_count, &e), &e, err);
 }

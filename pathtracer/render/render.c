@@ -107,7 +107,7 @@ static int begin_frame(struct pt_render *r, uint32_t film_planes, struct base_er
     if (code == LULL_E_UNSUPPORTED && n && !(n->flags & LULL_REQ_FLEXIBLE) && n->block_width > 0)
         return base_fail(err, BASE_EINVAL, "%s: use --block %ux%u", e.message, n->block_width, n->block_height);
     if (code != LULL_OK)
-        return pt_host_fail(code, &e, err);
+        return pt_host_result(code, &e, err);
     r->blocks = lull_host_blocks_of(r->frame);
     r->totals = lull_host_totals_of(r->frame);
     return 0;

@@ -336,7 +336,7 @@ static int lay_grid(struct recorder *r, struct base_err *err)
                                     .spp_max = 1};
     int32_t code = lull_host_begin(&grid, NULL, &r->whole, &e);
     if (code != LULL_OK)
-        return pt_host_fail(code, &e, err);
+        return pt_host_result(code, &e, err);
     r->grid = lull_host_blocks_of(r->whole);
     return 0;
 }
@@ -372,7 +372,7 @@ static int prepare(struct recorder *r, struct base_err *err)
     else if ((rc = pt_sequence_choose(r->config->blocks, r->chosen, r->grid->count, err)) != 0)
         return rc;
     describe(r);
-    rc = base_make_folder(r->config->directory, err);
+    rc = base_make_folder(r->config->directory, NULL, err);
     if (!rc)
         rc = base_lock_folder(&r->lock, r->config->directory, err);
     return rc ? rc : resume(r, err);

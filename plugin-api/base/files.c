@@ -250,9 +250,12 @@ static int put_in_place(const char *tmp_path, const char *path, struct base_err 
     return rc;
 }
 
-int base_make_folder(const char *path, struct base_err *err)
+int base_make_folder(const char *path, int *made, struct base_err *err)
 {
-    return mkdir(path, 0777) == 0 || errno == EEXIST ? 0 : base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
+    const int is_new = mkdir(path, 0777) == 0;
+    if (made)
+        *made = is_new;
+    return is_new || errno == EEXIST ? 0 : base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
 }
 
 int base_file_join(char *path, const char *dir, const char *name, struct base_err *err)

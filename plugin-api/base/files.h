@@ -54,8 +54,8 @@ struct base_file_out {
     char tmp_path[4128];
 };
 
-/* Makes a folder, unless it is there. */
-int base_make_folder(const char *path, struct base_err *err);
+/* Makes a folder, unless it is there. *made (may be NULL): whether it is new. */
+int base_make_folder(const char *path, int *made, struct base_err *err);
 
 /* Opens the temporary file beside `path`. On failure nothing is left behind. */
 int base_file_begin(struct base_file_out *out, const char *path, struct base_err *err);

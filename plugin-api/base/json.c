@@ -64,3 +64,21 @@ int base_json_get_whole(const cJSON *object, const char *key, double lo, double 
     *out = value;
     return 1;
 }
+
+int base_json_need(const cJSON *object, const char *key, double lo, double hi, double *out, struct base_err *err)
+{
+    return base_json_get(object, key, lo, hi, out)
+               ? 0
+               : base_fail(err, BASE_EINVAL, "'%s' is missing or not a number in %g..%g", key, lo, hi);
+}
+
+int base_json_need_int(const cJSON *object, const char *key, int lo, int hi, int *out, struct base_err *err)
+{
+    double value = 0;
+    int rc = base_json_need(object, key, lo, hi, &value, err);
+    if (!rc && value != floor(value))
+        rc = base_fail(err, BASE_EINVAL, "'%s' is not a whole number", key);
+    if (!rc)
+        *out = (int)value;
+    return rc;
+}

@@ -28,5 +28,8 @@ int base_json_write(const char *path, const cJSON *root, int failed, struct base
 int base_json_get(const cJSON *object, const char *key, double lo, double hi, double *out);
 /* And a whole one. */
 int base_json_get_whole(const cJSON *object, const char *key, double lo, double hi, double *out);
+/* The same of what must be there: BASE_EINVAL says what is wrong with it. */
+int base_json_need(const cJSON *object, const char *key, double lo, double hi, double *out, struct base_err *err);
+int base_json_need_int(const cJSON *object, const char *key, int lo, int hi, int *out, struct base_err *err);
 
 #endif

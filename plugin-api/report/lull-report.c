@@ -71,8 +71,7 @@ static int read_report(struct settings *s, char **report, struct base_err *err)
 
 static int write_page(const struct settings *s, const char *report, const char *quote, struct base_err *err)
 {
-    static const char *const names[LAYERS] = {"picture", "noisy", "denoised"}, *const prefixes[LAYERS] = {"", "noisy.",
-                                                                                                          "denoised."};
+    static const char *const names[LAYERS] = {"picture", "noisy", "denoised"};
     static struct report_view view;
     struct lull_host_layer layers[LAYERS];
     uint8_t *codes[LAYERS] = {NULL};
@@ -83,7 +82,7 @@ static int write_page(const struct settings *s, const char *report, const char *
     if (!rc && s->args[1])
         rc = report_view_picture(s->args[1], &view, &picture, err);
     for (int i = 1; i < LAYERS && !rc && s->args[1]; i++)
-        codes[i] = report_view_channels(s->args[1], prefixes[i], &view, &picture);
+        codes[i] = report_view_layer(s->args[1], names[i], &view, &picture);
     for (int i = 0; i < LAYERS && !rc && s->args[1]; i++)
         if (i == 0 || codes[i])
             layers[count++] = (struct lull_host_layer){names[i], i == 0 ? picture.u8 : codes[i]};

@@ -65,25 +65,16 @@ uint8_t report_view_code(const struct report_view *v, double value)
     return (uint8_t)lround(code * 255.0 / MOST_CODE);
 }
 
-uint8_t *report_view_channels(const char *path, const char *prefix, const struct report_view *view,
-                              const struct pic_image *like)
+uint8_t *report_view_layer(const char *path, const char *layer, const struct report_view *view, const struct pic_image *like)
 {
-    const size_t pixels = (size_t)like->width * (size_t)like->height;
-    uint8_t *codes = malloc(3 * pixels);
-    for (size_t c = 0; c < 3 && codes; c++) {
-        char channel[32];
-        struct pic_image image = {0};
-        snprintf(channel, sizeof channel, "%s%c", prefix, "RGB"[c]);
-        int found = pic_read_channel(path, channel, &image, NULL) == 0 && image.f32 && image.width == like->width &&
-                    image.height == like->height;
-        for (size_t i = 0; found && i < pixels; i++)
-            codes[3 * i + c] = report_view_code(view, (double)image.f32[i]);
-        pic_release(&image);
-        if (!found) {
-            free(codes);
-            codes = NULL;
-        }
-    }
+    const size_t values = 3 * (size_t)like->width * (size_t)like->height;
+    struct pic_image image = {0};
+    uint8_t *codes = NULL;
+    if (pic_read_layer(path, layer, &image, NULL) == 0 && image.width == like->width && image.height == like->height)
+        codes = malloc(values);
+    for (size_t i = 0; codes && i < values; i++)
+        codes[i] = report_view_code(view, (double)image.f32[i]);
+    pic_release(&image);
     return codes;
 }
 
@@ -94,7 +85,7 @@ int report_view_picture(const char *path, const struct report_view *view, struct
     if (rc)
         return rc;
     if (view->count > 0) {
-        uint8_t *codes = report_view_channels(path, "", view, &picture);
+        uint8_t *codes = report_view_layer(path, "", view, &picture);
         if (!codes) {
             pic_release(&picture);
             return base_fail(err, BASE_EINVAL, "%s: it has a view, lull:view, but no channels R, G and B", path);

@@ -25,9 +25,9 @@ uint8_t report_view_code(const struct report_view *view, double value);
 
 /* pic_read_display (picture/read.h), as the view shows it. */
 int report_view_picture(const char *path, const struct report_view *view, struct pic_image *out, struct base_err *err);
-/* Codes of the channels PREFIX + "R", "G", "B", [height][width][3], the caller's; NULL: the file does not have them, or no
+/* Codes of a layer (pic_read_layer), [height][width][3], the caller's; NULL: the file does not have it in this size, or no
  * memory. */
-uint8_t *report_view_channels(const char *path, const char *prefix, const struct report_view *view,
-                              const struct pic_image *like);
+uint8_t *report_view_layer(const char *path, const char *layer, const struct report_view *view,
+                           const struct pic_image *like);
 
 #endif

@@ -145,9 +145,9 @@ static void what_cannot_be_written(void **state)
     assert_int_equal(base_file_join(path, "a/b", "c", &err), 0);
     assert_string_equal(path, "a/b/c");
     for (int i = 0; i < 2; i++) /* one that is there is as good */
-        assert_int_equal(base_make_folder("folder/made", &err), 0);
+        assert_int_equal(base_make_folder("folder/made", NULL, &err), 0);
     assert_int_equal(rmdir("folder/made"), 0);
-    says(base_make_folder("folder/none/made", &err), BASE_EIO, &err, "folder/none/made: No such file or directory");
+    says(base_make_folder("folder/none/made", NULL, &err), BASE_EIO, &err, "folder/none/made: No such file or directory");
 }
 
 static void outputs_appear_when_they_are_whole(void **state)

@@ -210,9 +210,9 @@ static void services(void **state)
     lull_host_close(busy);
     base_threads_destroy(threads);
     const struct lull_error no_room = {.message = "out of memory (x)"};
-    assert_int_equal(pt_host_fail(LULL_E_MEMORY, &no_room, &err), BASE_ENOMEM);
+    assert_int_equal(pt_host_result(LULL_E_MEMORY, &no_room, &err), BASE_ENOMEM);
     assert_string_equal(err.text, "out of memory (x)");
-    assert_int_equal(pt_host_fail(LULL_E_IO, &no_room, &err), BASE_EINVAL);
+    assert_int_equal(pt_host_result(LULL_E_IO, &no_room, &err), BASE_EINVAL);
 }
 
 /* --- masks -------------------------------------------------------------------------------------------------------------- */
