@@ -327,7 +327,7 @@ test-clang: ## build the product with clang, without a warning, into build/clang
 	@$(build) OUT=build/clang CC=clang CXX=clang++ CFLAGS="$(CFLAGS) -Werror" all $(CLANG_TEST)
 	@BUILD=build/clang tests/run $(CLANG_TEST)
 
-test-hosts: setup ## install Blender, Mitsuba and bpy as far as they can be had, and test Lull in them
+test-hosts: setup ## install Blender, Mitsuba, LuxCore and bpy as far as they can be had, and test Lull in them
 	@$(build) all $(ABI_PLUGINS) $(OIDN_STUB)
 	@scripts/hosts/setup
 	@BUILD=build tests/run $(HOST_TEST)

@@ -13,7 +13,7 @@ LULL_PLUGIN_PATH=$(cd "$BUILD/lib/lull" && pwd)
 export LULL_PLUGIN_PATH
 if "$python" -m pip install -q --disable-pip-version-check --no-index --no-build-isolation --no-deps --target "$tmp/target" \
     "$tmp/source" >"$tmp/log" 2>&1 && cd "$tmp" && PYTHONPATH=$tmp/target "$python" -c '
-import lull, lull.blender.cli, lull.mitsuba
+import lull, lull.blender.cli, lull.luxcore, lull.mitsuba
 assert lull.__file__.startswith("'"$tmp"'/target")
 assert lull.load("halfbuf").info.id == "halfbuf"' >>"$tmp/log" 2>&1; then
     echo "ok 1 - pip install"

@@ -736,7 +736,7 @@ def test_no_numpy():
     refuses_pip = sys.prefix == sys.base_prefix and os.path.exists(f"{sysconfig.get_path('stdlib')}/EXTERNALLY-MANAGED")  # Debian's own
     what = "sudo apt install python3-numpy" if refuses_pip else "python3 -m pip install numpy"
     assert re.fullmatch(rf"lull needs numpy, [^:]*: {re.escape(what)}\n", program.stderr), program.stderr
-    for module in ("lull", "lull.mitsuba"):
+    for module in ("lull", "lull.mitsuba", "lull.luxcore"):
         script = subprocess.run([sys.executable, "-c", f"import {module}"], env=environment, text=True, capture_output=True)
         assert script.stderr.splitlines()[-1].startswith("ImportError: lull needs numpy"), script.stderr
         assert "During handling" not in script.stderr, script.stderr

@@ -36,7 +36,7 @@ CHECKED = {("README.md", 1): "tests/packages/readme.sh", ("docs/hosts.md", 1): "
            ("docs/results/scale.md", 3): "a measurement, hours", ("docs/study.md", 1): "a server, a training; tests/cli/lull_study.sh, ggn_train.sh",
            ("docs/watching.md", 2): "a server; tests/cli/watch.sh",
            ("plugin-api/python/README.md", 1): "tests/packages/wheel.sh"}
-CODE = {("docs/denoised.md", "python", 1), ("docs/hosts.md", "python", 1), ("docs/hosting.md", "cpp", 1), ("plugin-api/README.md", "c", 1),
+CODE = {("docs/denoised.md", "python", 1), ("docs/hosts.md", "python", 1), ("docs/hosts.md", "python", 2), ("docs/hosting.md", "cpp", 1), ("plugin-api/README.md", "c", 1),
         ("plugin-api/README.md", "c", 2), ("plugin-api/python/README.md", "python", 1), ("plugin-api/python/README.md", "python", 2)}
 
 
@@ -125,6 +125,19 @@ def test_python_of_mitsuba():
         (folder / "scene.xml").write_text(scene.read_text().replace('value="96"', 'value="24"'))
         text = FOUND["docs/hosts.md", "python", 1].replace("llvm_ad_rgb", "scalar_rgb").replace("spp_max=2048", "spp_max=256")
         done = subprocess.run([VENV, "-c", text], text=True, capture_output=True, env={**os.environ, "PYTHONPATH": f"{ROOT}/plugin-api/python"})
+        assert done.returncode == 0 and "spp min / mean / max" in done.stdout and os.path.getsize("picture.exr") > 1000, done
+
+
+def test_python_of_luxcore():
+    """docs/hosts.md: LuxCore, its price and its picture"""
+    python = ROOT / "build/hosts/luxcore/bin/python3"
+    if not python.exists() or subprocess.run([python, "-c", "import numpy, pyluxcore"], capture_output=True).returncode:
+        raise Skip("no pyluxcore in build/hosts/luxcore: run make test-hosts")
+    with elsewhere() as folder:
+        shutil.copy(ROOT / "tests/hosts/scenes/room.scn", folder / "scene.scn")
+        (folder / "scene.cfg").write_text("film.width = 24\nfilm.height = 24\n")
+        text = FOUND["docs/hosts.md", "python", 2].replace("spp_max=2048", "spp_max=128")
+        done = subprocess.run([python, "-c", text], text=True, capture_output=True, env={**os.environ, "PYTHONPATH": f"{ROOT}/plugin-api/python"})
         assert done.returncode == 0 and "spp min / mean / max" in done.stdout and os.path.getsize("picture.exr") > 1000, done
 
 

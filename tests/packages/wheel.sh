@@ -86,9 +86,9 @@ s.render.resolution_y = 36; bpy.ops.wm.save_as_mainfile(filepath='$tmp/cube.blen
     t "python -m lull.blender, by the Blender on PATH" sh -c "cd $tmp && PATH=/usr/bin:/bin $python -m lull.blender cube.blend -c halfbuf --spp-max 32 -q -o cube.exr && [ -s cube.exr ]"
     rm "$site/json.py"
 else n=$((n + 1)); echo "ok $n - python -m lull.blender # SKIP no blender: make test-hosts"; fi
-extras() { for e in denoise:pyoidn mitsuba:mitsuba blender:bpy plot:matplotlib study:aiohttp; do
+extras() { for e in denoise:pyoidn mitsuba:mitsuba luxcore:pyluxcore blender:bpy plot:matplotlib study:aiohttp; do
     unzip -p "$wheel" '*/METADATA' | grep -q "^Requires-Dist: ${e#*:}.*extra == \"${e%:*}\"" || return; done; }
-t "the extras denoise, mitsuba, blender, plot and study" extras
+t "the extras denoise, mitsuba, luxcore, blender, plot and study" extras
 t "one version everywhere" sh -c "$python -c 'import lull; print(lull.__version__)' | grep -qxF \"\$(build/bin/lull-render --version | sed -n '1s/.* //p')\" &&
     unzip -p $wheel '*/METADATA' | grep -qxF \"Version: \$($python -c 'import lull; print(lull.__version__)')\""
 t "the programs' and the packages'" sh -c "head -n 1 debian/changelog | grep -qF \"(\$($python -c 'import lull; print(lull.__version__)'))\""

@@ -9,7 +9,7 @@
     frame.mean(), frame.spp()                          # the picture and its samples per pixel
 
 For renderers that keep their own film: HostFrame, which is shown numpy arrays as they lie in memory (Plane). Ready hosts:
-lull.blender for Blender's Cycles, lull.mitsuba for Mitsuba 3. Needs numpy and liblull-host.so; nothing is compiled.
+lull.blender for Blender's Cycles, lull.mitsuba for Mitsuba 3, lull.luxcore for LuxCore. Needs numpy and liblull-host.so; nothing is compiled.
 """
 import importlib
 import importlib.util

@@ -53,7 +53,7 @@ def main() -> int:
     for path in sorted(path for folder in folders for path in folder.glob("*.ggn")):
         print(f"model       {path}")
     print(f"denoiser    {denoiser}")
-    for module in ("mitsuba", "bpy"):
+    for module in ("mitsuba", "pyluxcore", "bpy"):
         print(f"{module:<12}{'found' if importlib.util.find_spec(module) else 'none'}")
     print(f"blender     {shutil.which('blender') or 'none'}")
     return 0 if found else 2

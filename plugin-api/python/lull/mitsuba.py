@@ -14,43 +14,20 @@ rendered with it. Use a sampler of independent samples: stratified ones stratify
 """
 from __future__ import annotations
 
-import contextlib
-import os
+import functools
 import re
-import struct
-import sys
 import zlib
-from typing import Any, Callable, Iterator, NamedTuple, Optional, Sequence, Union
+from typing import Any, Iterator, Sequence, Union
 
 import numpy as np
 
-from . import checkpoint as checkpoints
-from . import denoising, limits
-from . import quote as quotes
-from .criterion import Criterion, Rect, load
-from .denoising import Denoised
-from .driver import Driver, Result
-from .files import Output, check_outputs
-from .frame import Frame
-from .library import LullError
+from . import limits, scenes
+from .criterion import Criterion, Rect
+from .scenes import Picture
 
 # Planes that criteria can read, and the channels of an AOV of that name
 _AOVS = {"albedo": ("albedo.R", "albedo.G", "albedo.B"), "normal": ("normal.X", "normal.Y", "normal.Z"),
          "depth": ("depth.T",)}
-
-
-class Picture(NamedTuple):
-    """What render gives back: image [height, width, 3] linear, spp [height, width] uint32, layers: alpha ("A") and AOVs by
-    the film's names, [height, width] float64. unsaved: why the checkpoint could not be written, if so. denoised: over the
-    view, if it was asked for, and then image is its picture; undenoised: why that failed, if so."""
-    image: np.ndarray
-    spp: np.ndarray
-    result: Result
-    driver: Driver  # for lull.outputs and lull.checkpoint
-    layers: dict[str, np.ndarray]
-    unsaved: Optional[OSError] = None
-    denoised: Optional[Denoised] = None
-    undenoised: Optional[LullError] = None
 
 
 class Film:
@@ -140,8 +117,7 @@ class Film:
         area = Rect(max(r.x0 - self.border, 0), max(r.y0 - self.border, 0), min(r.x1 + self.border, self.width),
                     min(r.y1 + self.border, self.height))
         self._set_crop(area)
-        seed = zlib.crc32(struct.pack("<QQii", self.seed, first, r.x0, r.y0))
-        self.integrator.render(self.scene, self.sensor, seed=seed, spp=count, develop=False)
+        self.integrator.render(self.scene, self.sensor, seed=scenes.seed_of(self.seed, first, r), spp=count, develop=False)
         sums = np.array(self.film.develop(raw=True))[r.y0 - area.y0:r.y1 - area.y0, r.x0 - area.x0:r.x1 - area.x0]
         means = dict(zip(self._channels, np.moveaxis(sums.astype(np.float64) / count, -1, 0)))
         planes = {plane: np.stack([means[name] for name in names], -1) if len(names) > 1 else means[names[0]]
@@ -171,74 +147,15 @@ def _read_mask(path: str) -> np.ndarray:
     return colours / np.iinfo(stored.dtype).max if stored.dtype.kind == "u" else colours
 
 
-def _tell(line: str) -> None:
-    print(f"lull: {line}", file=sys.stderr)
-
-
 def quote(scene: Any, criterion: Union[str, Criterion] = "", **settings: Any) -> str:
-    """A table of what the quality parameter will cost, and coarser and finer ones, from a pilot of 128 samples or 30
-    seconds. settings: as render takes them; with checkpoint=, render(…, resume=True) goes on from the pilot, nothing is
-    lost."""
-    def look(driver: Driver) -> None:
-        if quotes.pilot_done(driver):
-            driver.interrupt()
-    picture = render(scene, criterion, **{**settings, "after_call": look, "tell": None})
-    if picture.result.exception:
-        raise picture.result.exception
-    if picture.unsaved:
-        raise picture.unsaved
-    return quotes.table(picture.driver)
+    """What the quality parameter will cost (lull.scenes.quote). settings: as render takes them."""
+    return scenes.quote(functools.partial(render, scene), criterion, settings)
 
 
-def render(scene: Any, criterion: Union[str, Criterion] = "", *, sensor: int = 0, spp_min: int = 16,
-           spp_max: int = 1024, time_budget_s: float = 0.0, block: Optional[int] = None, wave: int = 8, seed: int = 0,
-           mask: Union[np.ndarray, str, None] = None, checkpoint: str = "", resume: bool = False,
-           checkpoint_every_s: float = 60.0, after_call: Optional[Callable[[Driver], None]] = None,
-           tell: Optional[Callable[[str], None]] = _tell, display_server: str = "", denoise: str = "",
-           **parameters: Any) -> Picture:
-    """Renders a mi.Scene; each block until the criterion stops it.
-
-    criterion: a name, a path or a lull.Criterion, default observer, or denoised with denoise="blend" or "full", which keeps
-    the denoised picture (docs/denoised.md); parameters are its own (threshold=…). The film's crop is kept to. mask:
-    an array, or the path of a PNG (lull.mask). checkpoint: a file that keeps the state at the end, however it ends, and
-    every checkpoint_every_s seconds; resume: goes on from it, if it is there; with a higher spp_max a finished picture gets
-    more samples. tell: is given one line at the first check, what the quality parameter costs and what coarser ones would
-    (default: it is printed to stderr; None: no line). display_server: "HOST:PORT" of an image viewer (lull.display). An
-    exception while rendering is not raised: see Picture.result. Raises LullError, ValueError, TypeError and OSError for bad
-    input, before anything is rendered.
-    """
-    if resume and not checkpoint:
-        raise ValueError("resume: there is no checkpoint to go on from: name one with checkpoint=")
-    if checkpoint:
-        check_outputs([Output("checkpoint", checkpoint)], [mask] if isinstance(mask, str) else [])
-        checkpoints.check(checkpoint)
-    usual, library = denoising.criterion_of(denoise), str(parameters.get("library", ""))
-    if denoise:
-        denoising.check(library)
-        parameters = denoising.parameters_of(denoise, criterion or usual, parameters)
-    shades = _read_mask(mask) if isinstance(mask, str) else mask
-    with contextlib.ExitStack() as stack:
-        judge = (criterion if isinstance(criterion, Criterion) else
-                 stack.enter_context(load(criterion or usual, **parameters)))
-        film = stack.enter_context(Film(scene, sensor, seed, bool(denoise)))
-        film.check_waves(wave, spp_max)
-        frame = Frame(judge, film.width, film.height, block=block, crop=film.crop, spp_min=spp_min, spp_max=spp_max,
-                      time_budget_s=time_budget_s, deterministic=time_budget_s <= 0, seed=seed, independent=True,
-                      shared=film.splats, weighted=True, wave=wave, supplies=film.supplies, layers=film.layers,
-                      mask=shades, denoised=bool(denoise))
-        stack.callback(frame.close)
-        driver = Driver(frame, film.render, identity=film.identity() if checkpoint else None, after_call=after_call,
-                        display_server=display_server)
-        if tell:
-            driver.watchers.append(quotes.telling(tell))
-        kept = checkpoints.Keeper(checkpoint, driver, checkpoint_every_s) if checkpoint else None
-        if resume and os.path.exists(checkpoint):
-            checkpoints.load(checkpoint, driver)
-        result = driver.run()
-    picture = Picture(frame.cropped(frame.mean()), frame.cropped(frame.spp()), result, driver,
-                      {name: frame.cropped(frame.mean(name)) for name in film.layers}, kept.unsaved if kept else None)
-    try:
-        made = denoising.denoise(frame, full=denoise == "full", library=library) if denoise else None
-    except LullError as error:
-        return picture._replace(undenoised=error)
-    return picture._replace(image=frame.cropped(made.picture), denoised=made) if made else picture
+def render(scene: Any, criterion: Union[str, Criterion] = "", *, sensor: int = 0, seed: int = 0, wave: int = 8,
+           denoise: str = "", **settings: Any) -> Picture:
+    """Renders a mi.Scene, one sensor of it; each block until the criterion stops it. The film's crop is kept to. settings:
+    as lull.scenes.render takes them (limits, mask, checkpoint, resume, the criterion's parameters …), which also says what
+    is raised."""
+    return scenes.render(lambda: Film(scene, sensor, seed, bool(denoise)), criterion, seed=seed, wave=wave, denoise=denoise,
+                         read_mask=_read_mask, **settings)
