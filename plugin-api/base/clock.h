@@ -4,6 +4,6 @@
 
 double base_clock_wall_s(void);    /* monotonic, arbitrary origin */
 double base_clock_thread_s(void);  /* CPU time of the calling thread */
-double base_clock_process_s(void); /* CPU time of all threads together and of child processes that have ended */
+double base_clock_process_s(void); /* CPU time of all threads together and of child processes */
 
 #endif

@@ -1,4 +1,4 @@
-#define _GNU_SOURCE /* dladdr, memfd_create, syscall */
+#define _GNU_SOURCE /* dladdr, memfd_create */
 #include "denoise/oidn.h"
 
 #include <dlfcn.h>
@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <sys/syscall.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -28,9 +28,10 @@ struct lull_oidn {
     char program[PATH_MAX + 64], *library; /* owns library, "": the usual places */
     char version[32];
     int memory_fd;
-    posix_spawn_file_actions_t actions; /* if shared is not NULL */
-    struct shared *shared;              /* NULL: nothing is prepared */
+    struct shared *shared; /* NULL: nothing is prepared */
     size_t bytes;
+    pid_t pid;      /* of the program; 0: it does not run */
+    int program_fd; /* the connection to it, or -1 */
 };
 
 /* --- the program ------------------------------------------------------------------------------------------------------- */
@@ -62,42 +63,85 @@ static int find_program(struct lull_oidn *o, struct base_err *err)
                      "no program lull-denoiser in lib/lull/modules: is this tree built, or installed, as a whole?");
 }
 
-/* Waits until the program ends or is no longer wanted; returns whether it is not. */
-static int wait_for(pid_t pid, int (*cancelled)(void *data), void *data)
+static void end_program(struct lull_oidn *o)
 {
-    /* -1, on old systems, only sleeps */
-    struct pollfd ended = {.fd = (int)syscall(SYS_pidfd_open, pid, 0), .events = POLLIN};
-    int stop = 0, status;
-    pid_t got;
-    while ((got = waitpid(pid, &status, WNOHANG)) == 0 && !stop) {
-        poll(&ended, 1, ASK_EVERY_MS);
-        stop = cancelled && cancelled(data);
+    int status;
+    if (o->program_fd >= 0)
+        close(o->program_fd);
+    if (o->pid > 0 && waitpid(o->pid, &status, WNOHANG) == 0) { /* else it has ended, and its number may be another's */
+        kill(o->pid, SIGKILL);
+        waitpid(o->pid, &status, 0);
     }
-    if (got == 0) {
-        kill(pid, SIGKILL);
-        waitpid(pid, &status, 0);
-    }
-    if (ended.fd >= 0)
-        close(ended.fd);
-    return got == 0;
+    o->program_fd = -1;
+    o->pid = 0;
 }
 
-static int run_program(struct lull_oidn *o, int (*cancelled)(void *data), void *data, struct base_err *err)
+/* `caller` is the program's end of the connection. Returns an errno. The memory's descriptor is neither of those that the
+ * program finds. */
+static int spawn(struct lull_oidn *o, int caller)
 {
     char *arguments[] = {o->program, o->library, NULL};
+    posix_spawn_file_actions_t actions;
+    int why = posix_spawn_file_actions_init(&actions);
+    if (why)
+        return why;
+    why = posix_spawn_file_actions_adddup2(&actions, caller, SHARED_CALLER);
+    if (!why)
+        why = posix_spawn_file_actions_adddup2(&actions, o->memory_fd, SHARED_MEMORY);
+    if (!why)
+        why = posix_spawn(&o->pid, o->program, &actions, NULL, arguments, environ);
+    posix_spawn_file_actions_destroy(&actions);
+    return why;
+}
+
+static int start_program(struct lull_oidn *o, struct base_err *err)
+{
+    int ends[2];
+    int why = socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) == 0 ? 0 : errno;
+    if (!why) {
+        o->program_fd = ends[0];
+        why = spawn(o, ends[1]);
+        close(ends[1]);
+    }
+    if (!why)
+        return 0;
+    o->pid = 0;
+    end_program(o);
+    return why == ENOMEM ? base_fail_nomem(err, "lull-denoiser")
+                         : base_fail(err, BASE_EIO, "cannot run %s: %s", o->program, strerror(why));
+}
+
+/* Waits for the program's answer, or until it is no longer wanted. */
+static int wait_for(const struct lull_oidn *o, int (*cancelled)(void *data), void *data, struct base_err *err)
+{
+    struct pollfd answer = {.fd = o->program_fd, .events = POLLIN};
+    char byte;
+    while (poll(&answer, 1, ASK_EVERY_MS) <= 0)
+        if (cancelled && cancelled(data))
+            return base_fail(err, BASE_ECANCELLED, "cancelled");
+    if (recv(o->program_fd, &byte, 1, 0) == 1)
+        return 0;
+    return base_fail(err, BASE_EINVAL, "Open Image Denoise ended its process: a crash, or no memory");
+}
+
+/* The program does what the shared memory says. One that has ended is started anew, one that fails is ended. */
+static int ask_program(struct lull_oidn *o, int (*cancelled)(void *data), void *data, struct base_err *err)
+{
+    int status;
     struct shared *s = o->shared;
-    pid_t pid;
-    s->done = 0;
-    int rc = posix_spawn(&pid, o->program, &o->actions, NULL, arguments, environ);
+    if (o->pid > 0 && waitpid(o->pid, &status, WNOHANG) != 0)
+        end_program(o);
+    int rc = o->pid > 0 ? 0 : start_program(o, err);
     if (rc)
-        return rc == ENOMEM ? base_fail_nomem(err, "lull-denoiser")
-                            : base_fail(err, BASE_EIO, "cannot run %s: %s", o->program, strerror(rc));
-    if (wait_for(pid, cancelled, data))
-        return base_fail(err, BASE_ECANCELLED, "cancelled");
-    if (!s->done)
-        return base_fail(err, BASE_EINVAL, "Open Image Denoise ended its process: a crash, or no memory");
+        return rc;
+    send(o->program_fd, "", 1, MSG_NOSIGNAL); /* that it is gone is seen by waiting */
+    rc = wait_for(o, cancelled, data, err);
     s->version[sizeof s->version - 1] = s->text[sizeof s->text - 1] = '\0';
-    return s->code ? base_fail(err, s->code, "%s", s->text) : 0;
+    if (!rc && s->code)
+        rc = base_fail(err, s->code, "%s", s->text);
+    if (rc)
+        end_program(o);
+    return rc;
 }
 
 /* --- memory ------------------------------------------------------------------------------------------------------------ */
@@ -106,12 +150,16 @@ static void drop_memory(struct lull_oidn *o)
 {
     if (o->shared)
         munmap(o->shared, o->bytes);
-    if (o->memory_fd >= 0)
-        close(o->memory_fd);
-    if (o->shared)
-        posix_spawn_file_actions_destroy(&o->actions);
     o->shared = NULL;
-    o->memory_fd = -1;
+}
+
+/* The program finds its own descriptors below 10. */
+static int create_memory(void)
+{
+    int low = memfd_create("lull-denoiser", MFD_CLOEXEC), fd = low < 0 ? -1 : fcntl(low, F_DUPFD_CLOEXEC, 10);
+    if (low >= 0)
+        close(low);
+    return fd;
 }
 
 int lull_oidn_prepare(struct lull_oidn *o, const struct lull_oidn_form *form, struct base_err *err)
@@ -119,23 +167,14 @@ int lull_oidn_prepare(struct lull_oidn *o, const struct lull_oidn_form *form, st
     const size_t around = 2 * (size_t)form->margin;
     const size_t width = (size_t)form->width + around, height = (size_t)form->height + around;
     const size_t pictures = SHARED_PICTURES * 3 * width * height;
+    void *memory = MAP_FAILED;
     drop_memory(o);
     o->bytes = sizeof *o->shared + pictures * sizeof(float);
-    o->memory_fd = memfd_create("lull-denoiser", MFD_CLOEXEC);
-    void *memory = MAP_FAILED;
-    if (o->memory_fd >= 0 && posix_fallocate(o->memory_fd, 0, (off_t)o->bytes) == 0)
+    if (ftruncate(o->memory_fd, 0) == 0 && posix_fallocate(o->memory_fd, 0, (off_t)o->bytes) == 0)
         memory = mmap(NULL, o->bytes, PROT_READ | PROT_WRITE, MAP_SHARED, o->memory_fd, 0);
-    if (memory == MAP_FAILED || posix_spawn_file_actions_init(&o->actions) != 0) {
-        if (memory != MAP_FAILED)
-            munmap(memory, o->bytes);
-        drop_memory(o);
+    if (memory == MAP_FAILED)
         return base_fail_nomem(err, "the denoiser's pictures");
-    }
     o->shared = memory;
-    if (posix_spawn_file_actions_adddup2(&o->actions, o->memory_fd, SHARED_MEMORY) != 0) {
-        drop_memory(o);
-        return base_fail_nomem(err, "the denoiser's pictures");
-    }
     o->shared->form = *form;
     o->shared->form.width = (int32_t)width;
     o->shared->form.height = (int32_t)height;
@@ -153,13 +192,14 @@ int lull_oidn_open(const char *library, struct lull_oidn **out, struct base_err 
     struct lull_oidn *o = calloc(1, sizeof *o);
     if (!o)
         return base_fail_nomem(err, "Open Image Denoise");
-    o->memory_fd = -1;
+    o->program_fd = -1;
+    o->memory_fd = create_memory();
     o->library = strdup(library ? library : "");
-    int rc = o->library ? find_program(o, err) : base_fail_nomem(err, "Open Image Denoise");
+    int rc = o->library && o->memory_fd >= 0 ? find_program(o, err) : base_fail_nomem(err, "Open Image Denoise");
     if (!rc)
         rc = lull_oidn_prepare(o, &(struct lull_oidn_form){.threads = 1}, err);
     if (!rc)
-        rc = run_program(o, NULL, NULL, err);
+        rc = ask_program(o, NULL, NULL, err);
     if (rc) {
         lull_oidn_close(o);
         return rc;
@@ -174,7 +214,10 @@ void lull_oidn_close(struct lull_oidn *o)
 {
     if (!o)
         return;
+    end_program(o);
     drop_memory(o);
+    if (o->memory_fd >= 0)
+        close(o->memory_fd);
     free(o->library);
     free(o);
 }
@@ -221,7 +264,7 @@ int lull_oidn_run(struct lull_oidn *o, const struct lull_oidn_pictures *p, int (
         clean(p->albedo, &s->form, 0.0f, 1.0f, shared_picture(s, SHARED_ALBEDO));
     if (s->form.albedo && s->form.normal)
         clean(p->normal, &s->form, -1.0f, 1.0f, shared_picture(s, SHARED_NORMAL));
-    int rc = run_program(o, cancelled, data, err);
+    int rc = ask_program(o, cancelled, data, err);
     for (int k = 0; k < s->colors && !rc; k++)
         take(s, k, p->out[k]);
     return rc;

@@ -2,9 +2,10 @@
  * Open Image Denoise 2, in a process of its own: nothing is linked, nothing else needs it.
  *
  * The library starts a thread for each device, allocates while it works and, out of memory, ends the process that it is in.
- * None of that may happen to a host of criteria, so each run is one of the program lib/lull/modules/lull-denoiser
- * (denoise/program), with pictures in shared memory; whatever happens there is an error here. The library is looked for in
- * this order:
+ * None of that may happen to a host of criteria, so the program lib/lull/modules/lull-denoiser (denoise/program) does it,
+ * with pictures in shared memory; whatever happens there is an error here. It is a child process from lull_oidn_open to
+ * lull_oidn_close, which waits from run to run. It ends when this process does, and when a run fails; the next run starts
+ * it anew. The library is looked for in this order:
  *
  * - the path given, a file or a folder that holds one;
  * - the environment's LULL_OIDN, likewise;
@@ -68,7 +69,7 @@ void lull_oidn_close(struct lull_oidn *oidn);
 /* "2.5.1". */
 const char *lull_oidn_version(const struct lull_oidn *oidn);
 
-/* Takes the memory that pictures of this form need, 72 bytes a pixel; the program takes some 600 more while it runs. */
+/* Takes the memory that pictures of this form need, 72 bytes a pixel; the program takes some 600 more in a run. */
 int lull_oidn_prepare(struct lull_oidn *oidn, const struct lull_oidn_form *form, struct base_err *err);
 /* From now on pictures of this size, which need no more memory than those of the form. */
 void lull_oidn_resize(struct lull_oidn *oidn, int32_t width, int32_t height);

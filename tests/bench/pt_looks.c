@@ -11,10 +11,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/clock.h"
 #include "pbrt/load.h"
 #include "render/checkpoint.h"
 #include "render/denoised.h"
@@ -38,17 +38,6 @@ static void die(const struct base_err *err)
 {
     fprintf(stderr, "pt_looks: %s\n", err->text);
     exit(2);
-}
-
-static double spent_s(void)
-{
-    double s = 0;
-    for (int who = 0; who < 2; who++) {
-        struct rusage u;
-        getrusage(who ? RUSAGE_CHILDREN : RUSAGE_SELF, &u);
-        s += (double)(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
-    }
-    return s;
 }
 
 static void hear(void *context, int32_t level, const char *text)
@@ -130,9 +119,9 @@ static void write_pictures(const struct pt_render *r, uint64_t spp)
 static void look(struct pt_render *r, uint64_t spp)
 {
     struct lull_decision noisy[BLOCKS_MAX], d[BLOCKS_MAX];
-    double before_s = spent_s(), spent;
+    double before_s = base_clock_process_s(), spent;
     ask(r, "denoised", d);
-    spent = spent_s() - before_s;
+    spent = base_clock_process_s() - before_s;
     ask(r, "observer", noisy);
     for (uint32_t i = 0; i < r->blocks->count; i++)
         printf("{\"spp\": %llu, \"block\": %u, \"error\": %.6f, \"halves\": %.6f, \"crossed\": %.6f, \"noisy\": %.6f, "

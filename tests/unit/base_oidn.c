@@ -109,6 +109,40 @@ static void cancelling(void **unused)
     lull_oidn_close(o);
 }
 
+static void run_pixel(struct lull_oidn *o, float expected)
+{
+    float color[3] = {0.25f, 0.25f, 0.25f}, out[3];
+    struct lull_oidn_pictures p = {.color = {color}, .out = {out}};
+    struct base_err err = {0};
+    if (lull_oidn_run(o, &p, NULL, NULL, &err))
+        fail_msg("%s", err.text);
+    assert_true(out[2] == expected);
+}
+
+/* One process from open to close, which has the environment of its start; what has ended is started anew, with another. */
+static void staying(void **unused)
+{
+    (void)unused;
+    struct lull_oidn *o = open_stub("identity");
+    const struct lull_oidn_form two = {.width = 1, .height = 2, .quality = LULL_OIDN_HIGH, .threads = 1, .exposure = 1};
+    float color[3] = {1, 2, 3}, out[3];
+    struct lull_oidn_pictures p = {.color = {color}, .out = {out}};
+    setenv("OIDN_STUB", "crash", 1);
+    for (int k = 0; k < 2; k++) {
+        assert_int_equal(lull_oidn_prepare(o, k ? &pixel : &two, NULL), 0);
+        lull_oidn_resize(o, 1, 1);
+        run_pixel(o, 0.25f);
+        run_pixel(o, 0.25f);
+    }
+    lull_oidn_close(o);
+    o = open_stub("crash");
+    assert_int_equal(lull_oidn_prepare(o, &pixel, NULL), 0);
+    setenv("OIDN_STUB", "constant", 1);
+    assert_int_equal(lull_oidn_run(o, &p, NULL, NULL, NULL), BASE_EINVAL);
+    run_pixel(o, 0.5f);
+    lull_oidn_close(o);
+}
+
 /* The library is never given what is not finite, and never believed: the stub refuses the one, `nan` does the other. */
 static void bad_numbers(void **unused)
 {
@@ -275,9 +309,9 @@ int main(void)
     if (api_folder(stub, sizeof stub, "../oidn-stub") != 0)
         return 1;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(finding),     cmocka_unit_test(failures), cmocka_unit_test(cancelling),
-        cmocka_unit_test(bad_numbers), cmocka_unit_test(mirrored), cmocka_unit_test(real_library),
-        cmocka_unit_test(real_margin),
+        cmocka_unit_test(finding),      cmocka_unit_test(failures),    cmocka_unit_test(cancelling),
+        cmocka_unit_test(staying),      cmocka_unit_test(bad_numbers), cmocka_unit_test(mirrored),
+        cmocka_unit_test(real_library), cmocka_unit_test(real_margin),
     };
     return cmocka_run_group_tests_name("oidn", tests, NULL, NULL);
 }

@@ -16,6 +16,7 @@ typedef void *filter_t;
 struct library {
     void *handle;
     device_t device;
+    int32_t threads; /* of the device; 0: all processors */
     device_t (*new_device)(int type);
     void (*commit_device)(device_t device);
     void (*release_device)(device_t device);
@@ -218,16 +219,27 @@ static int run_all(const struct library *o, struct shared *s, struct base_err *e
     return rc;
 }
 
-/* The library stays loaded: its threads outlive their device for a moment. */
-int library_denoise(const char *path, struct shared *s, struct base_err *err)
+int library_open(const char *path, struct library **out, struct base_err *err)
 {
-    struct library o = {.handle = find(path, err)};
-    int rc = o.handle ? take_symbols(&o, err) : BASE_EINVAL;
-    if (!rc)
-        rc = make_device(&o, s, err);
-    if (!rc && s->form.width > 0)
-        rc = run_all(&o, s, err);
-    if (o.device)
-        o.release_device(o.device);
+    struct library *o = calloc(1, sizeof *o);
+    if (!o)
+        return base_fail_nomem(err, "Open Image Denoise");
+    o->handle = find(path, err);
+    int rc = o->handle ? take_symbols(o, err) : BASE_EINVAL;
+    if (rc)
+        free(o);
+    else
+        *out = o;
     return rc;
+}
+
+int library_denoise(struct library *o, struct shared *s, struct base_err *err)
+{
+    if (o->device && o->threads != s->form.threads) {
+        o->release_device(o->device);
+        o->device = NULL;
+    }
+    o->threads = s->form.threads;
+    int rc = o->device ? 0 : make_device(o, s, err);
+    return rc || s->form.width == 0 ? rc : run_all(o, s, err);
 }

@@ -1,7 +1,7 @@
 /*
  * The memory that lull-denoiser shares with the process that runs it: this, and then pictures, [height][width][3] floats
  * each, in the order of their names. The program is lull-denoiser LIBRARY, "" for the usual places, with the memory as
- * descriptor 3.
+ * descriptor 3 and as descriptor 4 a socket: a byte asks for a run of what the memory holds then, a byte answers.
  */
 #ifndef DENOISE_PROGRAM_SHARED_H
 #define DENOISE_PROGRAM_SHARED_H
@@ -10,7 +10,7 @@
 
 #include "denoise/oidn.h"
 
-enum { SHARED_MEMORY = 3 };
+enum { SHARED_MEMORY = 3, SHARED_CALLER = 4 };
 enum {
     SHARED_COLOR,
     SHARED_ALBEDO = LULL_OIDN_COLORS,
@@ -22,7 +22,6 @@ enum {
 struct shared {
     struct lull_oidn_form form; /* width 0: only say the version */
     int32_t colors;
-    int32_t done; /* the program has said all below */
     int32_t code; /* BASE_ */
     char version[32];
     char text[440]; /* the pictures begin at byte 512 */
