@@ -26,7 +26,7 @@ int pt_action_frame(struct pt_open *o, const struct pt_shot_frame *frame, struct
     if (!rc && samples)
         rc = pt_agree_handshake(o, job, err);
     if (!rc)
-        rc = works ? pt_farm_serve(job, o->threads, &(struct pt_row_maker){o->scene, o->kernel, NULL}, err)
+        rc = works ? pt_farm_serve(job, o->threads, &(struct pt_sampler_context){o->scene, o->kernel, NULL}, err)
                    : act(o, status, err);
     pt_open_end_frame(o);
     return rc;

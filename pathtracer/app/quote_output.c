@@ -8,7 +8,7 @@
 #include "render/output.h"
 #include "shade/bsdf_models.h"
 
-enum { DEAREST = 5, REPLAYED = 256 };
+enum { MOST_EXPENSIVE = 5, REPLAYED = 256 };
 
 static const struct lull_host_quote_row *asked_row(const struct pt_quote *q)
 {
@@ -20,7 +20,7 @@ static const struct lull_host_quote_row *asked_row(const struct pt_quote *q)
 
 /* --- what stands out --------------------------------------------------------------------------------------------------- */
 
-struct dear_block {
+struct expensive_block {
     uint32_t index;
     double share;       /* of the time of all blocks */
     double bounces;     /* vertices per path */
@@ -29,7 +29,7 @@ struct dear_block {
 };
 
 /* What the paths of a block meet: those of REPLAYED pixels spread over it, replayed by the tracing kernel. */
-static void take_census(const struct pt_render *r, const struct lull_host_block *b, struct dear_block *dear)
+static void take_census(const struct pt_render *r, const struct lull_host_block *b, struct expensive_block *expensive)
 {
     uint64_t met[PT_MET_COUNT] = {0}, all = 0, most = 0;
     uint32_t width = (uint32_t)(b->x1 - b->x0), pixels = width * (uint32_t)(b->y1 - b->y0);
@@ -38,30 +38,31 @@ static void take_census(const struct pt_render *r, const struct lull_host_block 
         uint32_t x = (uint32_t)b->x0 + at % width, y = (uint32_t)b->y0 + at / width;
         pt_kernel_census(r->scene, &r->config.integrator, x, y, i, met);
     }
-    dear->mostly = "nothing";
+    expensive->mostly = "nothing";
     for (int k = 0; k < PT_MET_COUNT; k++) {
         all += met[k];
         if (met[k] > most) {
             most = met[k];
-            dear->mostly = k == PT_MET_MEDIUM ? "scattering in a medium" : pt_bsdf_models[k].words;
+            expensive->mostly = k == PT_MET_MEDIUM ? "scattering in a medium" : pt_bsdf_models[k].words;
         }
     }
-    dear->bounces = (double)all / REPLAYED;
-    dear->mostly_share = all > 0 ? (double)most / (double)all : 0.0;
+    expensive->bounces = (double)all / REPLAYED;
+    expensive->mostly_share = all > 0 ? (double)most / (double)all : 0.0;
 }
 
-/* The blocks that cost most, dearest first. Returns their number. */
-static uint32_t find_dearest(const struct pt_quote *q, const struct pt_render *r, struct dear_block out[DEAREST])
+/* The blocks that cost most, the most expensive first. Returns their number. */
+static uint32_t find_most_expensive(const struct pt_quote *q, const struct pt_render *r,
+                                    struct expensive_block out[MOST_EXPENSIVE])
 {
     const struct lull_host_quote_row *row = asked_row(q);
     uint32_t n = 0;
     for (uint32_t i = 0; i < r->blocks->count; i++) {
-        uint32_t at = n < DEAREST ? n++ : DEAREST;
+        uint32_t at = n < MOST_EXPENSIVE ? n++ : MOST_EXPENSIVE;
         for (; at > 0 && row->blocks[out[at - 1].index].thread_s < row->blocks[i].thread_s; at--)
-            if (at < DEAREST)
+            if (at < MOST_EXPENSIVE)
                 out[at] = out[at - 1];
-        if (at < DEAREST)
-            out[at] = (struct dear_block){.index = i, .share = row->blocks[i].thread_s / row->thread_s};
+        if (at < MOST_EXPENSIVE)
+            out[at] = (struct expensive_block){.index = i, .share = row->blocks[i].thread_s / row->thread_s};
     }
     for (uint32_t k = 0; k < n; k++)
         take_census(r, &r->blocks->list[out[k].index], &out[k]);
@@ -115,23 +116,24 @@ static void print_row(FILE *out, const struct pt_quote_setting *setting, const s
     fprintf(out, "%-26s  %-26s  %-30s  %.2f x\n", who, samples, wall, row->against_uniform);
 }
 
-static void print_dearest(FILE *out, const struct pt_quote *q, const struct pt_render *r)
+static void print_most_expensive(FILE *out, const struct pt_quote *q, const struct pt_render *r)
 {
-    struct dear_block dear[DEAREST];
-    uint32_t n = find_dearest(q, r, dear);
+    struct expensive_block expensive[MOST_EXPENSIVE];
+    uint32_t n = find_most_expensive(q, r, expensive);
     const struct lull_host_quote_row *row = asked_row(q);
     fprintf(out, "\nblocks that take most of the time, as asked:\n");
     for (uint32_t k = 0; k < n; k++) {
-        const struct lull_host_block *b = &r->blocks->list[dear[k].index];
-        const struct lull_host_stop_at *stop = &row->blocks[dear[k].index].stop;
+        const struct lull_host_block *b = &r->blocks->list[expensive[k].index];
+        const struct lull_host_stop_at *stop = &row->blocks[expensive[k].index].stop;
         double paths = (double)b->spp * (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0);
         char spp[32], low[32], high[32];
         fprintf(out,
                 "  block %u (%d,%d to %d,%d): %.0f %%, %s spp (%s to %s), %.2f us per path of %.1f vertices, %.0f %% "
                 "of them %s\n",
-                b->id, b->x0, b->y0, b->x1, b->y1, 100 * dear[k].share, pt_quote_thousands(stop->spp, 0, spp),
+                b->id, b->x0, b->y0, b->x1, b->y1, 100 * expensive[k].share, pt_quote_thousands(stop->spp, 0, spp),
                 pt_quote_thousands(stop->low, 0, low), pt_quote_thousands(stop->high, 0, high),
-                paths > 0 ? b->thread_s / paths * 1e6 : 0.0, dear[k].bounces, 100 * dear[k].mostly_share, dear[k].mostly);
+                paths > 0 ? b->thread_s / paths * 1e6 : 0.0, expensive[k].bounces, 100 * expensive[k].mostly_share,
+                expensive[k].mostly);
     }
 }
 
@@ -161,7 +163,7 @@ void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *
                 "criterion %s does not say when it expects to stop %u of %u blocks: those are counted with --spp-max, "
                 "so that all is at most\n",
                 lull_host_table(r->criterion)->id, asked->unknown, r->blocks->count);
-    print_dearest(out, q, r);
+    print_most_expensive(out, q, r);
     print_unmet(out, asked, r);
     fprintf(out, "\npilot: %.0f spp on average in %s, loading %s, %.1f of %d threads at work%s\n",
             (double)r->totals->samples / (double)r->film.pixels, pt_quote_duration(lull_host_elapsed_s(r->frame), took),
@@ -220,18 +222,18 @@ static void add_pilot(cJSON *root, const struct pt_render *r, const struct pt_qu
     base_json_number(o, "scene_bytes", (double)info->scene_bytes, failed);
 }
 
-static void add_dearest(cJSON *root, const struct pt_quote *q, const struct pt_render *r, int *failed)
+static void add_most_expensive(cJSON *root, const struct pt_quote *q, const struct pt_render *r, int *failed)
 {
-    struct dear_block dear[DEAREST];
-    uint32_t n = find_dearest(q, r, dear);
+    struct expensive_block expensive[MOST_EXPENSIVE];
+    uint32_t n = find_most_expensive(q, r, expensive);
     cJSON *list = base_json_array(root, "dearest", failed);
     for (uint32_t k = 0; k < n; k++) {
         cJSON *o = base_json_object(list, NULL, failed);
-        base_json_number(o, "id", r->blocks->list[dear[k].index].id, failed);
-        base_json_number(o, "share", dear[k].share, failed);
-        base_json_number(o, "vertices_per_path", dear[k].bounces, failed);
-        base_json_text(o, "mostly", dear[k].mostly, failed);
-        base_json_number(o, "mostly_share", dear[k].mostly_share, failed);
+        base_json_number(o, "id", r->blocks->list[expensive[k].index].id, failed);
+        base_json_number(o, "share", expensive[k].share, failed);
+        base_json_number(o, "vertices_per_path", expensive[k].bounces, failed);
+        base_json_text(o, "mostly", expensive[k].mostly, failed);
+        base_json_number(o, "mostly_share", expensive[k].mostly_share, failed);
     }
 }
 
@@ -260,7 +262,7 @@ int pt_quote_json(FILE *out, const struct pt_quote *q, const struct pt_render *r
         base_json_number(o, "pilot_spp", (double)b->spp, &failed);
         base_json_number(o, "thread_s_per_spp", q->rows[0].blocks[i].sample_s, &failed);
     }
-    add_dearest(root, q, r, &failed);
+    add_most_expensive(root, q, r, &failed);
     add_pilot(root, r, info, &failed);
     char *text = failed ? NULL : cJSON_Print(root);
     cJSON_Delete(root);

@@ -44,7 +44,7 @@ static int sample_here(void *data, uint32_t first, uint32_t n, int thread, struc
 {
     const struct sampling *s = data;
     for (uint32_t i = first; i < first + n; i++)
-        pt_row_sample(&s->slice->maker, s->slice->film, begin_row(s, i));
+        pt_row_sample(&s->slice->context, s->slice->film, begin_row(s, i));
     (void)thread;
     (void)err;
     return 0;
@@ -77,7 +77,7 @@ static void undo(const struct sampling *s)
 
 int pt_farm_sample(struct job *job, struct base_threads *threads, const struct pt_farm_slice *slice, struct base_err *err)
 {
-    const struct sampling_task common = {slice->film->planes, *slice->maker.integrator};
+    const struct sampling_task common = {slice->film->planes, *slice->context.integrator};
     struct sampling s = {.slice = slice};
     int rc = 0;
     for (size_t i = 0; i < slice->count; i++) {
@@ -110,25 +110,26 @@ static int sample_row(void *data, struct job_task *task, uint32_t k, uint32_t n,
     const struct sampling_task *common = job_task_common(task);
     const struct row_item *item = job_task_item(task, k);
     struct row_item *answer = to;
-    struct pt_row_maker maker = *(const struct pt_row_maker *)data;
+    struct pt_sampler_context context = *(const struct pt_sampler_context *)data;
     struct pt_film film = {0};
     (void)n;
     (void)thread;
-    maker.integrator = &common->integrator;
+    context.integrator = &common->integrator;
     answer->row = item->row;
     int rc = pt_film_init(&film, item->row.x0, item->row.y, item->row.x1, item->row.y + 1, common->planes, err);
     if (rc)
         return rc;
     pt_row_restore(&film, &item->row, item->sums);
-    pt_row_sample(&maker, &film, &answer->row);
+    pt_row_sample(&context, &film, &answer->row);
     pt_row_save(&film, &item->row, answer->sums);
     pt_film_release(&film);
     return 0;
 }
 
-int pt_farm_serve(struct job *job, struct base_threads *threads, const struct pt_row_maker *maker, struct base_err *err)
+int pt_farm_serve(struct job *job, struct base_threads *threads, const struct pt_sampler_context *context,
+                  struct base_err *err)
 {
-    struct pt_row_maker own = *maker;
+    struct pt_sampler_context own = *context;
     const struct job_service service = {sample_row, &own};
     return job_serve(job, threads, &service, err);
 }

@@ -14,7 +14,7 @@
 
 /* Rows to be sampled. */
 struct pt_farm_slice {
-    struct pt_row_maker maker;
+    struct pt_sampler_context context;
     struct pt_film *film;
     struct pt_row *rows;
     const uint32_t *order; /* [count] row to be done n-th */
@@ -25,7 +25,8 @@ struct pt_farm_slice {
  * before and so are the rows. */
 int pt_farm_sample(struct job *job, struct base_threads *threads, const struct pt_farm_slice *slice, struct base_err *err);
 
-/* A worker: samples rows until the end of the job. The maker's integrator is not used: it comes with the rows. */
-int pt_farm_serve(struct job *job, struct base_threads *threads, const struct pt_row_maker *maker, struct base_err *err);
+/* A worker: samples rows until the end of the job. The context's integrator is not used: it comes with the rows. */
+int pt_farm_serve(struct job *job, struct base_threads *threads, const struct pt_sampler_context *context,
+                  struct base_err *err);
 
 #endif

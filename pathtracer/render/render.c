@@ -200,9 +200,9 @@ void pt_render_go_on(struct pt_render *r, unsigned others, uint64_t first_spp)
 static void sample_row(void *data, long n, int worker)
 {
     struct pt_render *r = data;
-    const struct pt_row_maker maker = {r->scene, r->kernel, &r->config.integrator};
+    const struct pt_sampler_context context = {r->scene, r->kernel, &r->config.integrator};
     (void)worker;
-    pt_row_sample(&maker, &r->film, &r->work->items[r->work->order[n]]);
+    pt_row_sample(&context, &r->film, &r->work->items[r->work->order[n]]);
 }
 
 /* All rows of the slice. Not 0: none of them, as pt_farm_sample. */

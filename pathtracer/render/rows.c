@@ -5,7 +5,7 @@
 #include "base/clock.h"
 
 /* Samples of `count` neighbours from x on, in the order of samples in each pixel. */
-static void sample_run(const struct pt_row_maker *maker, struct pt_film *film, struct pt_row *row, int x, int count)
+static void sample_run(const struct pt_sampler_context *context, struct pt_film *film, struct pt_row *row, int x, int count)
 {
     struct pt_film_pixel pixels[PT_RUN];
     struct pt_path_result paths[PT_RUN];
@@ -15,7 +15,7 @@ static void sample_run(const struct pt_row_maker *maker, struct pt_film *film, s
         pt_film_load(film, index + (size_t)i, &pixels[i]);
     for (uint32_t s = row->from; s < row->to; s++) {
         const int in_half = pt_film_in_half(s);
-        maker->kernel(maker->scene, maker->integrator, (uint32_t)x, (uint32_t)row->y, count, s, paths);
+        context->kernel(context->scene, context->integrator, (uint32_t)x, (uint32_t)row->y, count, s, paths);
         for (int i = 0; i < count; i++) {
             row->rays += paths[i].rays;
             if (!pt_film_add(&pixels[i], planes, in_half, &paths[i]) && row->dropped++ == 0) {
@@ -29,11 +29,11 @@ static void sample_run(const struct pt_row_maker *maker, struct pt_film *film, s
         pt_film_store(film, index + (size_t)i, &pixels[i]);
 }
 
-void pt_row_sample(const struct pt_row_maker *maker, struct pt_film *film, struct pt_row *row)
+void pt_row_sample(const struct pt_sampler_context *context, struct pt_film *film, struct pt_row *row)
 {
     double start_s = base_clock_thread_s();
     for (int x = row->x0; x < row->x1; x += PT_RUN)
-        sample_run(maker, film, row, x, row->x1 - x < PT_RUN ? row->x1 - x : PT_RUN);
+        sample_run(context, film, row, x, row->x1 - x < PT_RUN ? row->x1 - x : PT_RUN);
     row->thread_s = base_clock_thread_s() - start_s;
 }
 

@@ -24,14 +24,14 @@ struct pt_row {
 };
 
 /* What every row of a render is sampled with; borrows. */
-struct pt_row_maker {
+struct pt_sampler_context {
     const struct pt_scene *scene;
     pt_kernel *kernel;
     const struct pt_integrator *integrator;
 };
 
 /* Adds the row's samples to the film and fills the second half of *row, which must be zero. */
-void pt_row_sample(const struct pt_row_maker *maker, struct pt_film *film, struct pt_row *row);
+void pt_row_sample(const struct pt_sampler_context *context, struct pt_film *film, struct pt_row *row);
 
 /* The sums of a row's pixels as bytes, plane after plane, and back. */
 size_t pt_row_bytes(const struct pt_row *row, uint32_t planes);

@@ -189,21 +189,22 @@ static int32_t split(const struct build *build, const struct cluster *c)
     return middle > c->begin && middle < c->end ? middle : c->begin + (c->end - c->begin) / 2;
 }
 
-/* Splits the dearest until there are PT_LIGHT_FAN of them or all are single. */
+/* Splits the most expensive until there are PT_LIGHT_FAN of them or all are single. */
 static int fan_out(const struct build *build, struct cluster all, struct cluster children[PT_LIGHT_FAN])
 {
     int n = 1;
     children[0] = all;
     while (n < PT_LIGHT_FAN) {
-        int dearest = -1;
+        int most_expensive = -1;
         for (int k = 0; k < n; k++)
-            if (children[k].end - children[k].begin > 1 && (dearest < 0 || cost(&children[k]) > cost(&children[dearest])))
-                dearest = k;
-        if (dearest < 0)
+            if (children[k].end - children[k].begin > 1 &&
+                (most_expensive < 0 || cost(&children[k]) > cost(&children[most_expensive])))
+                most_expensive = k;
+        if (most_expensive < 0)
             break;
-        struct cluster whole = children[dearest];
+        struct cluster whole = children[most_expensive];
         int32_t middle = split(build, &whole);
-        children[dearest] = gather(build, whole.begin, middle);
+        children[most_expensive] = gather(build, whole.begin, middle);
         children[n++] = gather(build, middle, whole.end);
     }
     return n;

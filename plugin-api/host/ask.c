@@ -49,7 +49,7 @@ static int32_t evaluate_step(struct lull_host_criterion *c, uint32_t step, const
     if (n == 0)
         return LULL_OK;
     int32_t code =
-        c->table->evaluate(c->dialled[step], view, c->due, sizeof c->due[0], c->answers, sizeof c->answers[0], n, e);
+        c->table->evaluate(c->instances[step], view, c->due, sizeof c->due[0], c->answers, sizeof c->answers[0], n, e);
     n = 0;
     for (uint32_t k = 0; k < q->count && code == LULL_OK; k++)
         if (q->blocks->list[q->due[k]].step == step)

@@ -6,30 +6,30 @@
 /* Half an interval that holds 8 of 10 blocks, in octaves of samples: luck in the last checks, and so much more for each
  * octave that the prediction looks ahead. Fitted to 43 blocks of seven renders and 61 of 33 recordings
  * (docs/results/quote.md). */
-static const double NEAR = 0.15, PER_OCTAVE = 0.08, UNMET = 1.0;
+static const double NEAR = 0.15, PER_OCTAVE = 0.08, UNDERSAMPLED = 1.0;
 
-static double half_width(const struct lull_host_said *said, double end)
+static double half_width(const struct lull_host_response *response, double end)
 {
-    double ahead = log2(end / (double)said->spp);
-    return said->unmet ? UNMET : NEAR + PER_OCTAVE * fmax(ahead, 0.0);
+    double ahead = log2(end / (double)response->spp);
+    return response->undersampled ? UNDERSAMPLED : NEAR + PER_OCTAVE * fmax(ahead, 0.0);
 }
 
-struct lull_host_stop_at lull_host_expect(const struct lull_host_said *said, uint64_t spp, uint64_t spp_max)
+struct lull_host_stop_at lull_host_expect(const struct lull_host_response *response, uint64_t spp, uint64_t spp_max)
 {
     double has = (double)spp, most = (double)spp_max;
-    if (said->spp == 0 || !isfinite(said->predicted))
+    if (response->spp == 0 || !isfinite(response->predicted))
         return (struct lull_host_stop_at){.spp = most, .low = has, .high = most};
-    double end = fmin(fmax(said->predicted, 1.0), most);
-    if (said->stopped)
+    double end = fmin(fmax(response->predicted, 1.0), most);
+    if (response->stopped)
         return (struct lull_host_stop_at){end, end, end, 1};
-    double factor = exp2(half_width(said, end));
+    double factor = exp2(half_width(response, end));
     end = fmax(end, has);
     return (struct lull_host_stop_at){end, fmax(end / factor, has), fmin(end * factor, most), 1};
 }
 
 struct lull_host_stop_at lull_host_expect_block(const struct lull_host_blocks *blocks, const struct lull_host_block *b)
 {
-    struct lull_host_said said = {.spp = b->asked ? b->asked_spp : 0, .predicted = b->predicted_spp};
+    struct lull_host_response response = {.spp = b->asked ? b->asked_spp : 0, .predicted = b->predicted_spp};
     double has = (double)b->spp;
     if (b->reason != LULL_REASON_NONE)
         return (struct lull_host_stop_at){has, has, has, 1};
@@ -37,7 +37,7 @@ struct lull_host_stop_at lull_host_expect_block(const struct lull_host_blocks *b
         double end = (double)b->next_spp;
         return (struct lull_host_stop_at){end, end, end, 1};
     }
-    struct lull_host_stop_at stop = lull_host_expect(&said, b->spp, blocks->spp_max);
+    struct lull_host_stop_at stop = lull_host_expect(&response, b->spp, blocks->spp_max);
     stop.spp = fmax(stop.spp, (double)lull_host_goal(blocks, b)); /* nobody asks before */
     return stop;
 }

@@ -23,8 +23,8 @@ uint64_t lull_host_goal(const struct lull_host_blocks *blocks, const struct lull
 
 struct lull_host_criterion {
     const struct lull_criterion *table;
-    struct lull_instance *dialled[LULL_HOST_STEPS + 1]; /* own; by step of the mask, NULL where no block is of that step */
-    struct lull_pair *pairs;                            /* owns, as their text */
+    struct lull_instance *instances[LULL_HOST_STEPS + 1]; /* own; by step of the mask, NULL where no block is of that step */
+    struct lull_pair *pairs;                              /* owns, as their text */
     uint32_t pair_count;
     struct lull_requirements needs;
     struct lull_host_services offered; /* name: owns */
@@ -77,20 +77,20 @@ struct lull_host_frame {
 };
 
 /* What a criterion said about a block last. */
-struct lull_host_said {
-    uint64_t spp;     /* samples when it was asked; 0: it never was */
-    double predicted; /* samples at which it expects to stop; NaN: it does not say */
-    int32_t stopped;  /* it said stop: `predicted` is where, at most spp */
-    int32_t unmet;    /* its noise sits in few pixels or grows: light that most of its pixels have not met yet */
+struct lull_host_response {
+    uint64_t spp;         /* samples when it was asked; 0: it never was */
+    double predicted;     /* samples at which it expects to stop; NaN: it does not say */
+    int32_t stopped;      /* it said stop: `predicted` is where, at most spp */
+    int32_t undersampled; /* its noise sits in few pixels or grows: light that most of its pixels have not met yet */
 };
 
 /* What a row of a quote asks, and what it was told. */
 struct lull_host_quote_asked {
     struct lull_host_criterion *criterion; /* owns; NULL: nobody is asked */
-    struct lull_host_said *said;           /* owns; [blocks] */
-    struct lull_host_said *first;          /* owns; [blocks] what it said when it was asked first */
+    struct lull_host_response *response;   /* owns; [blocks] */
+    struct lull_host_response *first;      /* owns; [blocks] what it said when it was asked first */
     struct lull_host_quote_block *blocks;  /* owns; the answer */
-    double *errors;                        /* owns; [blocks] that it heard of at said->spp; of rows by error alone */
+    double *errors;                        /* owns; [blocks] that it heard of at response->spp; of rows by error alone */
     double limit;                          /* the error at which a row by error stops; 0: another row */
     int other;                             /* not the frame's criterion: its checks take their own time */
     double asked_s;                        /* wall seconds that it was asked */
@@ -188,8 +188,8 @@ uint64_t lull_host_next_check(const struct lull_host_blocks *blocks, uint64_t sp
 
 /* Predictions are taken as they are: from a hundred samples on they were neither low nor high (docs/results/quote.md). The
  * interval widens with the octaves from the samples at hand to the predicted ones, and to an octave either way for a block
- * that is `unmet`. It does not stop before `spp`: samples that it has or gets in any case, 0 … spp_max. */
-struct lull_host_stop_at lull_host_expect(const struct lull_host_said *said, uint64_t spp, uint64_t spp_max);
+ * that is undersampled. It does not stop before `spp`: samples that it has or gets in any case, 0 … spp_max. */
+struct lull_host_stop_at lull_host_expect(const struct lull_host_response *response, uint64_t spp, uint64_t spp_max);
 /* Of a block of a render that is going on. A stopped block: where it did. */
 struct lull_host_stop_at lull_host_expect_block(const struct lull_host_blocks *blocks, const struct lull_host_block *block);
 /* More checks of a block that stops at `spp`: as many per octave as the criterion asks for now. */
@@ -229,9 +229,9 @@ struct cJSON *lull_host_report_block(struct cJSON *list, const struct lull_host_
 
 /* "criterion ID: ", `what` and what the criterion said; returns its code. */
 int32_t lull_host_blame(const struct lull_host_criterion *criterion, const char *what, int32_t code,
-                        const struct lull_error *said, struct lull_error *err);
+                        const struct lull_error *response, struct lull_error *err);
 /* A failure of plugin-api/base in the words of the ABI. */
-int32_t lull_host_translate(const struct base_err *said, struct lull_error *err);
+int32_t lull_host_translate(const struct base_err *response, struct lull_error *err);
 int32_t lull_host_no_memory(struct lull_error *err, const char *what);
 
 #endif

@@ -68,10 +68,10 @@ int32_t lull_host_create(const struct lull_host_services *services, const struct
     if (code == LULL_OK)
         code = copy_pairs(c, pairs, pair_count, err);
     if (code == LULL_OK) {
-        code = table->create(&c->host, pairs, pair_count, sizeof *pairs, &c->dialled[0], &e);
+        code = table->create(&c->host, pairs, pair_count, sizeof *pairs, &c->instances[0], &e);
         c->needs.struct_size = sizeof c->needs;
         if (code == LULL_OK)
-            code = table->requirements(c->dialled[0], &c->needs, &e);
+            code = table->requirements(c->instances[0], &c->needs, &e);
         if (code != LULL_OK)
             lull_host_blame(c, "", code, &e, err);
     }
@@ -126,10 +126,10 @@ void lull_host_close(struct lull_host_criterion *c)
     if (!c)
         return;
     for (int s = 0; s <= LULL_HOST_STEPS; s++) {
-        if (c->dialled[s] && c->open)
-            c->table->end_frame(c->dialled[s]);
-        if (c->dialled[s])
-            c->table->destroy(c->dialled[s]);
+        if (c->instances[s] && c->open)
+            c->table->end_frame(c->instances[s]);
+        if (c->instances[s])
+            c->table->destroy(c->instances[s]);
     }
     release_frame(c);
     release_pairs(c);
@@ -161,7 +161,7 @@ const char *lull_host_parameter(const struct lull_criterion *t, const char *name
 /* --- its frame ------------------------------------------------------------------------------------------------------ */
 
 /* An instance like the first one, its quality parameter scaled for this step of the mask. */
-static int32_t create_dialled(struct lull_host_criterion *c, uint32_t step, struct lull_error *err)
+static int32_t create_instance(struct lull_host_criterion *c, uint32_t step, struct lull_error *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
     char value[32];
@@ -171,7 +171,7 @@ static int32_t create_dialled(struct lull_host_criterion *c, uint32_t step, stru
     memcpy(pairs, c->pairs, c->pair_count * sizeof *pairs);
     int32_t code = lull_host_scale_quality(c->table, c->pairs, c->pair_count, step, value, &pairs[c->pair_count], err);
     if (code == LULL_OK) { /* a later pair wins */
-        code = c->table->create(&c->host, pairs, c->pair_count + 1, sizeof *pairs, &c->dialled[step], &e);
+        code = c->table->create(&c->host, pairs, c->pair_count + 1, sizeof *pairs, &c->instances[step], &e);
         if (code != LULL_OK)
             lull_host_blame(c, "", code, &e, err);
     }
@@ -250,12 +250,12 @@ static int32_t begin_instances(struct lull_host_criterion *c, const struct lull_
     for (uint32_t i = 0; i < b->count && code == LULL_OK; i++) {
         const struct lull_host_block *k = &b->list[i];
         rects[i] = (struct lull_rect){k->x0, k->y0, k->x1, k->y1};
-        if (!c->dialled[k->step])
-            code = create_dialled(c, k->step, err);
+        if (!c->instances[k->step])
+            code = create_instance(c, k->step, err);
     }
     struct lull_frame frame = describe(f, c, rects);
     for (int s = 0; s <= LULL_HOST_STEPS && code == LULL_OK; s++) {
-        code = c->dialled[s] ? c->table->begin_frame(c->dialled[s], &frame, &e) : LULL_OK;
+        code = c->instances[s] ? c->table->begin_frame(c->instances[s], &frame, &e) : LULL_OK;
         if (code != LULL_OK)
             lull_host_blame(c, "", code, &e, err);
     }

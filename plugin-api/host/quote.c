@@ -34,7 +34,7 @@ void lull_host_quote_end(struct lull_host_quote *q)
 {
     for (uint32_t i = 0; q && i < q->count; i++) {
         lull_host_close(q->asked[i].criterion);
-        free(q->asked[i].said);
+        free(q->asked[i].response);
         free(q->asked[i].first);
         free(q->asked[i].blocks);
         free(q->asked[i].errors);
@@ -57,10 +57,11 @@ static int32_t add_row(struct lull_host_quote *q, int32_t asked, struct lull_err
     if (!rows || !answers)
         return no_memory(err);
     struct lull_host_quote_asked *a = &q->asked[q->count];
-    *a = (struct lull_host_quote_asked){
-        .said = calloc(n, sizeof *a->said), .first = calloc(n, sizeof *a->first), .blocks = calloc(n, sizeof *a->blocks)};
+    *a = (struct lull_host_quote_asked){.response = calloc(n, sizeof *a->response),
+                                        .first = calloc(n, sizeof *a->first),
+                                        .blocks = calloc(n, sizeof *a->blocks)};
     q->rows[q->count++] = (struct lull_host_quote_row){.asked = asked};
-    return a->said && a->first && a->blocks ? LULL_OK : no_memory(err);
+    return a->response && a->first && a->blocks ? LULL_OK : no_memory(err);
 }
 
 int32_t lull_host_quote_add(struct lull_host_quote *q, const struct lull_pair *changed, int32_t asked,
@@ -123,17 +124,17 @@ int32_t lull_host_quote_add_other(struct lull_host_quote *q, struct lull_host_cr
 
 /* A row that would have stopped the block at an earlier check has stopped it; where between the two checks follows from what
  * it expected at the first. */
-static void note_answer(struct lull_host_said *said, const struct lull_host_block *b, const struct lull_decision *d,
+static void note_answer(struct lull_host_response *response, const struct lull_host_block *b, const struct lull_decision *d,
                         uint64_t spp_min)
 {
-    if (said->stopped || b->spp <= said->spp)
+    if (response->stopped || b->spp <= response->spp)
         return;
     if (d->action == LULL_STOP && b->spp >= spp_min) {
-        double expected = said->spp > 0 && isfinite(said->predicted) ? said->predicted : (double)b->spp;
-        double stop = fmin(fmax(expected, (double)said->spp), (double)b->spp);
-        *said = (struct lull_host_said){.spp = b->spp, .predicted = fmax(stop, (double)spp_min), .stopped = 1};
+        double expected = response->spp > 0 && isfinite(response->predicted) ? response->predicted : (double)b->spp;
+        double stop = fmin(fmax(expected, (double)response->spp), (double)b->spp);
+        *response = (struct lull_host_response){.spp = b->spp, .predicted = fmax(stop, (double)spp_min), .stopped = 1};
     } else {
-        *said = (struct lull_host_said){.spp = b->spp, .predicted = d->predicted_spp};
+        *response = (struct lull_host_response){.spp = b->spp, .predicted = d->predicted_spp};
     }
 }
 
@@ -144,20 +145,20 @@ static const double LEAST_FALL = 0.25, FALL_OF_NOISE = 0.5;
 static void note_error(struct lull_host_quote_asked *a, uint32_t index, const struct lull_host_block *b, double error,
                        uint64_t spp_min)
 {
-    struct lull_host_said *said = &a->said[index];
-    if (said->stopped || b->spp <= said->spp)
+    struct lull_host_response *response = &a->response[index];
+    if (response->stopped || b->spp <= response->spp)
         return;
     const double spp = (double)b->spp, before = a->errors[index], limit = a->limit * lull_host_mask_factor(b->step);
-    const int has_before = said->spp > 0 && before > 0.0;
+    const int has_before = response->spp > 0 && before > 0.0;
     double fall = FALL_OF_NOISE;
     if (has_before && error > 0.0)
-        fall = fmin(fmax(log2(before / error) / log2(spp / (double)said->spp), LEAST_FALL), FALL_OF_NOISE);
+        fall = fmin(fmax(log2(before / error) / log2(spp / (double)response->spp), LEAST_FALL), FALL_OF_NOISE);
     double stop = error > 0.0 ? spp * pow(error / limit, 1.0 / fall) : isnan(error) ? (double)NAN : 0.0;
     const int stopped = error <= limit && b->spp >= spp_min;
-    const double least = has_before ? (double)said->spp : b->checks > 1 ? 0.0 : spp; /* checks before the quote began */
+    const double least = has_before ? (double)response->spp : b->checks > 1 ? 0.0 : spp; /* checks before the quote began */
     if (stopped)
         stop = fmax(fmin(fmax(stop, least), spp), (double)spp_min);
-    *said = (struct lull_host_said){.spp = b->spp, .predicted = stop, .stopped = stopped};
+    *response = (struct lull_host_response){.spp = b->spp, .predicted = stop, .stopped = stopped};
     a->errors[index] = error;
 }
 
@@ -170,7 +171,7 @@ static void note_errors(const struct lull_host_quote *q, const uint32_t *due, ui
             struct lull_host_quote_asked *a = &q->asked[i];
             note_error(a, due[k], &blocks->list[due[k]], decisions[k].error, blocks->spp_min);
             if (a->first[due[k]].spp == 0)
-                a->first[due[k]] = a->said[due[k]];
+                a->first[due[k]] = a->response[due[k]];
         }
 }
 
@@ -194,9 +195,9 @@ static int32_t ask_row(const struct lull_host_quote *q, uint32_t row, const stru
     a->asked_s += base_clock_wall_s() - start_s;
     a->asked += count;
     for (uint32_t k = 0; k < count && code == LULL_OK; k++) {
-        note_answer(&a->said[due[k]], &blocks->list[due[k]], &decisions[k], blocks->spp_min);
+        note_answer(&a->response[due[k]], &blocks->list[due[k]], &decisions[k], blocks->spp_min);
         if (a->first[due[k]].spp == 0)
-            a->first[due[k]] = a->said[due[k]];
+            a->first[due[k]] = a->response[due[k]];
     }
     if (code == LULL_OK && q->rows[row].asked)
         note_errors(q, due, count, decisions);
@@ -254,15 +255,15 @@ static double top_share(const struct lull_host_frame *f, const struct lull_view 
     return seq_tail_of(scratch, n, 0.0).top_share;
 }
 
-static int grows(const struct lull_host_said *first, const struct lull_host_said *said)
+static int grows(const struct lull_host_response *first, const struct lull_host_response *response)
 {
-    return first->spp > 0 && said->spp > first->spp && !said->stopped &&
-           log2(said->predicted / first->predicted) > GROWTH * log2((double)said->spp / (double)first->spp);
+    return first->spp > 0 && response->spp > first->spp && !response->stopped &&
+           log2(response->predicted / first->predicted) > GROWTH * log2((double)response->spp / (double)first->spp);
 }
 
 static size_t pixels_of(const struct lull_host_block *b) { return (size_t)(b->x1 - b->x0) * (size_t)(b->y1 - b->y0); }
 
-static int32_t find_unmet(const struct lull_host_quote *q, const struct lull_host_view *view, struct lull_error *err)
+static int32_t find_undersampled(const struct lull_host_quote *q, const struct lull_host_view *view, struct lull_error *err)
 {
     const struct lull_host_blocks *blocks = &q->frame->blocks;
     struct lull_host_shown shown;
@@ -277,8 +278,8 @@ static int32_t find_unmet(const struct lull_host_quote *q, const struct lull_hos
     for (uint32_t i = 0; i < blocks->count && code == LULL_OK; i++) {
         int tail = top_share(q->frame, &seen, i, scratch) > MOST_TOP_SHARE;
         for (uint32_t k = 0; k < q->count; k++) {
-            struct lull_host_said *said = &q->asked[k].said[i];
-            said->unmet = !said->stopped && (tail || grows(&q->asked[k].first[i], said));
+            struct lull_host_response *response = &q->asked[k].response[i];
+            response->undersampled = !response->stopped && (tail || grows(&q->asked[k].first[i], response));
         }
     }
     if (code == LULL_OK)
@@ -321,17 +322,17 @@ static double wall_s(const struct lull_host_quote *q, const struct lull_host_quo
 
 /* The render's own blocks are where they are; another row's may have stopped before, or would go on. */
 static struct lull_host_stop_at stop_of(const struct lull_host_blocks *blocks, const struct lull_host_block *b,
-                                        struct lull_host_said said, int asked)
+                                        struct lull_host_response response, int asked)
 {
     if (blocks->flags & LULL_HOST_UNIFORM)
         return lull_host_expect_block(blocks, b);
     if (!asked)
-        return lull_host_expect(&said, 0, blocks->spp_max);
+        return lull_host_expect(&response, 0, blocks->spp_max);
     if (b->reason == LULL_REASON_CRITERION || b->reason == LULL_REASON_SPP_MAX || b->reason == LULL_REASON_DROPPED)
         return lull_host_expect_block(blocks, b);
-    if (said.stopped)
-        said.predicted = (double)b->next_spp;
-    return lull_host_expect(&said, lull_host_goal(blocks, b), blocks->spp_max);
+    if (response.stopped)
+        response.predicted = (double)b->next_spp;
+    return lull_host_expect(&response, lull_host_goal(blocks, b), blocks->spp_max);
 }
 
 static void add_up(const struct lull_host_quote *q, const struct lull_host_quote_asked *a, struct lull_host_quote_row *row,
@@ -343,10 +344,10 @@ static void add_up(const struct lull_host_quote *q, const struct lull_host_quote
     cost_blocks(blocks, a->blocks);
     for (uint32_t i = 0; i < blocks->count; i++) {
         struct lull_host_quote_block *to = &a->blocks[i];
-        const struct lull_host_stop_at stop = stop_of(blocks, &blocks->list[i], a->said[i], row->asked);
+        const struct lull_host_stop_at stop = stop_of(blocks, &blocks->list[i], a->response[i], row->asked);
         const double size = (double)pixels_of(&blocks->list[i]), cost_s = to->sample_s;
-        *to = (struct lull_host_quote_block){stop,   stop.spp * cost_s, stop.low * cost_s, stop.high * cost_s,
-                                             cost_s, a->said[i].unmet};
+        *to = (struct lull_host_quote_block){stop,   stop.spp * cost_s,          stop.low * cost_s, stop.high * cost_s,
+                                             cost_s, a->response[i].undersampled};
         row->thread_s += to->thread_s;
         row->thread_low_s += to->thread_low_s;
         row->thread_high_s += to->thread_high_s;
@@ -379,7 +380,7 @@ int32_t lull_host_quote_finish(struct lull_host_quote *q, const struct lull_host
     struct lull_host_work *work = calloc(q->frame->blocks.count, sizeof *work);
     code = work ? ask_all(q, view, err) : no_memory(err);
     if (code == LULL_OK)
-        code = find_unmet(q, view, err);
+        code = find_undersampled(q, view, err);
     q->check_s = totals->checks > 0 ? totals->criterion_s / (double)totals->checks : 0.0;
     for (uint32_t i = 0; i < q->count && code == LULL_OK; i++)
         add_up(q, &q->asked[i], &q->rows[i], work);

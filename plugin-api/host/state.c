@@ -79,7 +79,7 @@ int32_t lull_host_save_history(const struct lull_host_criterion *c, const struct
     const struct lull_state *state = state_extension(c);
     struct lull_error e = {.struct_size = sizeof e};
     for (int s = 0; state && s <= LULL_HOST_STEPS && code == LULL_OK; s++)
-        code = c->dialled[s] ? state->save(c->dialled[s], writer, &e) : LULL_OK;
+        code = c->instances[s] ? state->save(c->instances[s], writer, &e) : LULL_OK;
     return code == LULL_OK ? code : lull_host_blame(c, "cannot save its state: ", code, &e, err);
 }
 
@@ -95,7 +95,7 @@ int32_t lull_host_load_history(struct lull_host_criterion *c, const void *data, 
     struct lull_error e = {.struct_size = sizeof e};
     int32_t code = LULL_OK;
     for (int s = 0; s <= LULL_HOST_STEPS && code == LULL_OK; s++)
-        code = c->dialled[s] ? state->load(c->dialled[s], &reader, &e) : LULL_OK;
+        code = c->instances[s] ? state->load(c->instances[s], &reader, &e) : LULL_OK;
     if (code != LULL_OK)
         return lull_host_blame(c, "cannot load its state: ", code, &e, err);
     if (b.at != b.size)

@@ -255,8 +255,8 @@ static void offers(void **state)
     set_up(ALL_PLANES, 0);
     assert_int_equal(lull_host_create(&three, &table, NULL, 0, &busy, &err), LULL_OK);
     assert_int_equal(lull_host_create(NULL, &table, NULL, 0, &silent, &err), LULL_OK);
-    const struct lull_host *alone = criterion->dialled[0]->host, *many = busy->dialled[0]->host,
-                           *none = silent->dialled[0]->host;
+    const struct lull_host *alone = criterion->instances[0]->host, *many = busy->instances[0]->host,
+                           *none = silent->instances[0]->host;
     assert_true(alone->struct_size == sizeof *alone && alone->api_minor == LULL_API_MINOR && alone->max_workers == 1 &&
                 many->max_workers == 3);
     assert_true(alone->flags == 0 && !alone->cancelled && !alone->get_extension && none->max_workers == 1 && !none->name);

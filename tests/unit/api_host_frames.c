@@ -369,7 +369,7 @@ static void a_time_budget_goes_where_noise_is_seen_most(void **state)
     frame->config.time_budget_s = 1e9;
     lull_host_blocks_of(frame)->spp_max = 1000000;
     list[1].step = LULL_HOST_STEPS;
-    criterion->dialled[LULL_HOST_STEPS] = criterion->dialled[0];
+    criterion->instances[LULL_HOST_STEPS] = criterion->instances[0];
     uint64_t given = 0, before;
     do {
         before = given;
@@ -391,7 +391,7 @@ static void a_time_budget_goes_where_noise_is_seen_most(void **state)
         for (int k = 0; k < 3; k++)
             assert_true(seen[i] <= 1.51 * seen[k]);
     assert_true(list[0].spp > 2 * list[2].spp && list[3].spp >= list[0].spp);
-    criterion->dialled[LULL_HOST_STEPS] = NULL;
+    criterion->instances[LULL_HOST_STEPS] = NULL;
     end();
 }
 
@@ -504,7 +504,7 @@ static void states_go_on(void **state)
         for (int i = 0; i < BLOCKS; i++) {
             were[i].half_spp = known ? 0 : were[i].half_spp;
             assert_memory_equal(&list[i], &were[i], sizeof were[i]);
-            assert_int_equal(criterion->dialled[0]->asked[i], 1);
+            assert_int_equal(criterion->instances[0]->asked[i], 1);
         }
         uint32_t kept;
         const struct lull_host_sample *dropped = lull_host_dropped(frame, &kept);

@@ -487,7 +487,7 @@ static void warnings_without_a_log(void **state)
     lull_host_close(criterion);
     assert_int_equal(lull_host_create(NULL, &table, NULL, 0, &criterion, &err), LULL_OK);
     begin();
-    const struct lull_host *host = criterion->dialled[0]->host;
+    const struct lull_host *host = criterion->instances[0]->host;
     host->log(host, LULL_LOG_INFO, "chatter");
     host->log(host, LULL_LOG_WARNING, "the first");
     host->log(host, LULL_LOG_ERROR, "the second");

@@ -79,7 +79,7 @@ static void sample(struct worker *w, struct job_task *task, size_t size)
 {
     const uint32_t planes = *(const uint32_t *)job_task_common(task);
     const struct pt_integrator *integrator = (const struct pt_integrator *)((const uint32_t *)job_task_common(task) + 1);
-    const struct pt_row_maker maker = {NULL, pt_fake_noise, integrator};
+    const struct pt_sampler_context context = {NULL, pt_fake_noise, integrator};
     struct base_err err = {0};
     for (uint32_t i = 0; i < task->count; i++) {
         struct pt_row *row = job_task_item(task, i);
@@ -87,7 +87,7 @@ static void sample(struct worker *w, struct job_task *task, size_t size)
         struct pt_film film;
         pt_film_init(&film, row->x0, row->y, row->x1, row->y + 1, planes, &err);
         pt_row_restore(&film, row, sums);
-        pt_row_sample(&maker, &film, row);
+        pt_row_sample(&context, &film, row);
         pt_row_save(&film, row, sums);
         pt_film_release(&film);
     }
@@ -148,11 +148,11 @@ static void *worker_main(void *arg)
         return NULL;
     }
     struct base_threads *threads = base_threads_create(w->threads, &err);
-    const struct pt_row_maker maker = {NULL, counted_noise, NULL};
+    const struct pt_sampler_context context = {NULL, counted_noise, NULL};
     job_create(w->transport, &job, &err);
     job_handshake(job, w->behaviour == OTHER_SETTINGS ? "a=1\nb=3\n" : "a=1\nb=2\n", w->threads, &err);
     if (w->behaviour == WORKS || w->behaviour == OTHER_SETTINGS) {
-        pt_farm_serve(job, threads, &maker, &err);
+        pt_farm_serve(job, threads, &context, &err);
         job_close(job, 0, "", &err);
     } else {
         misbehave(w);

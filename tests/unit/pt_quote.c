@@ -253,16 +253,16 @@ static void a_pilot_loses_nothing(void **state)
 static void intervals_widen_with_distance(void **state)
 {
     (void)state;
-    struct lull_host_said said = {.spp = 10, .predicted = 40.0};
-    struct lull_host_stop_at far = lull_host_expect(&said, 10, 500);
-    said.spp = 40;
-    struct lull_host_stop_at near = lull_host_expect(&said, 10, 500);
+    struct lull_host_response response = {.spp = 10, .predicted = 40.0};
+    struct lull_host_stop_at far = lull_host_expect(&response, 10, 500);
+    response.spp = 40;
+    struct lull_host_stop_at near = lull_host_expect(&response, 10, 500);
     assert_true(far.spp == 40.0 && near.spp == 40.0);
     assert_true(near.low > far.low && far.low > 20.0 && near.high < far.high && far.high < 80.0);
     assert_true(near.low < 38.0 && near.high > 42.0);
-    said.unmet = 1;
-    struct lull_host_stop_at unmet = lull_host_expect(&said, 30, 70);
-    assert_true(unmet.low == 30.0 && unmet.high == 70.0);
+    response.undersampled = 1;
+    struct lull_host_stop_at wide = lull_host_expect(&response, 30, 70);
+    assert_true(wide.low == 30.0 && wide.high == 70.0);
 }
 
 /* Every block has uniform noise; in the first of them one pixel of a hundred has a hundred times as much. */
@@ -303,18 +303,18 @@ static void a_pilot_ends_with_its_time(void **state)
 static void stops_that_nobody_predicts(void **state)
 {
     (void)state;
-    struct lull_host_said said = {0};
-    struct lull_host_stop_at stop = lull_host_expect(&said, 20, 500);
+    struct lull_host_response response = {0};
+    struct lull_host_stop_at stop = lull_host_expect(&response, 20, 500);
     assert_true(!stop.known && stop.spp == 500.0 && stop.low == 20.0 && stop.high == 500.0);
-    said = (struct lull_host_said){.spp = 32, .predicted = (double)NAN};
-    assert_false(lull_host_expect(&said, 32, 500).known);
-    said.predicted = 1e9;
-    stop = lull_host_expect(&said, 32, 500);
+    response = (struct lull_host_response){.spp = 32, .predicted = (double)NAN};
+    assert_false(lull_host_expect(&response, 32, 500).known);
+    response.predicted = 1e9;
+    stop = lull_host_expect(&response, 32, 500);
     assert_true(stop.known && stop.spp == 500.0);
-    said.predicted = 3.0;
-    assert_true(lull_host_expect(&said, 32, 500).spp == 32.0);
-    said.stopped = 1;
-    assert_true(lull_host_expect(&said, 0, 500).spp == 3.0);
+    response.predicted = 3.0;
+    assert_true(lull_host_expect(&response, 32, 500).spp == 32.0);
+    response.stopped = 1;
+    assert_true(lull_host_expect(&response, 0, 500).spp == 3.0);
 }
 
 /* 4 threads: while both blocks are active 3 rows keep 3 busy, the single row of the second keeps one. */
@@ -334,7 +334,7 @@ static void outlooks_in_closed_form(void **state)
 {
     (void)state;
     static const struct {
-        struct lull_host_said said;
+        struct lull_host_response response;
         uint64_t spp;
         double stop, low, high;
         int known;
@@ -349,7 +349,7 @@ static void outlooks_in_closed_form(void **state)
         {{0, 40, 0, 0}, 10, 500, 10, 500, 0},         {{10, INFINITY, 0, 0}, 10, 500, 10, 500, 0},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        struct lull_host_stop_at s = lull_host_expect(&cases[i].said, cases[i].spp, 500);
+        struct lull_host_stop_at s = lull_host_expect(&cases[i].response, cases[i].spp, 500);
         if (!(fabs(s.spp - cases[i].stop) < 1e-9 && fabs(s.low / cases[i].low - 1) < 3e-4 &&
               fabs(s.high / cases[i].high - 1) < 3e-4) ||
             s.known != cases[i].known)
@@ -392,13 +392,15 @@ static char *quote_of(struct approve_case *c)
     if (strstr(c->text, "unasked"))
         r->blocks->list[3].spp = r->blocks->list[3].half_spp = r->blocks->list[3].asked = 0;
     for (uint32_t i = 0; i < run.quote->row_count && strstr(c->text, "unsaid"); i++)
-        run.quote->told->asked[i].said[2] = (struct lull_host_said){.spp = r->blocks->list[2].spp, .predicted = (double)NAN};
+        run.quote->told->asked[i].response[2] =
+            (struct lull_host_response){.spp = r->blocks->list[2].spp, .predicted = (double)NAN};
     r->totals->criterion_s = 0.25 * (double)r->totals->checks;
     assert_int_equal(pt_quote_finish(run.quote, r, &err), 0);
     fprintf(out, "a check takes %.9g\n", run.quote->told->check_s);
     for (uint32_t i = 0; i < run.quote->row_count; i++) {
         const struct lull_host_quote_row *row = &run.quote->rows[i];
-        const struct lull_host_said *said = run.quote->told->asked[i].said, *first = run.quote->told->asked[i].first;
+        const struct lull_host_response *response = run.quote->told->asked[i].response,
+                                        *first = run.quote->told->asked[i].first;
         fprintf(
             out,
             "row %g asked %d spp %.9g %.9g %.9g from %.9g to %.9g thread %.9g %.9g %.9g wall %.9g %.9g %.9g of uniform %.9g",
@@ -409,9 +411,10 @@ static char *quote_of(struct approve_case *c)
         for (uint32_t k = 0; k < run.render->blocks->count; k++) {
             const struct lull_host_quote_block *b = &row->blocks[k];
             fprintf(out, "  block %u said %llu %.9g%s%s first %llu %.9g stop %.9g %.9g %.9g %d thread %.9g %.9g %.9g\n", k,
-                    (unsigned long long)said[k].spp, said[k].predicted, said[k].stopped ? " stopped" : "",
-                    said[k].unmet ? " unmet" : "", (unsigned long long)first[k].spp, first[k].predicted, b->stop.spp,
-                    b->stop.low, b->stop.high, (int)b->stop.known, b->thread_s, b->thread_low_s, b->thread_high_s);
+                    (unsigned long long)response[k].spp, response[k].predicted, response[k].stopped ? " stopped" : "",
+                    response[k].undersampled ? " unmet" : "", (unsigned long long)first[k].spp, first[k].predicted,
+                    b->stop.spp, b->stop.low, b->stop.high, (int)b->stop.known, b->thread_s, b->thread_low_s,
+                    b->thread_high_s);
         }
     }
     end(&run);

@@ -155,11 +155,11 @@ static void rows_are_cut_into_runs(void **state)
         struct pt_film film;
         struct base_err err = {0};
         struct pt_integrator integrator = {0};
-        const struct pt_row_maker maker = {NULL, tell_place, &integrator};
+        const struct pt_sampler_context context = {NULL, tell_place, &integrator};
         struct pt_row row = {.y = 6, .x0 = 3, .x1 = 3 + width, .from = 5, .to = 8};
         assert_int_equal(pt_film_init(&film, 1, 5, 140, 8, PT_FILM_HALF, &err), 0);
         run_count = 0;
-        pt_row_sample(&maker, &film, &row);
+        pt_row_sample(&context, &film, &row);
         int per_sample = width > 2 * PT_RUN ? 3 : 2, n = 0;
         assert_int_equal(run_count, 3 * per_sample);
         for (int k = 0; k < per_sample; k++)
