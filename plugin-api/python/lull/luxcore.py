@@ -24,7 +24,7 @@ from typing import Any, Iterable, Iterator, Sequence, Union
 
 import numpy as np  # before pyluxcore, which else aborts
 
-from . import limits, scenes
+from . import scenes
 from .criterion import Criterion, Rect
 from .scenes import Picture
 
@@ -48,7 +48,7 @@ def start() -> Any:
     return pyluxcore
 
 
-class Film:
+class Film(scenes.Film):
     """The film of a pyluxcore.Scene that is rendered by pyluxcore.Properties, in waves of its blocks. Both are the
     caller's, and stay as they are. Pixels are boxes: no filter of LuxCore's. Planes and layers: albedo, normal, alpha."""
     splats = False
@@ -84,10 +84,6 @@ class Film:
         if float(self._setting("path.clamping.variance.maxvalue") or 0) > 0:
             raise ValueError("path.clamping.variance.maxvalue: it clamps by all samples of the film: set it to 0")
 
-    def check_waves(self, wave: int, spp_max: int) -> None:
-        """Waves of any size are rendered."""
-        limits.checked("wave", wave), limits.checked("spp_max", spp_max)
-
     def identity(self) -> dict[str, str]:
         """What the samples depend on, for the checkpoint: LuxCore, its settings and the scene's. The vertices of meshes
         made in memory are not among them."""
@@ -97,12 +93,6 @@ class Film:
         # ids that nobody gave are random
         scene = [t for t in str(self.scene.ToProperties()).splitlines() if ".id = " not in t]
         return {"renderer": f"LuxCore {self._lux.Version()}", "settings": crc(settings), "scene": crc(scene)}
-
-    def __enter__(self) -> Film:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass  # nothing was changed
 
     def render(self, rects: Sequence[Rect], first: int, count: int, _half: bool) -> Iterator[dict[str, np.ndarray]]:
         """The driver's render function: for each rectangle the mean of `count` samples times their weight, by plane."""

@@ -30,7 +30,7 @@ _AOVS = {"albedo": ("albedo.R", "albedo.G", "albedo.B"), "normal": ("normal.X", 
          "depth": ("depth.T",)}
 
 
-class Film:
+class Film(scenes.Film):
     """One sensor's film, cropped to blocks. Use as a context manager: the crop is put back. layers: names of its channels
     beside R, G and B; supplies: planes that criteria can read, among its channels; denoised: a scene without AOVs gets
     those that the denoiser reads."""
@@ -100,9 +100,6 @@ class Film:
         self._parameters["film.crop_size"] = [rect.width, rect.height]
         self._parameters["film.crop_offset"] = [rect.x0, rect.y0]
         self._parameters.update()
-
-    def __enter__(self) -> Film:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._set_crop(self.crop)

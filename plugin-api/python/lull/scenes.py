@@ -2,17 +2,18 @@
 """The one call that renders a scene of another renderer, and its price: what lull.mitsuba and lull.luxcore share."""
 from __future__ import annotations
 
+import abc
 import contextlib
 import os
 import struct
 import sys
 import zlib
-from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Protocol, Sequence, Union
+from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 
 from . import checkpoint as checkpoints
-from . import denoising
+from . import denoising, limits
 from . import quote as quotes
 from .criterion import Criterion, Rect, load
 from .denoising import Denoised
@@ -36,7 +37,7 @@ class Picture(NamedTuple):
     undenoised: Optional[LullError] = None
 
 
-class Film(Protocol):
+class Film(abc.ABC):
     """What a renderer brings: a context manager that puts back what it changed. crop: the part that is rendered; splats:
     neighbouring pixels share samples; layers, supplies: as Frame takes them. render gives "weight" with every sample."""
     width: int
@@ -46,16 +47,21 @@ class Film(Protocol):
     layers: Sequence[str]
     supplies: Sequence[str]
 
-    def __enter__(self) -> Film: ...
+    def __enter__(self) -> Film:
+        return self
 
-    def __exit__(self, *_: object) -> None: ...
+    def __exit__(self, *_: object) -> None:
+        """Where nothing was changed."""
 
     def check_waves(self, wave: int, spp_max: int) -> None:
         """ValueError if waves of this size, or the one that is left at the end, cannot be rendered."""
+        limits.checked("wave", wave), limits.checked("spp_max", spp_max)
 
+    @abc.abstractmethod
     def identity(self) -> dict[str, str]:
         """What the samples depend on, for the checkpoint."""
 
+    @abc.abstractmethod
     def render(self, rects: Sequence[Rect], first: int, count: int, half: bool) -> Iterable[Mapping[str, np.ndarray]]:
         """The driver's render function."""
 
