@@ -223,61 +223,61 @@ static int set_quote_pilot(void *into, const char *value, struct base_err *err)
 
 /* --- what the image depends on: options of several parts, or whose line has another name --------------------------  */
 
-static void tell_uniform(const void *from, struct base_identity *to)
+static void identify_uniform(const void *from, struct base_identity *to)
 {
     base_identity_add(to, "uniform", "%d", ((const struct pt_cli *)from)->render.uniform);
 }
 
-static void tell_block(const void *from, struct base_identity *to)
+static void identify_block(const void *from, struct base_identity *to)
 {
     const struct pt_render_config *r = &((const struct pt_cli *)from)->render;
     base_identity_add(to, "block", "%dx%d", r->block_width, r->block_height);
 }
 
-static void tell_seam(const void *from, struct base_identity *to)
+static void identify_seam(const void *from, struct base_identity *to)
 {
     base_identity_add(to, "max-seam", "%g", ((const struct pt_cli *)from)->render.max_seam);
 }
 
-static void tell_params(const void *from, struct base_identity *to)
+static void identify_params(const void *from, struct base_identity *to)
 {
     const struct pt_cli_params *params = &((const struct pt_cli *)from)->params;
     for (uint32_t i = 0; i < params->count; i++)
         base_identity_add(to, "param", "%s=%s", params->list[i].key, params->list[i].value);
 }
 
-static void tell_size(const void *from, struct base_identity *to)
+static void identify_size(const void *from, struct base_identity *to)
 {
     const struct pt_render_config *r = &((const struct pt_cli *)from)->render;
     base_identity_add(to, "size", "%dx%d", r->width, r->height);
 }
 
-static void tell_crop(const void *from, struct base_identity *to)
+static void identify_crop(const void *from, struct base_identity *to)
 {
     const int *crop = ((const struct pt_cli *)from)->render.crop;
     base_identity_add(to, "crop", "%d,%d,%d,%d", crop[0], crop[1], crop[2], crop[3]);
 }
 
-static void tell_look_at(const void *from, struct base_identity *to)
+static void identify_look_at(const void *from, struct base_identity *to)
 {
     const struct pt_view *view = &((const struct pt_cli *)from)->load.view;
     base_identity_add_reals(to, "look-at", view->look_at_world, view->has_look_at ? 9 : 0);
 }
 
-static void tell_light_selection(const void *from, struct base_identity *to)
+static void identify_light_selection(const void *from, struct base_identity *to)
 {
     base_identity_add(to, "light-selection", "%s",
                       pt_light_selection_words[((const struct pt_cli *)from)->load.light_selection]);
 }
 
-static void tell_filter(const void *from, struct base_identity *to)
+static void identify_filter(const void *from, struct base_identity *to)
 {
     const struct pt_integrator *i = &((const struct pt_cli *)from)->render.integrator;
     base_identity_add(to, "filter", "%d:%gx%g:%g", i->filter, (double)i->filter_x, (double)i->filter_y,
                       (double)i->filter_sigma);
 }
 
-static void tell_aov(const void *from, struct base_identity *to)
+static void identify_aov(const void *from, struct base_identity *to)
 {
     base_identity_add(to, "aov", "%u", ((const struct pt_cli *)from)->render.planes);
 }
@@ -304,7 +304,7 @@ const struct base_option pt_cli_options[] = {
     {"mask", 0, "FILE.png", TO(mask), .input = BASE_FILE, .words = png,
      .help = "A grey picture of the image's size: lighter regions are rendered better. White takes a quarter of the quality "
              "parameter (error, visible or threshold), black leaves it; the lightest pixel of a block counts"},
-    {"param", 'p', "KEY=VALUE", .set = set_param, .role = PT_ROLE_RULE, .tell = tell_params,
+    {"param", 'p', "KEY=VALUE", .set = set_param, .role = PT_ROLE_RULE, .tell = identify_params,
      .help = "Parameter of the criterion; may be repeated"},
     {"list-criteria", 0, NULL, TO(action), PT_CLI_LIST_CRITERIA,
      .help = "List the criteria that are found and their parameters, and exit"},
@@ -312,30 +312,30 @@ const struct base_option pt_cli_options[] = {
      .help = "Samples per pixel before the first check (default 16)"},
     {"spp-max", 0, "N", TO(render.spp_max), 1, INT32_MAX, .role = PT_ROLE_END,
      .help = "Samples per pixel at which every block stops (default 10000)"},
-    {"spp", 0, "N", TO(spp), 1, INT32_MAX, .role = BASE_DECIDES, .tell = tell_uniform,
+    {"spp", 0, "N", TO(spp), 1, INT32_MAX, .role = BASE_DECIDES, .tell = identify_uniform,
      .help = "The same number of samples everywhere; a criterion, if given, is asked once at the end"},
     {"time-budget", 0, "SECONDS", TO(render.time_budget_s), 0, 1e9,
      .help = "Stop after so long; until then samples go where noise is seen most; 0 = no limit (default)"},
-    {"block", 0, "N|WxH", .set = set_block, .role = BASE_DECIDES, .tell = tell_block,
+    {"block", 0, "N|WxH", .set = set_block, .role = BASE_DECIDES, .tell = identify_block,
      .help = "Block size in pixels (default 200)"},
     {"max-check-overhead", 0, "SHARE", TO(render.max_check_overhead), 0, 1,
      .help = "Leave out checks while they took more than this share of the time, e.g. 0.03; 0 = no bound (default). With a "
              "bound, as with a time budget, the result depends on the clock"},
-    {"max-seam", 0, "RATIO", .set = set_seam, .role = PT_ROLE_LIMIT, .tell = tell_seam,
+    {"max-seam", 0, "RATIO", .set = set_seam, .role = PT_ROLE_LIMIT, .tell = identify_seam,
      .help = "Re-open stopped blocks beside one with more than RATIO times their samples, so that no seam shows; 0 = never "
              "(default)"},
     {.help = "What to render:"},
-    {"size", 0, "WxH", .set = set_size, .role = BASE_DECIDES, .tell = tell_size,
+    {"size", 0, "WxH", .set = set_size, .role = BASE_DECIDES, .tell = identify_size,
      .help = "Image size, instead of the scene's"},
-    {"crop", 0, "X0,Y0,X1,Y1", .set = set_crop, .role = BASE_DECIDES, .tell = tell_crop,
+    {"crop", 0, "X0,Y0,X1,Y1", .set = set_crop, .role = BASE_DECIDES, .tell = identify_crop,
      .help = "Keep only these pixels. Blocks that the crop touches are rendered whole, so that they stop as in the full "
              "image"},
-    {"look-at", 0, "\"EX EY EZ AX AY AZ UX UY UZ\"", .set = set_look_at, .role = BASE_DECIDES, .tell = tell_look_at,
+    {"look-at", 0, "\"EX EY EZ AX AY AZ UX UY UZ\"", .set = set_look_at, .role = BASE_DECIDES, .tell = identify_look_at,
      .help = "Look from E at A with U up, in the scene's world, instead of through the scene's camera"},
     {"fov", 0, "DEGREES", TO(load.view.fov_deg), 1e-3, 179.9, .role = BASE_DECIDES,
      .help = "Field of view over the image's short side, instead of the scene's"},
     {"light-selection", 0, NULL, TO(load.light_selection), .words = pt_light_selection_words, .role = BASE_DECIDES,
-     .tell = tell_light_selection,
+     .tell = identify_light_selection,
      .help = "How next-event estimation picks among many lights (default hierarchy: by distance and orientation too)"},
     {"sampler", 0, NULL, TO(render.integrator.sampler), .words = pt_sampler_words, .role = BASE_DECIDES,
      .help = "Instead of the scene's"},
@@ -344,7 +344,7 @@ const struct base_option pt_cli_options[] = {
              "checking"},
     {"max-depth", 0, "N", TO(render.integrator.max_depth), -1, 1000000, .role = BASE_DECIDES,
      .help = "Most bounces, instead of the scene's; -1 = unlimited"},
-    {"filter", 0, &(PT_FILTERS(PT_WORD_OR) "[:RADIUS]")[1], .set = set_filter, .role = BASE_DECIDES, .tell = tell_filter,
+    {"filter", 0, &(PT_FILTERS(PT_WORD_OR) "[:RADIUS]")[1], .set = set_filter, .role = BASE_DECIDES, .tell = identify_filter,
      .help = "Pixel filter, instead of the scene's; radius in pixels"},
     {"seed", 0, "N", TO(render.integrator.seed), 0, UINT32_MAX, .role = BASE_DECIDES,
      .help = "Seed of all random numbers (default 0)"},
@@ -370,7 +370,8 @@ const struct base_option pt_cli_options[] = {
          "block, what was run where"},
     {"quoted", 0, "FILE.json", TO(paths[PT_QUOTED]), .input = BASE_FILE, .words = json,
      .help = "What --quote --json printed before: the page compares it with what became of it"},
-    {"aov", 0, "LIST", .set = set_aov, .role = BASE_DECIDES, .tell = tell_aov, .help = "More layers: albedo,normal,depth"},
+    {"aov", 0, "LIST", .set = set_aov, .role = BASE_DECIDES, .tell = identify_aov,
+     .help = "More layers: albedo,normal,depth"},
     {"denoise", 0, "blend|full", .set = set_denoise, .optional = 1,
      .help =
          "Keep the denoised picture, and stop blocks by what is seen of it (criterion denoised): blend (default) keeps as "
@@ -429,166 +430,6 @@ const struct base_option pt_cli_options[] = {
 
 /* --- the whole ------------------------------------------------------------------------------------------------------ */
 
-int pt_cli_samples(const struct pt_cli *cli)
-{
-    return cli->action == PT_CLI_RENDER || cli->action == PT_CLI_QUOTE || cli->action == PT_CLI_SEQUENCE;
-}
-
-int pt_cli_writes_image(const struct pt_cli *cli)
-{
-    const char *const *p = cli->paths;
-    return p[PT_OUTPUT] || p[PT_PREVIEW] || p[PT_REPORT] || p[PT_PAGE] || p[PT_STOP_MAPS];
-}
-
-/* What goes with an image alone. */
-static int check_no_image(const struct pt_cli *cli, const char *option, struct base_err *err)
-{
-    if (pt_cli_writes_image(cli))
-        return base_fail(err, BASE_EINVAL, "%s writes no image: leave out -o, --preview, --report, --html and --stop-map",
-                         option);
-    if (cli->display)
-        return base_fail(err, BASE_EINVAL, "%s shows no image: leave out --display-server", option);
-    return 0;
-}
-
-static int check_quote(struct pt_cli *cli, struct base_err *err)
-{
-    struct pt_render_config *r = &cli->render;
-    if (cli->action != PT_CLI_RENDER)
-        return base_fail(err, BASE_EINVAL, "--quote goes with none of --explain, --debug-path and --sequence");
-    if (check_no_image(cli, "--quote", err) != 0)
-        return BASE_EINVAL;
-    if (cli->resume || r->time_budget_s > 0)
-        return base_fail(err, BASE_EINVAL, "--quote goes with neither --resume nor --time-budget (--quote-pilot bounds it)");
-    if (r->max_seam > 0)
-        return base_fail(err, BASE_EINVAL, "--quote does not know what --max-seam re-opens: leave it out");
-    if (r->pilot_spp == 0)
-        r->pilot_spp = 128;
-    if (r->pilot_s <= 0)
-        r->pilot_s = 30.0;
-    cli->action = PT_CLI_QUOTE;
-    return 0;
-}
-
-static int check_no_quote(const struct pt_cli *cli, struct base_err *err)
-{
-    if ((cli->render.pilot_spp > 0 && !cli->shot.plan) || cli->quote_map || cli->json)
-        return base_fail(err, BASE_EINVAL, "--quote-pilot, --quote-map and --json belong to --quote");
-    return 0;
-}
-
-static int check_sequence(struct pt_cli *cli, struct base_err *err)
-{
-    if (cli->spp > 0 || cli->paths[PT_CHECKPOINT] || cli->has_crop || cli->mask)
-        return base_fail(err, BASE_EINVAL, "--sequence goes with neither --spp, --checkpoint, --crop nor --mask");
-    if (check_no_image(cli, "--sequence", err) != 0)
-        return BASE_EINVAL;
-    if (cli->picture != PT_PICTURE_NOISY)
-        return base_fail(err, BASE_EINVAL, "--sequence records noisy blocks: leave out --denoise");
-    if (cli->action != PT_CLI_RENDER)
-        return base_fail(err, BASE_EINVAL, "--sequence records blocks: leave out what only looks at the scene or a path");
-    cli->action = PT_CLI_SEQUENCE;
-    return 0;
-}
-
-static int check_no_sequence(const struct pt_cli *cli, struct base_err *err)
-{
-    const struct pt_sequence_config *q = &cli->sequence;
-    if (q->levels || q->blocks || q->reference_spp > 0 || q->name)
-        return base_fail(err, BASE_EINVAL, "--levels, --blocks, --reference-spp and --name belong to --sequence DIR");
-    return 0;
-}
-
-static int check_samples(struct pt_cli *cli, struct base_err *err)
-{
-    struct pt_render_config *r = &cli->render;
-    if (cli->spp > 0 && (r->spp_min > 0 || r->spp_max > 0))
-        return base_fail(err, BASE_EINVAL, "--spp takes the same samples everywhere: leave out --spp-min and --spp-max");
-    r->uniform = cli->spp > 0;
-    if (!r->spp_min)
-        r->spp_min = r->uniform ? cli->spp : 16;
-    if (!r->spp_max)
-        r->spp_max = r->uniform ? cli->spp : 10000;
-    if (r->spp_min > r->spp_max)
-        return base_fail(err, BASE_EINVAL, "--spp-min %llu is above --spp-max %llu", (unsigned long long)r->spp_min,
-                         (unsigned long long)r->spp_max);
-    return 0;
-}
-
-int pt_cli_is_shot(const struct pt_cli *cli) { return cli->shot.frames || cli->shot.camera_path; }
-
-static int check_plan(struct pt_cli *cli, struct base_err *err)
-{
-    struct pt_render_config *r = &cli->render;
-    if (check_no_image(cli, "--plan-shot", err) != 0)
-        return BASE_EINVAL;
-    if (cli->paths[PT_CHECKPOINT] || cli->shot.table)
-        return base_fail(err, BASE_EINVAL, "--plan-shot goes with neither --checkpoint nor --shot-table");
-    if (cli->spp > 0 || r->max_seam > 0 || r->time_budget_s > 0)
-        return base_fail(err, BASE_EINVAL, "--plan-shot goes with neither --spp, --max-seam nor --time-budget");
-    if (r->pilot_spp == 0)
-        r->pilot_spp = 128;
-    if (r->pilot_s <= 0)
-        r->pilot_s = 30.0;
-    return 0;
-}
-
-static int check_shot(struct pt_cli *cli, struct base_err *err)
-{
-    const struct pt_shot_plan *s = &cli->shot;
-    const struct pt_render_config *r = &cli->render;
-    if (!pt_cli_is_shot(cli))
-        return !s->plan && !s->table && !s->same_seed && !s->plan_every
-                   ? 0
-                   : base_fail(err, BASE_EINVAL,
-                               "--plan-shot, --plan-every, --shot-table and --frame-seed belong to "
-                               "--frames or --camera-path");
-    if (cli->action != PT_CLI_RENDER || cli->quote || cli->sequence.directory)
-        return base_fail(err, BASE_EINVAL, "--frames goes with none of --quote, --sequence, --explain and --debug-path");
-    if (s->camera_path && cli->load.view.has_look_at)
-        return base_fail(err, BASE_EINVAL, "--camera-path and --look-at are two cameras: leave out one");
-    if (s->plan_every > 0 && !s->plan)
-        return base_fail(err, BASE_EINVAL, "--plan-every belongs to --plan-shot");
-    cli->shot.plan_every = s->plan_every > 0 ? s->plan_every : 8;
-    if (s->plan)
-        return check_plan(cli, err);
-    if (!cli->paths[PT_OUTPUT])
-        return base_fail(err, BASE_EINVAL, "--frames needs -o OUT_%%04d.exr");
-    if (s->table && (cli->criterion || cli->params.count > 0 || cli->mask || cli->spp > 0 || r->spp_min > 0 ||
-                     r->spp_max > 0 || r->max_seam > 0))
-        return base_fail(err, BASE_EINVAL, "--shot-table says how many samples: leave out everything else that does");
-    return 0;
-}
-
-static int check_together(struct pt_cli *cli, struct base_err *err)
-{
-    if (cli->action == PT_CLI_LIST_CRITERIA)
-        return 0;
-    if (!cli->paths[PT_SCENE])
-        return base_fail(err, BASE_EINVAL, "a scene file is needed (--help says more)");
-    if (check_shot(cli, err) != 0)
-        return BASE_EINVAL;
-    if (check_samples(cli, err) != 0)
-        return BASE_EINVAL;
-    if (cli->resume && !cli->paths[PT_CHECKPOINT])
-        return base_fail(err, BASE_EINVAL, "--resume needs --checkpoint FILE");
-    if (cli->sequence.directory ? check_sequence(cli, err) != 0 : check_no_sequence(cli, err) != 0)
-        return BASE_EINVAL;
-    if (cli->live && !cli->paths[PT_PREVIEW] && !cli->paths[PT_REPORT] && !cli->paths[PT_STOP_MAPS])
-        return base_fail(err, BASE_EINVAL, "--live belongs to --report, --stop-map and --preview");
-    if (cli->paths[PT_QUOTED] && !cli->paths[PT_PAGE])
-        return base_fail(err, BASE_EINVAL, "--quoted belongs to --html");
-    if (cli->mask && cli->spp > 0)
-        return base_fail(err, BASE_EINVAL, "--mask %s: --spp takes the same samples everywhere", cli->mask);
-    if (cli->quote ? check_quote(cli, err) != 0 : check_no_quote(cli, err) != 0)
-        return BASE_EINVAL;
-    if (cli->params.count > 0 && cli->spp > 0 && !cli->criterion)
-        return base_fail(err, BASE_EINVAL, "-p %s=%s: no criterion is used", cli->params.list[0].key,
-                         cli->params.list[0].value);
-    cli->load.forced = cli->all_effects ? PT_FX_ALL : 0;
-    return 0;
-}
-
 int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err)
 {
     static const struct base_options command = {
@@ -613,7 +454,7 @@ int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err
     cli->argv = argv;
     cli->argc = argc;
     if (!rc)
-        rc = check_together(cli, err);
+        rc = pt_cli_check(cli, err);
     if (rc)
         pt_cli_release(cli);
     return rc;

@@ -76,6 +76,8 @@ struct pt_cli {
 
 /* Fills *cli (zeroed first). --help, --version and --usage print and exit. BASE_EINVAL with one line in err otherwise. */
 int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err);
+/* The part of it that compares options with each other (cli_check.c). */
+int pt_cli_check(struct pt_cli *cli, struct base_err *err);
 void pt_cli_release(struct pt_cli *cli);
 
 /* The table of the options: roles and lines of the identity, too, of a command line in which the scene's own settings stand
