@@ -5,7 +5,6 @@
 #include <string.h>
 #include <zlib.h>
 
-#include "figures/stats.h"
 #include "model/window.h"
 #include "sequence/simulate.h"
 
@@ -217,6 +216,13 @@ static int load_block(struct ggn_series_set *set, int view, uint32_t index, cons
     return rc;
 }
 
+static int by_value(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+
+    return (x > y) - (x < y);
+}
+
 /* The spacing of the longest series: equal steps when its first step is its last, else the median ratio of its upper half,
  * where rounding to whole samples matters least. */
 static void find_spacing(struct ggn_series_set *set)
@@ -239,7 +245,7 @@ static void find_spacing(struct ggn_series_set *set)
     }
     for (int i = count / 2 > 0 ? count / 2 : 1; i < count; i++)
         ratio[n++] = spp[i] / spp[i - 1];
-    ggn_stats_sort(ratio, (size_t)n);
+    qsort(ratio, (size_t)n, sizeof ratio[0], by_value);
     set->ratio = ratio[n / 2];
     struct ggn_policy pace = {0};
     ggn_series_set_pace(set, &pace);
