@@ -175,7 +175,7 @@ static void apply_one(const struct lull_host_blocks *blocks, struct lull_host_bl
  *
  * Time that does not suffice for every block is spent where noise is seen most: only blocks of about the largest error are
  * asked, and so go on; the others wait at their checks. About the same is what half as many samples again make up for, and
- * nobody goes further than that unasked.
+ * nobody goes further than that unasked. A render that is resumed differs from one without a budget, therefore.
  */
 static const double BUDGET_STEP = 1.5;
 
@@ -215,7 +215,7 @@ void lull_host_apply(struct lull_host_frame *f, const uint32_t *due, uint32_t co
         struct lull_host_block *b = &f->blocks.list[due[k]];
         struct lull_decision d = decisions[k];
         const double most = BUDGET_STEP * (double)b->spp;
-        if (spends_a_budget(f) && (double)d.next_spp > most)
+        if (spends_a_budget(f) && d.error >= 0.0 && (double)d.next_spp > most)
             d.next_spp = (uint64_t)most;
         apply_one(&f->blocks, b, &d);
     }

@@ -257,8 +257,7 @@ if [ -f "$model" ]; then
     net="$scene -q --size 200x200 -c ggn -p model=$model --spp-min 4 --spp-max 60 --reproducible"
     "$P" $net -o net.exr
     t "ggn: same bytes for 1 thread and another order" sh -c "$P $net -t 1 --order-seed 4 -o net1.exr && cmp net.exr net1.exr"
-    "$P" $net --time-budget 0.3 --checkpoint net.ckp -o part.exr
-    [ -s net.ckp ] || "$P" $net --checkpoint net.ckp --checkpoint-every 0 -o part.exr
+    interrupted net.ckp $net -o part.exr
     t "ggn: same bytes after interrupt and resume" sh -c "$P $net --checkpoint net.ckp --resume -o net2.exr && cmp net.exr net2.exr"
 else
     n=$((n + 2))

@@ -27,7 +27,7 @@ t "the report has the weight and both errors" sh -c "grep -q '\"noisy_weight\":[
 t "the criterion is denoised" grep -q '"id":[[:space:]]*"denoised"' r.json
 "$P" $common --denoise -t 1 -o one.exr && "$P" $common --denoise -t 3 -o three.exr
 t "the same bytes for any number of threads" cmp one.exr three.exr
-"$P" $common --denoise --time-budget 0.05 --checkpoint c.ckpt -o part.exr
+interrupted c.ckpt $common --denoise -o part.exr
 "$P" $common --denoise --checkpoint c.ckpt --resume -o resumed.exr
 t "and after a resume" cmp blend.exr resumed.exr
 "$P" $common -c fixed -p spp=32 -o plain.exr && "$P" $common -c fixed -p spp=32 --denoise -o fixed.exr

@@ -34,7 +34,7 @@ factors() { grep -o '"dial":[[:space:]]*[0-9.]*' "$1" | grep -o '[0-9.]*$' | tr 
 t "the report names the mask" grep -q '"mask":[[:space:]]*"mask.png"' g.json
 t "  …and the factor of each block" test "$(factors g.json)" = "1 1 1 1 1 0.25 0.5 1 1 1 1 1 "
 
-"$P" $common --mask mask.png --time-budget 0.05 --checkpoint c.ckpt --stop-map part.csv
+interrupted c.ckpt $common --mask mask.png --stop-map part.csv
 "$P" $common --mask mask.png --checkpoint c.ckpt --resume --stop-map resumed.csv
 t "a checkpoint holds the history of every quality parameter" cmp masked.csv resumed.csv
 "$P" $common --mask mask.png --time-budget 0.05 --checkpoint d.ckpt --stop-map part.csv

@@ -381,7 +381,7 @@ static void a_time_budget_goes_where_noise_is_seen_most(void **state)
                         list[i].next_spp <= list[i].spp + list[i].spp / 2 + 1); /* nobody goes far unasked */
             list[i].spp = list[i].next_spp;
             answer[i].error = noise[i] / sqrt((double)list[i].spp);
-            answer[i].next_spp = 1000000; /* where it expects to stop */
+            answer[i].next_spp = i < 3 ? 1000000 : 0; /* where it expects to stop */
         }
         assert_true(given > before);
         assert_int_equal(lull_host_check(frame, &view, &fault), LULL_OK);
@@ -390,7 +390,7 @@ static void a_time_budget_goes_where_noise_is_seen_most(void **state)
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
             assert_true(seen[i] <= 1.51 * seen[k]);
-    assert_true(list[0].spp > 2 * list[2].spp && list[3].spp >= list[0].spp);
+    assert_true(list[0].spp > 2 * list[2].spp && list[3].spp > 100);
     criterion->instances[LULL_HOST_STEPS] = NULL;
     end();
 }
