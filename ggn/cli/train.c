@@ -114,8 +114,6 @@ int ggn_cmd_train(int argc, char **argv)
         rc = check_beside(&s.plan, &err);
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
-    if (ggn_published("difference"))
-        s.plan.difference = 0;
     s.plan.progress = s.quiet ? NULL : stderr;
     s.plan.interrupted = &base_interrupted;
     base_interrupt_catch();

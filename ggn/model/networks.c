@@ -1,9 +1,5 @@
 #include "model/networks.h"
 
-#include <string.h>
-
-#include <stdlib.h>
-
 #include "model/measure.h"
 
 const char *const ggn_preset_names[] = {"paper", "lull", NULL};
@@ -152,16 +148,10 @@ static void build_discriminator(struct ggn_graph *g, const struct ggn_hyper *p)
     }
     ggn_graph_stage(g, "fc4");
     x = ggn_graph_linear(g, x, told, 1);
-    if (p->preset == GGN_PRESET_PAPER || ggn_published("logit")) {
+    if (p->preset == GGN_PRESET_PAPER) {
         x = ggn_graph_lrelu(g, x, SLOPE);
         ggn_graph_dropout(g, x, 0.5);
     }
-}
-
-int ggn_published(const char *part)
-{
-    const char *parts = getenv("LULL_PUBLISHED"), *at = parts ? strstr(parts, part) : NULL;
-    return at != NULL;
 }
 
 int ggn_network_build(struct ggn_graph *graph, int net, const struct ggn_hyper *hyper, struct base_err *err)

@@ -35,11 +35,6 @@ struct ggn_hyper {
 /* The paper's sizes: 200×200, S = 6, K = 16, 20, 64. */
 struct ggn_hyper ggn_hyper_default(enum ggn_preset preset);
 /* BASE_EINVAL naming the field that is out of range. */
-/* Experiment: is this part of the published procedure put back into preset lull? LULL_PUBLISHED lists them. */
-int ggn_published(const char *part);
-/* Experiment: LULL_PUBLISHED lists the parts of the published procedure that are put back into preset lull, or, with preset
- * paper's other defaults, all but those that are mended: label, logit, statistics, sum, last, denoiser, difference, start, draw. */
-int ggn_published(const char *part);
 int ggn_hyper_check(const struct ggn_hyper *hyper, struct base_err *err);
 
 /* R: 3×H×W → 3×H×W (sigmoid). M: 3S×H×W → 1×H×W (sigmoid). D: 2×H×W → logit (flat, 1); with `noise_map` 4×H×W: behind the

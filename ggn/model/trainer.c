@@ -99,7 +99,7 @@ static int create_execs(struct ggn_trainer *t, struct base_err *err)
             ggn_exec_create(&t->graph[GGN_NET_D], NULL, batch, GGN_EXEC_GRADS | GGN_EXEC_INPUT_GRAD | drop, t->threads, err);
         if (!t->m || !t->d)
             return BASE_ENOMEM;
-        if ((paper || ggn_published("statistics")) && !(t->m2 = ggn_exec_create(m, NULL, batch, GGN_EXEC_GRADS, t->threads, err)))
+        if (paper && !(t->m2 = ggn_exec_create(m, NULL, batch, GGN_EXEC_GRADS, t->threads, err)))
             return BASE_ENOMEM;
     }
     return 0;
@@ -369,27 +369,6 @@ static double classify(struct ggn_trainer *t, const struct ggn_batch *b, double 
     return total;
 }
 
-static int paper_denoise_image(struct ggn_trainer *t, const struct ggn_batch *b, int k, struct ggn_paper_record *record,
-                               struct base_err *err);
-
-/* The denoiser moves on, and its answers are the denoised windows. */
-static int moving_denoiser(struct ggn_trainer *t, const struct ggn_batch *b, const struct maps *to, struct base_err *err)
-{
-    const int out = t->graph[GGN_NET_R].n_values - 1;
-    const struct ggn_value *v = &t->graph[GGN_NET_R].value[out];
-    struct ggn_paper_record record;
-    for (int k = 0; k < t->hyper.window; k++) {
-        int rc = paper_denoise_image(t, b, k, &record, err);
-        if (rc)
-            return rc;
-        for (int i = 0; i < b->count; i++)
-            for (int c = 0; c < 3; c++)
-                ggn_plane_copy(v, ggn_exec_plane(t->m, 0, to->step * i + to->first, 3 * k + c), ggn_exec_plane(t->r, out, i, c),
-                               v->row);
-    }
-    return 0;
-}
-
 int ggn_trainer_classifier_step(struct ggn_trainer *t, const struct ggn_batch *b, double *bce, double *logits,
                                 struct base_err *err)
 {
@@ -400,22 +379,14 @@ int ggn_trainer_classifier_step(struct ggn_trainer *t, const struct ggn_batch *b
         return rc;
     if (t->hyper.preset == GGN_PRESET_PAPER)
         return base_fail(err, BASE_EINVAL, "the published preset trains in its own order");
-    const int apart = ggn_published("statistics"), summed = ggn_published("sum"), moves = b->reference != NULL;
-    const size_t m_all = t->graph[GGN_NET_M].n_params,
-                 m_trained = ggn_published("last") ? t->graph[GGN_NET_M].tensor[t->graph[GGN_NET_M].n_tensors - 2].offset : m_all;
-    const struct maps maps[2] = {{t->m, apart ? 1 : 2, 0}, {apart ? t->m2 : t->m, apart ? 1 : 2, apart ? 0 : 1}};
+    const struct maps maps[2] = {{t->m, 2, 0}, {t->m, 2, 1}}; /* a sample's two windows lie side by side */
     for (int i = 0; i < b->count; i++) {
-        if (!moves)
-            set_input(t->m, maps[0].step * i, b->denoised + (size_t)i * (size_t)planes, planes);
-        set_input(apart ? t->m2 : t->m, maps[1].step * i + maps[1].first, b->noisy + (size_t)i * (size_t)planes, planes);
+        set_input(t->m, 2 * i, b->denoised + (size_t)i * (size_t)planes, planes);
+        set_input(t->m, 2 * i + 1, b->noisy + (size_t)i * (size_t)planes, planes);
     }
-    if (moves && (rc = moving_denoiser(t, b, &maps[0], err)) != 0)
-        return rc;
     zero_grad(t, GGN_NET_M);
     zero_grad(t, GGN_NET_D);
-    ggn_exec_forward(t->m, t->weights[GGN_NET_M], (apart ? 1 : 2) * b->count, GGN_TRAIN);
-    if (apart)
-        ggn_exec_forward(t->m2, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
+    ggn_exec_forward(t->m, t->weights[GGN_NET_M], 2 * b->count, GGN_TRAIN);
     exchange_maps(t, maps, b->count, 0);
     ggn_trainer_set_noise_maps(t, b->noise_map, b->count);
     ggn_trainer_set_scalars(t, b->scalars, b->count);
@@ -424,27 +395,10 @@ int ggn_trainer_classifier_step(struct ggn_trainer *t, const struct ggn_batch *b
     if (rc)
         return rc;
     exchange_maps(t, maps, b->count, 1);
-    rc = update(t, GGN_NET_D, t->graph[GGN_NET_D].n_params, err);
-    if (!rc && summed) {
-        double again[GGN_BATCH_MAX];
-        zero_grad(t, GGN_NET_D);
-        classify(t, b, again);
-        const int out = t->graph[GGN_NET_M].n_values - 1;
-        const struct ggn_value *v = &t->graph[GGN_NET_M].value[out];
-        for (int i = 0; i < 2 * b->count; i++) {
-            const struct maps *of = &maps[i % 2];
-            real *sum = ggn_exec_grad(of->m, out, of->step * (i / 2) + of->first, 0);
-            const real *more = ggn_exec_grad(t->d, 0, i / 2, i % 2);
-            for (int y = 0; y < v->h; y++)
-                for (int x = 0; x < v->w; x++)
-                    sum[y * v->row + x] += more[y * v->row + x];
-        }
-    }
     ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
-    if (apart)
-        ggn_exec_backward(t->m2, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
+    rc = update(t, GGN_NET_D, t->graph[GGN_NET_D].n_params, err);
     if (!rc)
-        rc = update(t, GGN_NET_M, m_trained, err);
+        rc = update(t, GGN_NET_M, t->graph[GGN_NET_M].n_params, err);
     if (!rc)
         t->steps++;
     return rc;

@@ -3,8 +3,6 @@
 struct ggn_train_options ggn_train_options_default(enum ggn_preset preset)
 {
     int lull = preset == GGN_PRESET_LULL;
-    if (ggn_published("start"))
-        lull = 0;
     enum ggn_init plain = lull ? GGN_INIT_HE : GGN_INIT_PAPER;
 
     return (struct ggn_train_options){

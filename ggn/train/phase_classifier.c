@@ -221,21 +221,20 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
                       struct base_err *err)
 {
     const int paper = s->hyper.preset == GGN_PRESET_PAPER, n = s->plan->batch;
-    const int in_order = paper || ggn_published("draw"), moves = paper || ggn_published("denoiser");
     int index[GGN_BATCH_MAX];
     double label[GGN_BATCH_MAX], logit[GGN_BATCH_MAX], law[GGN_BATCH_MAX];
     struct ggn_paper_record record;
 
     for (int i = 0; i < n; i++) {
-        index[i] = in_order ? paper_window(s, step, i) : ggn_windows_draw(&s->train, step, i, ggn_session_seed(s));
+        index[i] = paper ? paper_window(s, step, i) : ggn_windows_draw(&s->train, step, i, ggn_session_seed(s));
         label[i] = s->train.list[index[i]].label;
         law[i] = law_of(s, &s->train, index[i]);
     }
-    struct fill f = {.s = s, .windows = &s->train, .index = index, .step = step, .augment = !in_order && !moves, .denoised = !moves};
+    struct fill f = {.s = s, .windows = &s->train, .index = index, .step = step, .augment = !paper, .denoised = !paper};
     struct ggn_batch b = fill_batch(s, &f, n);
     b.label = label;
     b.law = law;
-    double scale = paper || ggn_published("start") ? 1 : ggn_session_lr(s, 1, step, steps);
+    double scale = paper ? 1 : ggn_session_lr(s, 1, step, steps);
     s->trainer->options.lr[GGN_NET_M] = s->trainer->options.lr[GGN_NET_D] = s->plan->lr * scale;
     s->trainer->options.lr[GGN_NET_R] = s->plan->lr_r * scale;
     int rc = paper ? ggn_trainer_paper_step(s->trainer, &b, &record, err)
@@ -346,7 +345,7 @@ static void note_best(struct ggn_session *s, const struct ggn_log_row *row)
 
 static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_err *err)
 {
-    int rc = s->hyper.preset == GGN_PRESET_PAPER || ggn_published("denoiser") ? renew_denoiser(s, err) : 0;
+    int rc = s->hyper.preset == GGN_PRESET_PAPER ? renew_denoiser(s, err) : 0;
 
     if (!rc)
         rc = measure(s, row, err);
@@ -365,9 +364,8 @@ static int begin(struct ggn_session *s, struct base_err *err)
                                         .best_loss = HUGE_VAL,
                                         .seconds = {s->progress.seconds[0], 0},
                                         .processor_s = {s->progress.processor_s[0], 0}};
-    const int moves = paper || ggn_published("denoiser");
     int rc =
-        ggn_session_begin(s, moves ? GGN_TRAIN_ALL : GGN_TRAIN_MD, s->plan->batch, s->hyper.height, s->hyper.width, err);
+        ggn_session_begin(s, paper ? GGN_TRAIN_ALL : GGN_TRAIN_MD, s->plan->batch, s->hyper.height, s->hyper.width, err);
     for (int net = paper ? GGN_NET_R : GGN_NET_M; net < GGN_NETS && !rc; net++) {
         s->best[net] = calloc(s->trainer->graph[net].n_learned, sizeof *s->best[net]);
         if (!s->best[net])
@@ -379,10 +377,6 @@ static int begin(struct ggn_session *s, struct base_err *err)
         if (net == GGN_NET_M && !paper)
             ggn_train_unfold(w->graph, w->params, s->hyper.window, s->plan->difference);
         ggn_weights_pack(w, NULL);
-    }
-    if (!rc && moves && !paper) {
-        ggn_weights_copy(s->trainer->weights[GGN_NET_R], s->r->params);
-        ggn_weights_pack(s->trainer->weights[GGN_NET_R], NULL);
     }
     if (!rc)
         ggn_trainer_keep(s->trainer);

@@ -102,7 +102,7 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     if (rc)
         return rc;
     struct ggn_window_options train = {
-        .split = GGN_SPLIT_TRAIN, .length = p->window, .synthetic = 1, .label_first = paper || ggn_published("label"), .soft = p->soft_labels};
+        .split = GGN_SPLIT_TRAIN, .length = p->window, .synthetic = 1, .label_first = paper, .soft = p->soft_labels};
     struct ggn_window_options validation = {
         .split = GGN_SPLIT_VALIDATION, .length = p->window, .synthetic = p->reach > 0, .soft = p->soft_labels};
     rc = ggn_windows_create(&s->train, &s->set, &train, err);
