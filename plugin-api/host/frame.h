@@ -229,9 +229,9 @@ struct cJSON *lull_host_report_block(struct cJSON *list, const struct lull_host_
 
 /* "criterion ID: ", `what` and what the criterion said; returns its code. */
 int32_t lull_host_blame(const struct lull_host_criterion *criterion, const char *what, int32_t code,
-                        const struct lull_error *response, struct lull_error *err);
+                        const struct lull_error *why, struct lull_error *err);
 /* A failure of plugin-api/base in the words of the ABI. */
-int32_t lull_host_translate(const struct base_err *response, struct lull_error *err);
+int32_t lull_host_translate(const struct base_err *why, struct lull_error *err);
 int32_t lull_host_no_memory(struct lull_error *err, const char *what);
 
 #endif

@@ -175,7 +175,7 @@ static void apply_one(const struct lull_host_blocks *blocks, struct lull_host_bl
  *
  * Time that does not suffice for every block is spent where noise is seen most: only blocks of about the largest error are
  * asked, and so go on; the others wait at their checks. About the same is what half as many samples again make up for, and
- * nobody goes further than that unasked. A render that is resumed differs from one without a budget, therefore.
+ * no block goes further than that unasked. A render that is resumed differs from one without a budget, therefore.
  */
 static const double BUDGET_STEP = 1.5;
 
@@ -184,13 +184,13 @@ static int spends_a_budget(const struct lull_host_frame *f)
     return f->config.time_budget_s > 0.0 && !(f->blocks.flags & LULL_HOST_UNIFORM);
 }
 
-/* The error of a block now: that of its last answer, falling as 1/sqrt(spp); white in a mask asks for a quarter of it.
+/* The error of a block now, in that which a mask asks for: that of its last answer, falling as 1/sqrt(spp).
  * INFINITY: it was never asked; NaN: its criterion tells none. */
 static double error_now(const struct lull_host_block *b)
 {
     if (!b->asked)
         return (double)INFINITY;
-    return b->error * sqrt((double)b->asked_spp / (double)b->spp) * exp2(2.0 * b->step / LULL_HOST_STEPS);
+    return b->error * sqrt((double)b->asked_spp / (double)b->spp) / lull_host_mask_factor(b->step);
 }
 
 static int can_go_on(const struct lull_host_blocks *blocks, const struct lull_host_block *b)
