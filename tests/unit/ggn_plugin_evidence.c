@@ -1,12 +1,16 @@
-/* What second moments and the surroundings of a small block add to the evidence of `observer`, in closed form. */
+/* What second moments and the surroundings of a small block add to the evidence of `observer`, in closed form, and that its unit
+ * is that of `ggn visible` and of labels. */
 #include "support/ggn_cmocka.h"
 
 #include <math.h>
 #include <string.h>
 #include <lull/criterion.h>
 
+#include "base/colour.h"
 #include "model/visibility.h"
+#include "observer/curve.h"
 #include "observer/observer.h"
+#include "observer/remaining.h"
 #include "plugin/criteria.h"
 #include "support/ggn_noise.h"
 
@@ -236,11 +240,67 @@ static void surroundings(void **state)
     }
 }
 
+static uint8_t *codes_of(const struct seq_block *b, const struct seq_record *r, struct pic_image *image)
+{
+    uint8_t *codes = malloc(3 * (size_t)SIDE * SIDE);
+    assert_int_equal(seq_display(b, r, codes, NULL), 0);
+    *image = (struct pic_image){.width = SIDE, .height = SIDE, .channels = 3, .u8 = codes};
+    return codes;
+}
+
+/* The planes that a host would show of a recorded level with `variance` of the mean's luminance. */
+static void show(const struct seq_block *b, const struct seq_record *level, double variance)
+{
+    static float mean[3 * SIDE * SIDE], difference[3 * SIDE * SIDE];
+    assert_int_equal(seq_halves(b, level, mean, difference, NULL), 0);
+    for (size_t i = 0; i < SIDE * SIDE; i++) {
+        float *of = color[i / SIDE][i % SIDE];
+        for (size_t c = 0; c < 3; c++) {
+            of[c] = mean[c * SIDE * SIDE + i];
+            half[i / SIDE][i % SIDE][c] = of[c] + difference[c * SIDE * SIDE + i];
+        }
+        const double y = base_luminance((double)of[0], (double)of[1], (double)of[2]);
+        moment2[i / SIDE][i % SIDE] = (float)(y * y + (SPP - 1) * variance);
+    }
+}
+
+/* One noise in one unit: what two references show of a picture, what the criterion believes of it with either witness, and how
+ * many more samples its label asks for, which is the square. */
+static void one_unit(void **state)
+{
+    static const uint32_t level[1] = {SPP};
+    struct ggn_noise noise = {SIDE, SIDE, level, 1, 16 * SPP, 0.5, 0.05, 1, 0};
+    struct seq_block seen = ggn_noise_block(&noise), other;
+    struct pic_image image, reference[2];
+    struct ggn_remaining shown;
+    struct ggn_curve curve;
+    int censored;
+    (void)state;
+    noise.seed = 2;
+    other = ggn_noise_block(&noise);
+    uint8_t *codes[3] = {codes_of(&seen, seen.levels, &image), codes_of(&seen, seen.reference, &reference[0]),
+                         codes_of(&other, other.reference, &reference[1])};
+    const struct pic_image *const references[2] = {&reference[0], &reference[1]};
+    assert_int_equal(ggn_remaining(&ggn_observer_default, references, &image, SIDE, &shown, NULL, NULL), 0);
+    assert_true(shown.error > 2 && shown.error < 3);
+    show(&seen, seen.levels, noise.sigma * noise.sigma / SPP);
+    for (int moments = 0; moments < 2; moments++)
+        assert_true(fabs(ask(0, moments, 1).error / (1 + POOLING / SIDE) / shown.error - 1) < 0.03); /* of 1 % each */
+    assert_int_equal(ggn_curve_make(&seen, GGN_FROM_HALVES, 1, &curve, NULL), 0);
+    const double threshold = ggn_curve_threshold(&curve, ggn_observer_default.level, &censored);
+    assert_true(!censored && fabs(sqrt(threshold / SPP) / shown.error - 1) < 0.03);
+    ggn_curve_release(&curve);
+    for (int k = 0; k < 3; k++)
+        free(codes[k]);
+    seq_block_release(&seen);
+    seq_block_release(&other);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_equal_halves), cmocka_unit_test(even_light),   cmocka_unit_test(gaussian_noise),
-        cmocka_unit_test(skewed_noise),     cmocka_unit_test(surroundings),
+        cmocka_unit_test(skewed_noise),     cmocka_unit_test(surroundings), cmocka_unit_test(one_unit),
     };
     return cmocka_run_group_tests_name("evidence", tests, NULL, NULL);
 }
