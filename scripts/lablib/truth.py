@@ -181,6 +181,20 @@ def rows(results):
     return told
 
 
+def wrong(results):
+    """Which scenes hold the stops of the first criterion that are off, by size of block: a list of the page."""
+    lines, name = [], results["criteria"][0]
+    for size in results["sizes"]:
+        told = {s: row(of["%s %d" % (name, size)], None) for s, of in results["scenes"].items()}
+        stopped = sum(r["stopped"] for r in told.values())
+        off = sorted(((round(r["off"][0] * r["stopped"]), s, r) for s, r in told.items() if r["off"][0]), key=lambda x: (-x[0], x[1]))
+        lines.append("- %d px: %d of %d stops off at %g%s." % (
+            size, sum(count for count, _, _ in off), stopped, OFF[0],
+            "".join("%s %s %d of %d (worst %.2f)" % ("," if i else ":", s, count, r["stopped"], r["worst"])
+                    for i, (count, s, r) in enumerate(off))))
+    return "\n".join(lines) + "\n"
+
+
 def page(results):
     """The table of the page."""
     number = lambda v, form: "" if math.isnan(v) else form % v
