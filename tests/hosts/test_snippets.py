@@ -22,7 +22,6 @@ BUILD = Path(os.environ.get("BUILD", "build")).resolve()
 ROOT = Path.cwd()
 os.environ["LULL_PLUGIN_PATH"] = f"{BUILD}/lib/lull"
 PAGES = ["README.md", *map(str, sorted(Path("docs").rglob("*.md"))), "plugin-api/README.md", "plugin-api/python/README.md", "ggn/README.md"]
-VENV = ROOT / "build/hosts/venv/bin/python3"
 
 # Shell snippets, by page and place: what is run of them. A regular expression: lines that are not, and why.
 NOT_HERE = r"tev|scripts/setup|lull-denoiser-setup|python3 -m lull\.blender"  # a viewer with a window; from the network; tests/hosts/test_blender_command.py
@@ -116,23 +115,28 @@ def test_python_of_the_denoiser():
         assert names["made"].picture.shape == (64, 96, 3) and os.path.getsize("picture.exr") > 1000
 
 
+def host_python(folder, module):
+    """The interpreter of a folder that `make test-hosts` fills, when it has the module. pyluxcore wants numpy to be there first."""
+    python = ROOT / "build/hosts" / folder / "bin/python3"
+    if not python.exists() or subprocess.run([python, "-c", f"import numpy, {module}"], capture_output=True).returncode:
+        raise Skip(f"no {module} in build/hosts/{folder}: run make test-hosts")
+    return python
+
+
 def test_python_of_mitsuba():
     """docs/hosts.md: Mitsuba, its price and its picture; import lull is enough"""
-    if subprocess.run([VENV, "-c", "import mitsuba"], capture_output=True).returncode:
-        raise Skip("no mitsuba in build/hosts/venv: run make test-hosts")
+    python = host_python("venv", "mitsuba")
     scene = ROOT / "tests/hosts/scenes/box.xml"
     with elsewhere() as folder:
         (folder / "scene.xml").write_text(scene.read_text().replace('value="96"', 'value="24"'))
         text = FOUND["docs/hosts.md", "python", 1].replace("llvm_ad_rgb", "scalar_rgb").replace("spp_max=2048", "spp_max=256")
-        done = subprocess.run([VENV, "-c", text], text=True, capture_output=True, env={**os.environ, "PYTHONPATH": f"{ROOT}/plugin-api/python"})
+        done = subprocess.run([python, "-c", text], text=True, capture_output=True, env={**os.environ, "PYTHONPATH": f"{ROOT}/plugin-api/python"})
         assert done.returncode == 0 and "spp min / mean / max" in done.stdout and os.path.getsize("picture.exr") > 1000, done
 
 
 def test_python_of_luxcore():
     """docs/hosts.md: LuxCore, its price and its picture"""
-    python = ROOT / "build/hosts/luxcore/bin/python3"
-    if not python.exists() or subprocess.run([python, "-c", "import numpy, pyluxcore"], capture_output=True).returncode:
-        raise Skip("no pyluxcore in build/hosts/luxcore: run make test-hosts")
+    python = host_python("luxcore", "pyluxcore")
     with elsewhere() as folder:
         shutil.copy(ROOT / "tests/hosts/scenes/room.scn", folder / "scene.scn")
         (folder / "scene.cfg").write_text("film.width = 24\nfilm.height = 24\n")
