@@ -20,7 +20,6 @@ if NEEDED:  # this is a program: one line, no traceback
 from .. import denoising, quote
 from ..criterion import Criterion, load
 from ..driver import Result
-from ..library import LullError
 from ..outputs import Progress
 from ..stopping import EXIT_STATUS, Stopping
 
@@ -80,6 +79,8 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--frames", metavar="FIRST-LAST", help="an animation; 'all' = the scene's range (default: current frame)")
     p.add_argument("--device", choices=DEVICES, help="what Cycles renders on (default: what the scene says)")
     p.add_argument("--scene", metavar="NAME", help="which scene of the file (default: the active one)")
+    p.add_argument("--view-layer", default="", metavar="NAME", help="which view layer of the scene (default: the first that is "
+                   "used)")
     p.add_argument("-o", "--output", default="", metavar="FILE.exr", help="picture with layers for samples and noise "
                    "(default, if nothing else is asked for: where the scene's output path says, else the .blend's name in "
                    "the current folder)")
@@ -139,14 +140,14 @@ def _frames(text: Optional[str], scene: bpy.types.Scene) -> list[Optional[int]]:
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Inside Blender (options after `--`) or with bpy. Exit status: 0 done, 1 rendering failed, 2 bad input or an output
     could not be written, 130 interrupted."""
-    from .cycles import HostError
+    from .session import REFUSED
     if argv is None:
         argv = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
     options = parser().parse_args(argv)
     try:
         with Stopping() as stopping:
             return _render(options, stopping)
-    except (HostError, LullError, ValueError, OSError, RuntimeError) as error:
+    except REFUSED as error:
         print(f"lull: {error}", file=sys.stderr)
         return 2
 
@@ -155,7 +156,9 @@ def _scene(options: argparse.Namespace) -> bpy.types.Scene:
     """The scene that the options name, opened and set as they say."""
     import bpy
 
+    from . import engine
     from .cycles import choose_device
+    engine.register()  # a file may name it
     if options.file:
         bpy.ops.wm.open_mainfile(filepath=os.path.abspath(options.file))
     if options.scene and options.scene not in bpy.data.scenes:
@@ -183,7 +186,8 @@ def _settings(options: argparse.Namespace, scene: bpy.types.Scene, frame: Option
     settings = Settings(options.criterion, parameters, options.spp_min, options.spp_max, options.time_budget, options.block,
                         mask=options.mask, output=options.output, preview=options.preview, stop_map=options.stop_map,
                         report=options.report, page=options.html, checkpoint=options.checkpoint,
-                        display_server=options.display_server, denoise=options.denoise).numbered(frame)
+                        display_server=options.display_server, denoise=options.denoise,
+                        view_layer=options.view_layer).numbered(frame)
     if not (options.quote or settings.output or settings.preview or settings.stop_map or settings.report or settings.page):
         stem = Path(options.file or bpy.data.filepath or "untitled").stem
         settings.output = default_output(scene, frame, f"{stem}.exr")
@@ -244,7 +248,7 @@ def _render_frame(options: argparse.Namespace, scene: bpy.types.Scene, settings:
         written, failed = session.write(result)
     if progress:
         progress.clear()
-    print("lull:", summary(session), "; ".join(written))
+    print("lull:", session.summary(), "; ".join(written))
     return _end(session, result, failed)
 
 
@@ -271,13 +275,3 @@ def _end(session: Session, result: Optional[Result], failed: Sequence[str]) -> i
     if failed or session.unsaved:
         return 2
     return EXIT_STATUS if result is not None and result.outcome == "interrupt" else 0
-
-
-def summary(session: Session) -> str:
-    """One line about a finished frame."""
-    blocks = session.frame.blocks
-    converged = sum(b.reason == "criterion" for b in blocks)
-    counts = sorted(b.spp for b in blocks)
-    mean = session.driver.totals.samples / session.frame.view.pixels
-    line = f"{converged} of {len(blocks)} blocks converged, {counts[0]}..{counts[-1]} spp, mean {mean:.0f}"
-    return f"{line}; denoised, {session.denoised.weight.mean():.0%} is the noisy picture" if session.denoised else line

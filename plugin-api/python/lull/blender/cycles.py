@@ -74,6 +74,10 @@ def merge(rects: Sequence[Rect]) -> list[Rect]:
     return _joined(_joined(rects, 0), 1)
 
 
+# Whose scenes are rendered: Cycles', and those of the add-on's own engine, which renders with Cycles
+ENGINES = ("CYCLES", "LULL")
+
+
 class HostError(Exception):
     """The scene cannot be rendered; one line for people."""
 
@@ -108,13 +112,13 @@ def choose_device(name: str) -> None:
 
 class Cycles:
     """Use as a context manager around everything that renders. scene: borrowed; spp_max: the most samples of a pixel;
-    denoised: its denoising passes are rendered, too. notes: lines for people about what is done otherwise than the scene
-    says."""
+    denoised: its denoising passes are rendered, too; view_layer: which one, by name, "" = the first that is used. notes: lines
+    for people about what is done otherwise than the scene says."""
 
-    def __init__(self, scene: bpy.types.Scene, spp_max: int, denoised: bool = False):
+    def __init__(self, scene: bpy.types.Scene, spp_max: int, denoised: bool = False, view_layer: str = ""):
         if not hasattr(scene, "cycles"):
             raise HostError("Cycles is not available: enable the add-on 'Cycles Render Engine' in the preferences")
-        if scene.render.engine != "CYCLES":
+        if scene.render.engine not in ENGINES:
             engine = _label(scene.render, "engine", scene.render.engine)
             raise HostError(f"scene '{scene.name}' renders with {engine}, not with Cycles: choose Cycles as its "
                             "render engine, or another scene")
@@ -126,7 +130,9 @@ class Cycles:
         render = scene.render
         if render.use_multiview:
             raise HostError(f"scene '{scene.name}' renders several views: turn stereoscopy off")
-        if not any(layer.use for layer in scene.view_layers):
+        if view_layer and view_layer not in scene.view_layers:
+            raise HostError(f"scene '{scene.name}' has no view layer '{view_layer}': {', '.join(scene.view_layers.keys())}")
+        if not view_layer and not any(layer.use for layer in scene.view_layers):
             raise HostError(f"scene '{scene.name}' has no view layer that is used for rendering")
         self.scene, self.spp_max, self.denoised = scene, spp_max, denoised
         self.seeds = (scene.cycles.seed ^ 0x3504F333, scene.cycles.seed)  # of half B, of half A
@@ -134,7 +140,10 @@ class Cycles:
         self.height = render.resolution_y * render.resolution_percentage // 100
         self.threads, self.crop = render.threads, self._region()
         self.notes: list[str] = []
-        self.layer = next(layer for layer in scene.view_layers if layer.use)
+        self.layer = scene.view_layers[view_layer] if view_layer else next(layer for layer in scene.view_layers if layer.use)
+        if bpy.app.autoexec_fail:
+            self.notes.append("the file's Python scripts and drivers are not run, as Blender's preference Auto Run Python Scripts "
+                              "says")
         if scene.cycles.use_denoising and not denoised:
             self.notes.append("the picture is not denoised: --denoise, or the panel's Denoise, keeps the denoised one")
         nodes = scene.compositing_node_group if hasattr(scene, "compositing_node_group") else scene.use_nodes
@@ -143,7 +152,7 @@ class Cycles:
                               "Layers")
         if any(getattr(self.layer, f"use_pass_cryptomatte_{kind}") for kind in ("object", "material", "asset")):
             self.notes.append("Cryptomatte passes are left out: render them apart, a few samples are enough")
-        if others := [layer.name for layer in scene.view_layers if layer.use and layer != self.layer]:
+        if not view_layer and (others := [layer.name for layer in scene.view_layers if layer.use and layer != self.layer]):
             self.notes.append(f"only the view layer '{self.layer.name}' is rendered, not {', '.join(others)}")
         self.pattern = self._choose_pattern()
         self._touched: list[tuple[object, str, object]] = []
@@ -161,8 +170,8 @@ class Cycles:
         r = self.scene.render
         if not r.use_border:
             return Rect(0, 0, self.width, self.height)
-        x0, x1 = round(r.border_min_x * self.width), round(r.border_max_x * self.width)
-        y0, y1 = round((1 - r.border_max_y) * self.height), round((1 - r.border_min_y) * self.height)
+        x0, x1 = (int(np.float32(x) * np.float32(self.width)) for x in (r.border_min_x, r.border_max_x))  # as Blender cuts
+        y1, y0 = (self.height - int(np.float32(y) * np.float32(self.height)) for y in (r.border_min_y, r.border_max_y))
         if x0 >= x1 or y0 >= y1:
             raise HostError(f"scene '{self.scene.name}': its render region holds no pixel")
         return Rect(x0, y0, x1, y1)
@@ -171,7 +180,7 @@ class Cycles:
         render, cycles = self.scene.render, self.scene.cycles
         path = self._wave.enter_context(unnamed_file())
         try:
-            self._set(render, engine="CYCLES", use_persistent_data=True, use_border=True, use_crop_to_border=True,
+            self._set(render, engine="CYCLES", use_persistent_data=True, use_single_layer=False, use_border=True, use_crop_to_border=True,
                       use_compositing=False, use_sequencer=False, use_overwrite=True, use_placeholder=False,
                       use_file_extension=False, filepath=path)
             for name in ("border_min_x", "border_min_y", "border_max_x", "border_max_y"):

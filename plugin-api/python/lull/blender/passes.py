@@ -26,20 +26,25 @@ def _colour_of(name: str) -> Optional[str]:
     return None if not found else f"{found[1]}Col" if found[1] else f"{found[2]}Color"
 
 
+def summed(name: str) -> bool:
+    """Is this a pass that waves can be summed for?"""
+    return not _LEFT_OUT.fullmatch(name)
+
+
 class Passes:
     """names: what to give the frame as layers. prefix: the view layer's name; channels: those of a wave, without it; size:
     the picture's; hidden: passes that the user has not switched on; transparent: the film is, alpha is wanted."""
 
     def __init__(self, prefix: str, channels: Iterable[str], size: tuple[int, int], hidden: set[str], transparent: bool):
-        kept = [c for c in channels if not _LEFT_OUT.fullmatch(c.rpartition(".")[0]) and not c.startswith("Combined.")]
-        self._prefix, self._hidden, self._transparent = "View Layer" if prefix == "lull" else prefix, hidden, transparent
+        kept = [c for c in channels if summed(c.rpartition(".")[0]) and not c.startswith("Combined.")]
+        self.prefix, self._hidden, self._transparent = "View Layer" if prefix.split(".")[0] == "lull" else prefix, hidden, transparent
         self._kept = {self._named(c): c for c in kept}
         self.names = [*self._kept, *(["A"] if transparent else [])]
         self._first = {name: np.zeros((size[1], size[0]), np.float32) for name, c in self._kept.items()
                        if c.rpartition(".")[0] in _FIRST}
 
     def _named(self, channel: str) -> str:
-        return f"{self._prefix}.{channel}"
+        return f"{self.prefix}.{channel}"
 
     def _divisor(self, channel: str, have: Mapping[str, np.ndarray]) -> Optional[np.ndarray]:
         """The colour that a channel of light was divided by."""

@@ -10,15 +10,18 @@ from typing import Any, Callable, Optional, Sequence
 import bpy
 import numpy as np
 
-from .. import checkpoint, denoising, outputs, quote
+from .. import checkpoint, denoising, exr, outputs, quote
 from ..criterion import Criterion, load
 from ..driver import Driver, Result
 from ..files import Output, check_outputs, write_each
 from ..frame import Frame
 from ..library import LullError
 from . import shown
-from .cycles import WAVE, Cycles
+from .cycles import WAVE, Cycles, HostError
 from .view import display_of, is_plain, read_grey, view_text
+
+# What a session raises for a scene or for settings that cannot be, one line for people
+REFUSED = (HostError, LullError, ValueError, OSError, RuntimeError)
 
 # Blender's own output path, which nobody has chosen
 _UNSET = ("", "/tmp/", "/tmp\\")
@@ -42,6 +45,7 @@ class Settings:
     checkpoint: str = ""
     display_server: str = ""  # "HOST" or "HOST:PORT" of an image viewer; "": none
     denoise: str = ""  # of lull.denoising.KINDS; "": the noisy picture is kept
+    view_layer: str = ""  # "": the first that is used
 
     def __post_init__(self) -> None:
         self.criterion = self.criterion or denoising.criterion_of(self.denoise)
@@ -143,7 +147,7 @@ class Session:
         self.denoised: Optional[denoising.Denoised] = None  # at the end
         if settings.denoise:
             denoising.check(settings.parameters.get("library", ""))
-        self.host = Cycles(scene, spp_max, bool(settings.denoise))
+        self.host = Cycles(scene, spp_max, bool(settings.denoise), settings.view_layer)
         self.notes = self.host.notes
         exposure, display = 2.0 ** scene.view_settings.exposure if is_plain(scene) else 1.0, display_of(scene)
         self.host.__enter__()
@@ -194,6 +198,15 @@ class Session:
         """One call of the renderer or one round of checks; the end, or None."""
         return self.driver.step()
 
+    def summary(self) -> str:
+        """One line about the finished frame."""
+        blocks = self.frame.blocks
+        converged = sum(b.reason == "criterion" for b in blocks)
+        counts = sorted(b.spp for b in blocks)
+        mean = self.driver.totals.samples / self.frame.view.pixels
+        line = f"{converged} of {len(blocks)} blocks converged, {counts[0]}..{counts[-1]} spp, mean {mean:.0f}"
+        return f"{line}; denoised, {self.denoised.weight.mean():.0%} is the noisy picture" if self.denoised else line
+
     def write(self, result: Result) -> tuple[list[str], list[str]]:
         """Denoises the picture if that is asked for, and writes the files of the settings. Returns their names, and a line
         for each that could not be written."""
@@ -202,15 +215,26 @@ class Session:
         kernel = f"Cycles, Blender {bpy.app.version_string}"
         interrupted = result.outcome in ("interrupt", "failed")
         kept = self.denoised
-        rgb = kept.picture if kept else self.frame.mean()
         written, unwritten = write_each((
             (s.output, lambda p: outputs.write_exr(p, self.driver, scene, f"lull for Python 1.0; {kernel}",
-                                                    self.host.passes.finished(self.frame, rgb), kept)),
+                                                    self.host.passes.finished(self.frame, self._rgb()), kept)),
             (s.preview, lambda p: outputs.write_preview(p, self.driver, kept)),
             (s.stop_map, lambda p: outputs.write_stop_map(p, self.frame, scene)),
             (s.report, lambda p: outputs.write_report(p, self.driver, scene, kernel, interrupted, s.mask or None, kept)),
             (s.page, lambda p: outputs.write_page(p, self.driver, scene, kernel, interrupted, s.mask or None, kept))))
         return written, failed + unwritten
+
+    def write_layer(self, path: str, samples: str) -> None:
+        """What there is of the view layer, in an EXR that a render result of Blender's takes as it is: its passes, and one with
+        the name `samples` for samples per pixel."""
+        frame, own, name = self.frame, self.host.passes.prefix, self.host.layer.name
+        planes = {**{layer: frame.mean(layer) for layer in frame.layers}, **self.host.passes.finished(frame, self._rgb()),
+                  f"{own}.{samples}.X": frame.spp()}
+        exr.write(path, {name + channel.removeprefix(own): frame.cropped(plane) for channel, plane in planes.items()
+                         if channel.startswith(own) and plane is not None}, (frame.width, frame.height), frame.crop[:2])
+
+    def _rgb(self) -> np.ndarray:
+        return self.denoised.picture if self.denoised else self.frame.mean()
 
     def _denoise(self) -> list[str]:
         """A line if that failed."""

@@ -13,13 +13,11 @@ from .. import outputs, quote
 from ..criterion import load
 from ..denoising import criterion_of
 from ..driver import Result
-from ..library import LullError, criteria, search_path
-from . import shown
-from .cli import summary
-from .cycles import HostError
-from .session import Session, Settings, check_files, default_output
+from ..library import criteria, search_path
+from . import engine, shown
+from .cycles import ENGINES
+from .session import REFUSED, Session, Settings, check_files, default_output
 
-REFUSED = (HostError, LullError, ValueError, OSError, RuntimeError)
 _items: list[tuple[str, str, str]] = []  # kept: Blender does not copy the texts of dynamic enums
 _running = False  # a render is in the making: its settings are not to be shown, since it lends some of the scene's
 _visible: dict[str, float] = {}  # criteria whose quality parameter is the share of viewers, with their default, 0 = none
@@ -73,17 +71,21 @@ class LullSettings(bpy.types.PropertyGroup):
                            "where the scene's output path says, else a temporary one")
     state: StringProperty(options={"SKIP_SAVE"})
 
-    def chosen(self, scene: bpy.types.Scene, frame: Optional[int] = None) -> Settings:
-        """As the session wants them; ValueError for a pair without '=' or a name that is taken."""
+    def wanted(self) -> Settings:
+        """As the session wants them, without files; ValueError for a pair without '='."""
         pairs = self.parameters.split()
         if bad := [p for p in pairs if "=" not in p]:
             raise ValueError(f"parameter {bad[0]}: expected KEY=VALUE")
         quality = {"visible": f"{self.share:.6g}"} if self.share and self.criterion in _visible else {}
         if self.criterion in _by_error and self.quality != "final":
             quality = {"error": {"draft": "4", "good": "2"}[self.quality]}
-        settings = Settings(self.criterion, {**quality, **dict(p.split("=", 1) for p in pairs)}, self.spp_min,
-                            block=self.block or None, mask=bpy.path.abspath(self.mask) if self.mask else "",
-                            denoise=self.kept if self.denoise else "")
+        return Settings(self.criterion, {**quality, **dict(p.split("=", 1) for p in pairs)}, self.spp_min,
+                        block=self.block or None, mask=bpy.path.abspath(self.mask) if self.mask else "",
+                        denoise=self.kept if self.denoise else "")
+
+    def chosen(self, scene: bpy.types.Scene, frame: Optional[int] = None) -> Settings:
+        """With the files that the buttons write; ValueError for a name that is taken."""
+        settings = self.wanted()
         if self.folder:
             settings.output = os.path.join(bpy.path.abspath(self.folder), "lull.exr")
             settings = settings.numbered(frame)
@@ -207,13 +209,13 @@ class LULL_OT_render(bpy.types.Operator):
         for name, path in ((shown.PICTURE, session.settings.output), (shown.STOP_MAP, session.settings.stop_map)):
             if path in written:
                 shown.keep(name, path)
-        settings.state = "\n".join([summary(session), *session.notes, *written, self._price])
+        settings.state = "\n".join([session.summary(), *session.notes, *written, self._price])
         for text in failed:
             self.report({"ERROR"}, text)
         if result.exception:
             self.report({"ERROR"}, f"Rendering failed, what was rendered is kept: {result.exception}")
         elif not failed:
-            self.report({"INFO"}, summary(session))
+            self.report({"INFO"}, session.summary())
         return bool(self._frames) and result.outcome not in ("interrupt", "failed")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -266,11 +268,11 @@ class LULL_PT_render(bpy.types.Panel):
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
-    COMPAT_ENGINES = {"CYCLES"}
+    COMPAT_ENGINES = set(ENGINES)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """The scene renders with Cycles."""
+        """The scene renders with Cycles, or with our engine."""
         return context.engine in cls.COMPAT_ENGINES
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -312,11 +314,13 @@ def register() -> None:
     shown.register()
     for c in CLASSES:
         bpy.utils.register_class(c)
+    engine.register()
     bpy.types.Scene.lull = PointerProperty(type=LullSettings)
 
 
 def unregister() -> None:
     """Blender switches the add-on off."""
+    engine.unregister()
     shown.unregister()
     del bpy.types.Scene.lull
     for c in reversed(CLASSES):
