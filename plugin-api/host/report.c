@@ -83,6 +83,15 @@ static void add_totals(cJSON *root, const struct lull_host_totals *t, int has_ra
     base_json_number(o, "dropped_samples", (double)t->dropped, failed);
 }
 
+static void add_phases(cJSON *root, const struct lull_host_report *r, int *failed)
+{
+    if (!LULL_HAS(struct lull_host_report, r, phase_count) || r->phase_count == 0)
+        return;
+    cJSON *o = base_json_object(root, "phases", failed);
+    for (uint64_t i = 0; i < r->phase_count; i++)
+        base_json_number(o, r->phases[i].name, r->phases[i].seconds, failed);
+}
+
 /* How many took part, and what went between them. */
 static void add_processes(cJSON *root, const struct lull_host_report *r, int *failed)
 {
@@ -177,6 +186,7 @@ static cJSON *make(const struct lull_host_frame *f, const struct lull_host_repor
     add_blocks(root, f, r->flags & LULL_REPORT_DENOISED ? r->noisy_error : NULL, failed);
     add_history(root, f, failed);
     add_totals(root, &f->totals, !(r->flags & LULL_REPORT_NO_RAYS), failed);
+    add_phases(root, r, failed);
     base_json_bool(root, "interrupted", (r->flags & LULL_REPORT_INTERRUPTED) != 0, failed);
     base_json_text(root, "kernel", r->kernel, failed);
     if (r->flags & LULL_REPORT_DENOISED)
@@ -196,6 +206,13 @@ static int32_t check_report(const struct lull_host_report *r, struct lull_error 
     if (LULL_HAS(struct lull_host_report, r, command_count) && r->command_count > 0 && !r->command)
         return lull_error_set(err, LULL_E_INVALID, "the report: command is NULL, command_count is %llu",
                               (unsigned long long)r->command_count);
+    if (LULL_HAS(struct lull_host_report, r, phase_count) && r->phase_count > 0 && !r->phases)
+        return lull_error_set(err, LULL_E_INVALID, "the report: phases is NULL, phase_count is %llu",
+                              (unsigned long long)r->phase_count);
+    for (uint64_t i = 0; LULL_HAS(struct lull_host_report, r, phase_count) && i < r->phase_count; i++) {
+        if (!r->phases[i].name)
+            return lull_error_set(err, LULL_E_INVALID, "the report: phases[%llu].name is NULL", (unsigned long long)i);
+    }
     return LULL_OK;
 }
 

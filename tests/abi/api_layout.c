@@ -115,7 +115,8 @@ LAYOUT(lull_host_report, F(lull_host_report, struct_size), F(lull_host_report, f
        F(lull_host_report, message_wait_s), F(lull_host_report, film_bytes), F(lull_host_report, film_pixels),
        F(lull_host_report, scene_bytes), F(lull_host_report, noisy_weight), F(lull_host_report, noisy_error),
        F(lull_host_report, software), F(lull_host_report, processor), F(lull_host_report, command),
-       F(lull_host_report, command_count));
+       F(lull_host_report, command_count), F(lull_host_report, phases), F(lull_host_report, phase_count));
+LAYOUT(lull_host_phase, F(lull_host_phase, name), F(lull_host_phase, seconds));
 LAYOUT(lull_host_layer, F(lull_host_layer, name), F(lull_host_layer, rgb));
 LAYOUT(lull_host_denoising, F(lull_host_denoising, struct_size), F(lull_host_denoising, flags),
        F(lull_host_denoising, threads), F(lull_host_denoising, zero), F(lull_host_denoising, library),
@@ -145,7 +146,7 @@ static const struct layout layouts[] = {
     ENTRY(lull_host_stop_at),   ENTRY(lull_host_forecast),  ENTRY(lull_host_sample),
     ENTRY(lull_host_report),    ENTRY(lull_host_denoising), ENTRY(lull_host_layer),
     ENTRY(lull_host_picture),   ENTRY(lull_host_output),    ENTRY(lull_host_quote_block),
-    ENTRY(lull_host_quote_row),
+    ENTRY(lull_host_quote_row), ENTRY(lull_host_phase),
 };
 enum { LAYOUTS = sizeof layouts / sizeof *layouts, OF_THE_ABI = 15 };
 
@@ -211,21 +212,14 @@ static void structs_have_no_padding(void **state)
 static void growing_structs_begin_with_their_size(void **state)
 {
     (void)state;
-    static const char *const elements[] = {"lull_param",
-                                           "lull_pair",
-                                           "lull_rect",
-                                           "lull_plane",
-                                           "lull_block",
-                                           "lull_decision",
-                                           "lull_host_block",
-                                           "lull_host_totals",
-                                           "lull_host_stop_at",
-                                           "lull_host_forecast",
-                                           "lull_host_sample",
-                                           "lull_host_output",
-                                           "lull_host_quote_block",
-                                           "lull_host_quote_row",
-                                           "lull_host_layer"};
+    static const char *const elements[] = {"lull_param",          "lull_pair",
+                                           "lull_rect",           "lull_plane",
+                                           "lull_block",          "lull_decision",
+                                           "lull_host_block",     "lull_host_totals",
+                                           "lull_host_stop_at",   "lull_host_forecast",
+                                           "lull_host_sample",    "lull_host_phase",
+                                           "lull_host_output",    "lull_host_quote_block",
+                                           "lull_host_quote_row", "lull_host_layer"};
     for (int i = 0; i < LAYOUTS; i++) {
         int is_element = 0;
         for (size_t k = 0; k < sizeof elements / sizeof *elements; k++)

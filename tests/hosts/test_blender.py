@@ -1,10 +1,12 @@
 """Blender's Cycles as a host: pictures, passes, the add-on; run inside Blender or by a Python with the module bpy."""
 import contextlib
 import dataclasses
+import json
 import os
 import runpy
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -145,6 +147,22 @@ def test_halves():
     wrong = np.sqrt(((mean - one_render(scene, 4096)) ** 2).mean())
     apart = np.sqrt(((half - mean) ** 2).mean())
     assert .5 * wrong < apart < 2 * wrong, (apart, wrong)
+
+
+def test_phases():
+    """the report says what the seconds went to: together not more than the wall clock, and most of it"""
+    scene = cube(320, 180)
+    settings = Settings("halfbuf", {"threshold": "1e-9"}, block=80, spp_max=192, report=tmp("phases.json"))
+    begin_s = time.monotonic()
+    with Session(scene, settings) as session:
+        result = session.driver.run()
+    wall_s = time.monotonic() - begin_s
+    session.write(result)
+    report = json.loads(Path(tmp("phases.json")).read_text())
+    phases = report["phases"]
+    assert list(phases) == ["samples_s", "synchronisation_s", "copies_s", "looks_s"] and min(phases.values()) > 0, phases
+    assert .8 * wall_s < sum(phases.values()) <= wall_s, (phases, wall_s)
+    assert phases["samples_s"] > .5 * wall_s and phases["looks_s"] == report["totals"]["criterion_s"], (phases, wall_s)
 
 
 def exported(name, width=48, height=36):

@@ -605,7 +605,9 @@ static void reports_as_text(void **state)
                                       .flags = LULL_REPORT_NO_RAYS,
                                       .processes = 1,
                                       .film_pixels = 64,
-                                      .scene_bytes = (double)NAN};
+                                      .scene_bytes = (double)NAN,
+                                      .phases = &(struct lull_host_phase){"copies_s", 1.5},
+                                      .phase_count = 1};
     frame->blocks.count = 1; /* short */
     assert_int_equal(lull_host_report_text(frame, &report, &writer, &fault), LULL_OK);
     frame->blocks.count = BLOCKS;
@@ -616,6 +618,7 @@ static void reports_as_text(void **state)
     assert_non_null(strstr(text, "\"id\":\t\"told\""));
     assert_null(strstr(text, "messages"));
     assert_non_null(strstr(text, "\"command\""));
+    assert_non_null(strstr(text, "\"copies_s\":\t1.5"));
     report.struct_size = offsetof(struct lull_host_report, software); /* as version 1.0 has it */
     b.size = 0;
     assert_int_equal(lull_host_report_text(frame, &report, &writer, &fault), LULL_OK);

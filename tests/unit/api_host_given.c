@@ -388,6 +388,11 @@ static void every_pointer(void **state)
     report.command_count = 2;
     NO("command", lull_host_report_write(frame, &report, "r.json", &err));
     report.command_count = 0;
+    report.phase_count = 1;
+    NO("phases", lull_host_report_write(frame, &report, "r.json", &err));
+    report.phases = &(struct lull_host_phase){.seconds = 1.0};
+    NO("name", lull_host_report_write(frame, &report, "r.json", &err));
+    report.phase_count = 0;
     NO("path", lull_host_report_write(frame, &report, NULL, &err));
     NO("report", lull_host_report_write(frame, NULL, "r.json", &err));
     NO("frame", lull_host_report_text(NULL, &report, &writer, &err));

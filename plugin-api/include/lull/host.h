@@ -275,6 +275,12 @@ LULL_EXPORT double lull_host_mask_factor(uint32_t step);
 #define LULL_REPORT_NO_RAYS UINT32_C(4)  /* rays are not counted */
 #define LULL_REPORT_DENOISED UINT32_C(8) /* the picture is denoised: noisy_weight and noisy_error */
 
+/* What wall seconds went to. */
+struct lull_host_phase {
+    const char *name; /* "samples" … */
+    double seconds;
+};
+
 /* What the library cannot know. Text may be NULL: null in the report. */
 struct lull_host_report {
     uint32_t struct_size;
@@ -298,6 +304,10 @@ struct lull_host_report {
     const char *software, *processor; /* the renderer with its version */
     const char *const *command;       /* [command_count] words of the command line */
     uint64_t command_count;
+
+    /* Since 1.2: where the renderer's time went, [phase_count]. */
+    const struct lull_host_phase *phases;
+    uint64_t phase_count;
 };
 
 /* The report as JSON (lull-render(1) says what is in it): to a file, replaced as a whole or not at all, or to a writer. */

@@ -67,7 +67,9 @@ HostForecast: Any = _struct("HostForecast", "f64 done_s left_s sampling_s check_
 HostReport: Any = _struct("HostReport", "u32 struct_size flags; text scene mask kernel; ptr effects; u32 effect_count "
                                         "threads processes zero; u64 messages message_bytes; f64 message_wait_s; u64 "
                                         "film_bytes film_pixels; f64 scene_bytes noisy_weight; ptr noisy_error; text "
-                                        "software processor; ptr command; u64 command_count")
+                                        "software processor; ptr command; u64 command_count; ptr phases; u64 "
+                                        "phase_count")
+HostPhase: Any = _struct("HostPhase", "text name; f64 seconds")
 HostQuoteRow: Any = _struct("HostQuoteRow", "ptr blocks; f64 spp_min spp_mean spp_max spp_mean_low spp_mean_high thread_s "
                                             "thread_low_s thread_high_s wall_s wall_low_s wall_high_s against_uniform; u32 "
                                             "unknown unmet capped; i32 asked")

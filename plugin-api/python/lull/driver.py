@@ -63,6 +63,7 @@ class Driver:
         self.after_call, self.suspend, self.warn = after_call, suspend, warn
         self.identity, self.totals = self._identity(identity or {}), frame.totals
         self.samples_per_s = 0.0  # recent, 0 = not known yet
+        self.phases: dict[str, float] = {}  # what a host's seconds went to, by name, for the report
         self.percent_told = 0.0  # of the work, by the progress line, which never goes back
         self.interrupted = False
         self.display = Display(frame, display_server) if display_server else None

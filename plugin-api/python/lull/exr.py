@@ -68,25 +68,39 @@ def read(path: str) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
         raise ValueError(f"{path}: not an uncompressed scan-line EXR: {error}") from None
 
 
-def _decode(data: bytes) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
-    if struct.unpack_from("<IB", data) != (_MAGIC, 2) or data[5] & 0x1a:  # tiled, deep or of several parts
-        raise ValueError("another kind of file")
-    head, at = {}, 8
+def texts(path: str) -> dict[str, str]:
+    """The attributes that are text."""
+    with open(path, "rb") as file:
+        return {name: value.decode(errors="replace") for name, kind, value in _head(file.read(1 << 16))[0] if kind == "string"}
+
+
+def _head(data: bytes) -> tuple[list[tuple[str, str, bytes]], int]:
+    """The attributes, each with its name, kind and bytes; where what follows them begins."""
+    head, at = [], 8
     while data[at]:
         name_end = data.index(b"\0", at)
         kind_end = data.index(b"\0", name_end + 1)
         end = kind_end + 5 + struct.unpack_from("<I", data, kind_end + 1)[0]
-        head[data[at:name_end].decode()], at = data[kind_end + 5:end], end
+        head.append((data[at:name_end].decode(), data[name_end + 1:kind_end].decode(), data[kind_end + 5:end]))
+        at = end
+    return head, at + 1
+
+
+def _decode(data: bytes) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
+    if struct.unpack_from("<IB", data) != (_MAGIC, 2) or data[5] & 0x1a:  # tiled, deep or of several parts
+        raise ValueError("another kind of file")
+    listed, at = _head(data)
+    head = {name: value for name, _, value in listed}
     if head["compression"] != b"\0":
         raise ValueError("it is compressed")
     x0, y0, x1, y1 = struct.unpack("<4i", head["dataWindow"])
-    listed, fields = head["channels"], []
-    while listed[:1] != b"\0":
-        name, _, rest = listed.partition(b"\0")
+    channels, fields = head["channels"], []
+    while channels[:1] != b"\0":
+        name, _, rest = channels.partition(b"\0")
         fields.append((name.decode(), _TYPES[struct.unpack_from("<i", rest)[0]], (x1 - x0 + 1,)))
-        listed = rest[16:]
+        channels = rest[16:]
     line = np.dtype([("#y", "<i4"), ("#bytes", "<u4"), *fields])  # its channels one after the other
-    lines = np.frombuffer(data, line, y1 - y0 + 1, at + 1 + 8 * (y1 - y0 + 1))
+    lines = np.frombuffer(data, line, y1 - y0 + 1, at + 8 * (y1 - y0 + 1))
     if (lines["#y"] != np.arange(y0, y1 + 1)).any() or (lines["#bytes"] != line.itemsize - 8).any():
         raise ValueError("its lines are not in order")
     return {name: lines[name].astype(np.float32) for name, *_ in fields}, (x0, y0)

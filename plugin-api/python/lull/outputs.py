@@ -104,12 +104,14 @@ def _report(driver: Driver, scene: str, kernel: str, interrupted: bool, mask: Op
             denoised: Optional[Denoised]) -> abi.HostReport:
     frame = driver.frame
     flags = abi.REPORT_NO_RAYS | abi.REPORT_INTERRUPTED * interrupted | abi.REPORT_DENOISED * (denoised is not None)
+    phases = (abi.HostPhase * len(driver.phases))(*((f"{name}_s".encode(), s) for name, s in driver.phases.items()))
     kept = {"noisy_weight": denoised.weight.mean(dtype=float), "noisy_error": denoised.noisy_error.ctypes.data} \
         if denoised else {}
     return abi.sized(
         abi.HostReport, flags=flags, scene=os.fsencode(scene), mask=None if mask is None else os.fsencode(mask),
         kernel=kernel.encode(), threads=driver.threads, processes=1, film_pixels=frame.view.pixels, scene_bytes=math.nan,
-        film_bytes=sum(a.nbytes for a in frame.arrays().values()), **kept)
+        film_bytes=sum(a.nbytes for a in frame.arrays().values()), phases=C.cast(phases, C.c_void_p),
+        phase_count=len(phases), **kept)
 
 
 def write_page(path: str, driver: Driver, scene: str = "", kernel: str = "", interrupted: bool = False,

@@ -14,6 +14,7 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+import time
 from typing import Iterator, Optional, Sequence
 
 import bpy
@@ -76,6 +77,11 @@ def merge(rects: Sequence[Rect]) -> list[Rect]:
 
 # Whose scenes are rendered: Cycles', and those of the add-on's own engine, which renders with Cycles
 ENGINES = ("CYCLES", "LULL")
+
+
+def _seconds(text: str) -> float:
+    """Of a time as Cycles writes it, 01:02:03.45."""
+    return sum(float(part) * 60.0 ** n for n, part in enumerate(reversed(text.split(":"))))
 
 
 class HostError(Exception):
@@ -157,6 +163,7 @@ class Cycles:
         self.pattern = self._choose_pattern()
         self._touched: list[tuple[object, str, object]] = []
         self._wave = contextlib.ExitStack()
+        self.render_s = self.samples_s = 0.0  # wall seconds of all renders, and of their samples
 
     def device(self) -> str:
         """What it renders on, by name."""
@@ -276,10 +283,13 @@ class Cycles:
             cycles.samples, cycles.sample_subset_length = self.spp_max, count
         else:
             cycles.samples = count
+        begin_s = time.monotonic()
         with _silence():
             status = bpy.ops.render.render(write_still=True, scene=self.scene.name)
+        self.render_s += time.monotonic() - begin_s
         if "FINISHED" not in status:
             raise HostError("Cycles did not finish the wave")
+        self.samples_s += _seconds(exr.texts(render.filepath).get(f"cycles.{self.layer.name}.render_time", "0"))
         channels, _ = exr.read(render.filepath)
         own = f"{self.layer.name}."
         channels = {name.removeprefix(own): plane for name, plane in channels.items() if name.startswith(own)}

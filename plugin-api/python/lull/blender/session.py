@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 import zlib
 from dataclasses import dataclass, field, replace
 from typing import Any, Callable, Optional, Sequence
@@ -165,6 +166,8 @@ class Session:
         except BaseException:
             self.host.__exit__()
             raise
+        self._setup_s, self._denoising_s = self.host.render_s, 0.0
+        self._before = (0.0, 0.0)  # seconds of rendering and of checks that a checkpoint brought
         self.quote = ""
         self.driver.watchers.append(quote.telling(lambda line: setattr(self, "quote", line)))
         self.keeper: Optional[checkpoint.Keeper] = None
@@ -186,6 +189,7 @@ class Session:
         if state and resume and os.path.exists(state):
             checkpoint.load(state, self.driver)
             self.host.passes.remember(self.frame)
+            self._before = (self.driver.totals.render_s, self.driver.totals.criterion_s)
         if state:
             self.keeper = checkpoint.Keeper(state, self.driver, every_s or 1e-9)
 
@@ -207,10 +211,22 @@ class Session:
         line = f"{converged} of {len(blocks)} blocks converged, {counts[0]}..{counts[-1]} spp, mean {mean:.0f}"
         return f"{line}; denoised, {self.denoised.weight.mean():.0%} is the noisy picture" if self.denoised else line
 
+    def phases(self) -> dict[str, float]:
+        """What the wall seconds of this session went to: samples, inside Cycles; synchronisation, all else of Blender's
+        renders; copies of their pixels; looks of the criterion; denoising, of the picture."""
+        host, totals = self.host, self.driver.totals
+        rendered_s, looks_s = totals.render_s - self._before[0], totals.criterion_s - self._before[1]
+        return {"samples": host.samples_s, "synchronisation": max(0.0, host.render_s - host.samples_s),
+                "copies": max(0.0, rendered_s - (host.render_s - self._setup_s)), "looks": looks_s,
+                **({"denoising": self._denoising_s} if self.settings.denoise else {})}
+
     def write(self, result: Result) -> tuple[list[str], list[str]]:
         """Denoises the picture if that is asked for, and writes the files of the settings. Returns their names, and a line
         for each that could not be written."""
+        begin_s = time.monotonic()
         failed = self._denoise()
+        self._denoising_s = time.monotonic() - begin_s
+        self.driver.phases = self.phases()
         s, scene = self.settings, bpy.data.filepath or self.scene.name
         kernel = f"Cycles, Blender {bpy.app.version_string}"
         interrupted = result.outcome in ("interrupt", "failed")
