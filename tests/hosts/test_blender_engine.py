@@ -152,6 +152,23 @@ def test_stop():
         os.mkdir(folder)
 
 
+def test_scripts():
+    """drivers in Python are run where Blender's preference says so, else it is told that they are not"""
+    preferences = bpy.context.preferences.filepaths
+    for runs in (False, True):
+        scene = scene_of(24, 24)
+        bpy.data.objects["Cube"].driver_add("location", 2).driver.expression = "len([z for z in 'ab'])"
+        preferences.use_scripts_auto_execute = runs
+        try:
+            with tempfile.TemporaryDirectory(dir=tmp("")) as folder:
+                engine.save(folder, scene, scene.view_layers[0].name)
+                with engine.Child(folder) as process:
+                    told = [message["warning"] for message in process.messages() if "warning" in message]
+        finally:
+            preferences.use_scripts_auto_execute = False
+        assert runs != any("Auto Run Python Scripts" in text for text in told) and not process.error, (runs, told)
+
+
 def test_panels():
     """Cycles' panels show with the engine, and no longer after it is gone; the buttons work with it"""
     def shown():
