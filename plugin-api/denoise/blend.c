@@ -3,46 +3,62 @@
 #include <math.h>
 #include <string.h>
 
-enum { RADIUS = 9, HOLE = 2 };
+enum { RADIUS = 12, HOLE = 2 };
 
-/* exp(-k^2 / 18): a Gaussian of 3 px, up to three of its deviations. */
-static const float weight[RADIUS + 1] = {1.0f,         0.945959469f, 0.800737403f, 0.606530660f, 0.411112291f,
-                                         0.249352209f, 0.135335283f, 0.065728529f, 0.028565501f, 0.011108997f};
+/* exp(-k^2 / 32): a Gaussian of 4 px, up to three of its deviations. */
+static const float weight[RADIUS + 1] = {1.0f,         0.969233234f, 0.882496903f, 0.754839602f, 0.606530660f,
+                                         0.457833362f, 0.324652467f, 0.216265167f, 0.135335283f, 0.079559509f,
+                                         0.043936934f, 0.022794181f, 0.011108997f};
 
-/* A pixel whose own square is more than this many of its neighbourhood's is a speck: two standard deviations. */
-static const float SPECK = 4.0f;
+/* (sum of weights)^2 / (sum of their squares) of the two-dimensional Gaussian: 4 pi 4^2. */
+static const float PIXELS = 201.0f;
+
+/* Standard errors that a pooled gain must exceed to count. */
+static const float SURE = 2.0f;
+
+/* A pixel whose own square is more than this many of its neighbourhood's is a speck: four standard deviations. */
+static const float SPECK = 16.0f;
 
 /* Of one line of `count` values, `step` apart, around x: the weighted sum of those that are at least `near` and at most
  * `far` away. */
-static double sum_around(const float *line, int count, size_t step, int x, int near, int far, double *total)
+static double sum_around(const float *line, int count, size_t step, int x, int near, int far)
 {
     double sum = 0.0;
-    *total = 0.0;
     for (int k = x - far > 0 ? x - far : 0; k < count && k <= x + far; k++) {
         const int away = k < x ? x - k : k - x;
-        if (away >= near) {
+        if (away >= near)
             sum += (double)weight[away] * (double)line[(size_t)k * step];
-            *total += (double)weight[away];
-        }
     }
     return sum;
 }
 
-/* One line of `count` values, `step` apart. */
-static void pool_line(const float *from, int count, size_t step, float *to)
+/* The sum of these weights, which is that of a line of ones. */
+static double weigh_around(int count, int x, int near, int far)
+{
+    static const float one = 1.0f;
+    return sum_around(&one, count, 0, x, near, far);
+}
+
+/* Means of `lines` lines, `next` apart, each as above. */
+static void pool_lines(const float *from, int lines, size_t next, int count, size_t step, float *to)
 {
     for (int x = 0; x < count; x++) {
-        double total, sum = sum_around(from, count, step, x, 0, RADIUS, &total);
-        to[(size_t)x * step] = (float)(sum / total);
+        const double total = weigh_around(count, x, 0, RADIUS);
+        for (size_t k = 0; k < (size_t)lines; k++)
+            to[k * next + (size_t)x * step] = (float)(sum_around(from + k * next, count, step, x, 0, RADIUS) / total);
     }
 }
 
 static void pool(float *map, int width, int height, float *scratch)
 {
-    for (int y = 0; y < height; y++)
-        pool_line(map + (size_t)y * (size_t)width, width, 1, scratch + (size_t)y * (size_t)width);
-    for (int x = 0; x < width; x++)
-        pool_line(scratch + x, height, (size_t)width, map + x);
+    pool_lines(map, height, (size_t)width, width, 1, scratch);
+    pool_lines(scratch, width, 1, height, (size_t)width, map);
+}
+
+static void square_all(const float *from, size_t n, float *to)
+{
+    for (size_t i = 0; i < n; i++)
+        to[i] = from[i] * from[i];
 }
 
 /* Weighted sums over the neighbourhood of each pixel without the middle of it: columns that are not in the middle with all
@@ -51,47 +67,61 @@ static void sum_without_middle(const float *map, int width, int height, float *s
 {
     static const int across[2][2] = {{HOLE + 1, RADIUS}, {0, HOLE}}, down[2][2] = {{0, RADIUS}, {HOLE + 1, RADIUS}};
     const size_t row = (size_t)width;
-    double total;
     memset(to, 0, row * (size_t)height * sizeof *to);
     for (int part = 0; part < 2; part++) {
         for (size_t y = 0; y < (size_t)height; y++)
             for (int x = 0; x < width; x++)
                 scratch[y * row + (size_t)x] =
-                    (float)sum_around(map + y * row, width, 1, x, across[part][0], across[part][1], &total);
+                    (float)sum_around(map + y * row, width, 1, x, across[part][0], across[part][1]);
         for (int y = 0; y < height; y++)
             for (size_t x = 0; x < row; x++)
-                to[(size_t)y * row + x] +=
-                    (float)sum_around(scratch + x, height, row, y, down[part][0], down[part][1], &total);
+                to[(size_t)y * row + x] += (float)sum_around(scratch + x, height, row, y, down[part][0], down[part][1]);
     }
 }
+
+/* What of a pooled gain is more than the noise of its estimate. square, doubt: of the gain, pooled. */
+static float sure_gain(float gain, float square, float doubt)
+{
+    const float variance = fminf(fmaxf(square - gain * gain, 0.0f), doubt) / PIXELS;
+    return gain > 0.0f ? fmaxf(gain - SURE * SURE * variance / gain, 0.0f) : 0.0f;
+}
+
+static float share(float gain, float moved) { return gain > 0.0f ? fminf(gain / moved, 1.0f) : 0.0f; }
 
 void lull_blend_weights_blind(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha)
 {
     const size_t n = (size_t)width * (size_t)height;
-    float *denoised = scratch + n, *agreed = scratch + 2 * n;
-    sum_without_middle(estimate->denoised, width, height, scratch, denoised);
-    sum_without_middle(estimate->agreed, width, height, scratch, agreed);
-    sum_without_middle(estimate->noisy, width, height, scratch, alpha);
-    for (size_t i = 0; i < n; i++) { /* of sums: their weights are the same */
-        const float mse = fmaxf(denoised[i], agreed[i]);
-        alpha[i] = mse > 0.0f ? mse / (mse + alpha[i]) : 0.0f;
+    float *gain = scratch + n, *square = scratch + 2 * n, *doubt = scratch + 3 * n;
+    square_all(estimate->gain, n, alpha);
+    sum_without_middle(alpha, width, height, scratch, square);
+    sum_without_middle(estimate->gain, width, height, scratch, gain);
+    sum_without_middle(estimate->doubt, width, height, scratch, doubt);
+    sum_without_middle(estimate->moved, width, height, scratch, alpha);
+    for (int y = 0; y < height; y++) {
+        const double rows = weigh_around(height, y, 0, RADIUS), beside = weigh_around(height, y, HOLE + 1, RADIUS);
+        for (int x = 0; x < width; x++) {
+            const size_t i = (size_t)y * (size_t)width + (size_t)x;
+            const double total = weigh_around(width, x, HOLE + 1, RADIUS) * rows + weigh_around(width, x, 0, HOLE) * beside;
+            const float scale = total > 0.0 ? (float)(1.0 / total) : 0.0f; /* a picture that is all middle */
+            alpha[i] = share(sure_gain(scale * gain[i], scale * square[i], scale * doubt[i]), scale * alpha[i]);
+        }
     }
 }
-
-float lull_blend_mse(const struct lull_estimate *pooled, size_t i) { return fmaxf(pooled->denoised[i], pooled->agreed[i]); }
 
 void lull_blend_weights(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha,
                         float *apart)
 {
     const size_t n = (size_t)width * (size_t)height;
-    memcpy(alpha, estimate->noisy, n * sizeof *alpha);
+    square_all(estimate->gain, n, alpha);
     memcpy(apart, estimate->agreed, n * sizeof *apart);
-    pool(estimate->denoised, width, height, scratch);
+    pool(alpha, width, height, scratch);
+    pool(estimate->gain, width, height, scratch);
+    pool(estimate->doubt, width, height, scratch);
+    pool(estimate->moved, width, height, scratch);
     pool(estimate->agreed, width, height, scratch);
-    pool(estimate->noisy, width, height, scratch);
     for (size_t i = 0; i < n; i++) {
-        float mse = lull_blend_mse(estimate, i), noise = fmaxf(estimate->noisy[i], alpha[i] / SPECK);
-        alpha[i] = mse > 0.0f ? mse / (mse + noise) : 0.0f;
+        const float gain = sure_gain(estimate->gain[i], alpha[i], estimate->doubt[i]);
+        alpha[i] = share(gain, fmaxf(estimate->moved[i], estimate->noisy[i] / SPECK));
         apart[i] = apart[i] > SPECK * estimate->agreed[i] ? sqrtf(SPECK * estimate->agreed[i] / apart[i]) : 1.0f;
     }
 }

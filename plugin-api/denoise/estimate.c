@@ -2,8 +2,8 @@
 
 #include <math.h>
 
-/* Squares stay finite in float and in sums of it, whatever the pixels hold. */
-static const double MOST = 1e30;
+/* Squares of what is estimated stay finite in float and in sums of it, whatever the pixels hold. */
+static const double MOST = 1e15;
 
 double lull_lightness_slope(double y)
 {
@@ -22,7 +22,11 @@ void lull_estimate_pixels(const struct lull_estimate_in *in, size_t n, const str
         const double slope = lull_lightness_slope(0.5 * (fa + fb)), unit = slope * slope;
         const double halves = (a - b) * (a - b), filtered = (fa - fb) * (fa - fb);
         const double crossed = 0.5 * ((fa - b) * (fa - b) + (fb - a) * (fb - a));
-        out->denoised[i] = bounded(unit * (crossed - 0.5 * halves - 0.25 * filtered));
+        const double moved = 0.5 * (fa + fb) - (in->share * a + (1.0 - in->share) * b);
+        out->gain[i] = bounded(unit * (crossed - 0.5 * halves - 0.25 * filtered - 0.25 * (fa - fb) * (a - b)));
+        const double apart = unit * (fa - fb + a - b) * moved;
+        out->doubt[i] = bounded(apart * apart);
+        out->moved[i] = bounded(unit * moved * moved);
         out->agreed[i] = bounded(unit * 0.25 * filtered);
         out->noisy[i] = bounded(unit * split * halves);
     }

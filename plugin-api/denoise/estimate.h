@@ -1,16 +1,23 @@
 /*
- * How wrong a denoised picture is, from two halves of the samples and no reference.
+ * What a denoised picture gains by a share of the noisy one, from two halves of the samples and no reference.
  *
- * A and B are the means of the halves, F the denoiser, D = (F(A) + F(B)) / 2 the picture. B is unbiased and independent of
- * F(A), so
+ * A and B are the means of the halves, M that of all samples, F the denoiser, D = (F(A) + F(B)) / 2 the picture, T the truth.
+ * Of all D + alpha (M - D) the one with the least mean square error has
+ *
+ *     alpha = E (D - T)(D - M) / E (D - M)^2
+ *
+ * whether the errors of D and M are independent or not. They are not, since D is made of the same samples: where the denoiser
+ * only averages, alpha is 0. The numerator is mse(D) less the covariance of both errors. B is unbiased and independent of F(A),
+ * so
  *
  *     mse(F(A)) = E (F(A) - B)^2 - var(B),     var(B) from (A - B)^2
  *
- * holds with the denoiser's bias in it; likewise for F(B). Then mse(D) is the mean of the two less (F(A) - F(B))^2 / 4,
- * exactly, and never less than (F(A) - F(B))^2 / 4, by which the halves already disagree. Nothing so sharp can be said of F
- * of all samples: it keeps bright specks that it removes from either half, where they stand out more. Differences of
- * luminance count with the slope of L* at the denoised value: L* itself of a noisy B would be biased. A single pixel's
- * estimate is noise and often negative: pool, then take the larger of the two. Pure functions, thread-safe.
+ * holds with the denoiser's bias in it, likewise for F(B); mse(D) is the mean of the two less (F(A) - F(B))^2 / 4, exactly.
+ * The covariance is that of F(A) with A and of F(B) with B: (F(A) - F(B)) (A - B) / 4. Nothing so sharp can be said of F of all
+ * samples: it keeps bright specks that it removes from either half, where they stand out more. Differences of luminance
+ * count with the slope of L* at the denoised value: L* itself of a noisy B would be biased. A single pixel's estimate is
+ * noise and often negative: pool. How strong that noise is, the two crossings tell by their difference, in which the error of the
+ * denoiser cancels. Pure functions, thread-safe.
  */
 #ifndef DENOISE_ESTIMATE_H
 #define DENOISE_ESTIMATE_H
@@ -24,9 +31,11 @@ struct lull_estimate_in { /* luminance, 1 = the display's white; [n]; finite */
 };
 
 struct lull_estimate { /* squares of L*; [n] each, the caller's */
-    float *denoised;   /* mse of D, unbiased; may be negative */
-    float *agreed;     /* (F(A) - F(B))^2 / 4: the pooled mse of D is at least the pooled one of this */
-    float *noisy;      /* variance of the mean of all samples */
+    float *gain;       /* (D - T)(D - M), unbiased; may be negative */
+    float *doubt;      /* fourth powers of L*: by how much the crossings of either half differ, a quarter of its square */
+    float *moved;      /* (D - M)^2 */
+    float *agreed;     /* (F(A) - F(B))^2 / 4 */
+    float *noisy;      /* variance of M */
 };
 
 /* The derivative of L* by Y (CIE 15:2004), Y = 1 at white; goes on above it. */

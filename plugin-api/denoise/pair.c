@@ -67,18 +67,19 @@ static int open_part(struct lull_denoised_part *part, size_t pixels, const struc
                      struct base_err *err)
 {
     float **const pictures[] = {&part->half[0], &part->half[1], &part->denoised[0], &part->denoised[1]};
-    float **const maps[] = {&part->error.denoised, &part->error.agreed, &part->error.noisy,
-                            &part->weight,         &part->apart,        &part->scratch};
+    float **const maps[] = {&part->error.gain,  &part->error.doubt, &part->error.moved, &part->error.agreed,
+                            &part->error.noisy, &part->weight,      &part->apart,       &part->scratch};
+    enum { MAPS = sizeof maps / sizeof maps[0] };
     *part = (struct lull_denoised_part){.pixels = pixels};
     if (pixels < MOST)
-        part->memory = calloc((whole ? 6u : 12u + 6u) * pixels, sizeof(float));
+        part->memory = calloc((whole ? MAPS : 12u + MAPS) * pixels, sizeof(float));
     if (!part->memory) {
         *part = (struct lull_denoised_part){0};
         return base_fail_nomem(err, "what is kept of pictures to denoise");
     }
     float *next = part->memory;
     lay_out(pictures, whole ? 0 : 4, 3 * pixels, &next);
-    lay_out(maps, 6, pixels, &next);
+    lay_out(maps, MAPS, pixels, &next);
     return 0;
 }
 
@@ -184,9 +185,10 @@ void lull_denoised_cut(struct lull_denoised_part *part, const struct lull_denois
 
 void lull_denoised_estimate(struct lull_denoised_part *part, size_t first, size_t n, const struct lull_estimate_in *in)
 {
-    const struct lull_estimate *error = &part->error;
-    lull_estimate_pixels(in, n,
-                         &(struct lull_estimate){error->denoised + first, error->agreed + first, error->noisy + first});
+    const struct lull_estimate *all = &part->error;
+    const struct lull_estimate some = {all->gain + first, all->doubt + first, all->moved + first, all->agreed + first,
+                                       all->noisy + first};
+    lull_estimate_pixels(in, n, &some);
 }
 
 void lull_denoised_weigh(struct lull_denoised_part *part)

@@ -139,7 +139,7 @@ static void a_part_is_a_picture_of_its_own(void **unused)
         }
 
     /* what estimate.h and blend.h say of these arrays */
-    static float fa[3 * PART], fb[3 * PART], maps[3][PART], scratch[PART], weight[PART], apart[PART], light[4][PART];
+    static float fa[3 * PART], fb[3 * PART], maps[5][PART], scratch[PART], weight[PART], apart[PART], light[4][PART];
     static float kept[2][3 * PART], wanted[3 * PART];
     memcpy(fa, part.denoised[0], sizeof fa);
     memcpy(fb, part.denoised[1], sizeof fb);
@@ -148,7 +148,7 @@ static void a_part_is_a_picture_of_its_own(void **unused)
         light[2][i] = fa[3 * i], light[3][i] = fb[3 * i];
     }
     const struct lull_estimate_in in = {light[0], light[1], light[2], light[3], 0.4};
-    const struct lull_estimate error = {maps[0], maps[1], maps[2]};
+    const struct lull_estimate error = {maps[0], maps[1], maps[2], maps[3], maps[4]};
     lull_estimate_pixels(&in, PART, &error);
     lull_blend_weights(&error, PW, PH, scratch, weight, apart);
     lull_blend_despeckle(apart, PART, fa, fb);
@@ -157,7 +157,7 @@ static void a_part_is_a_picture_of_its_own(void **unused)
     assert_memory_equal(part.weight, weight, sizeof weight);
     assert_memory_equal(part.denoised[0], fa, sizeof fa);
     assert_memory_equal(part.denoised[1], fb, sizeof fb);
-    assert_memory_equal(part.error.denoised, maps[0], sizeof maps[0]);
+    assert_memory_equal(part.error.gain, maps[0], sizeof maps[0]);
     float *const to[2] = {kept[0], kept[1]};
     lull_denoised_blend(&part, weight, to);
     lull_blend(part.half[1], fb, weight, PART, wanted);

@@ -27,13 +27,13 @@ int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form,
                             &v.slope,
                             &v.apart,
                             &v.weight};
-    float **const pictures[] = {&v.rgb, &v.around, &v.crossed[0], &v.crossed[1], &v.kept[0], &v.kept[1]};
-    enum { MAPS = sizeof maps / sizeof maps[0], PICTURES = sizeof pictures / sizeof pictures[0] };
+    float **const pictures[] = {&v.rgb, &v.crossed[0], &v.crossed[1], &v.kept[0], &v.kept[1]};
+    enum { MAPS = sizeof maps / sizeof maps[0], PICTURES = sizeof pictures / sizeof pictures[0], AROUND = 4 };
     int rc = lull_denoised_part_open(&v.part, pixels, err);
     if (rc) /* after it P is known to be small enough for sums below */
         return rc;
     const size_t doubles = ggn_kept_scratch(form->width, form->height);
-    v.memory = malloc(doubles * sizeof(double) + (MAPS + 3 * PICTURES) * pixels * sizeof(float));
+    v.memory = malloc(doubles * sizeof(double) + (MAPS + 3 * PICTURES + AROUND) * pixels * sizeof(float));
     if (!v.memory) {
         gd_block_view_release(&v);
         return base_fail_nomem(err, "the pictures of a block");
@@ -44,6 +44,7 @@ int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form,
         *maps[i] = next;
     for (size_t i = 0; i < PICTURES; i++, next += 3 * pixels)
         *pictures[i] = next;
+    v.around = next;
     *seen = v;
     return 0;
 }
