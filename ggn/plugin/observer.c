@@ -9,7 +9,8 @@
  *   one draw of it, so that two halves which agree by luck stop nothing.
  *
  * A block smaller than 200x200 pixels is little evidence that rare light was met. It stops only where the 200x200 pixels
- * about it show at most three times the limit.
+ * about it show at most three times the limit. One smaller than 100x100 also waits until a sample as bright as its brightest
+ * no longer matters to its mean (plugin/unmet.h).
  *
  * `error` is the visible noise over the level at which people stop seeing it, `p_noisy` the share of viewers who still do; a
  * block stops when that is at most `visible`, or `error` at most the parameter of that name. With `fps` the noise is that of
@@ -23,6 +24,7 @@
 #include "plugin/moving.h"
 #include "plugin/pair.h"
 #include "plugin/translate.h"
+#include "plugin/unmet.h"
 #include "sequence/simulate.h"
 
 enum { P_VISIBLE, P_ERROR, P_FIRST_SPP, P_GROWTH, P_FPS, P_PPD, P_COUNT };
@@ -232,9 +234,10 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
         tally.early = 1;
     else
         error = (in->means.count ? error_of_means : error_of_halves)(in, view, b, w, &tally);
-    /* What surrounds a block is read where it matters: before a stop, and where the answer is all that is wanted. */
+    /* What surrounds a block, and what it may not have met, is read where it matters: before a stop, and where the answer is
+     * all that is wanted. */
     if (!in->means.count && (error <= in->stop_error || (b->flags & LULL_BLOCK_FINAL && !isnan(error))))
-        error = fmax(error, error_around(in, view, b, w));
+        error = fmax(fmax(error, error_around(in, view, b, w)), gp_unmet_error(&in->kit, view, b));
     lull_kit_verdict(&in->kit, b, &tally, error, in->stop_error, 0, in->kit.value[P_GROWTH], d);
     if (d->action == LULL_CONTINUE && !isnan(d->predicted_spp)) /* the last steps are short: checks cost little here */
         lull_kit_continue(&in->kit, b, ggn_observer_next((double)b->spp, d->predicted_spp, in->kit.value[P_GROWTH]), d);

@@ -240,6 +240,27 @@ static void surroundings(void **state)
     }
 }
 
+/* Light that may not have been met, in closed form: a small block with a pixel that is white whatever its luck is, since one
+ * sample made it 400 times white, waits until such a sample more or less no longer moves the block's mean by a sixth of one
+ * L*. A large block, and a host without moments, do not wait. */
+static void one_bright_sample(void **state)
+{
+    const double mean = 0.2, bright = 400, at = 10, pixels = BLOCK * BLOCK;
+    (void)state;
+    fill(mean);
+    grey(5, 5, mean, mean + 1e-3, mean * mean + 1e-5); /* halves that differ */
+    grey(20, 20, at, at, at * at + bright * bright / SPP);
+    const double shown = (mean * (pixels - 1) + 1) / pixels, slope = 116 / 3.0 * pow(shown, -2.0 / 3);
+    const double wanted = sqrt(2.4 * bright / (pixels * (1.0 / 6 / slope) * SPP));
+    const struct lull_decision small = ask(0, 1, 0), whole = ask(0, 1, 1), blind = ask(0, 0, 0);
+    assert_int_equal(small.action, LULL_CONTINUE);
+    assert_true(fabs(small.error / wanted - 1) < 1e-3);
+    assert_true(whole.action == LULL_STOP && whole.error < 0.1);
+    assert_true(blind.action == LULL_STOP && blind.error < 0.1);
+    grey(20, 20, at, at, at * at + bright / 10 * bright / 10 / SPP); /* a tenth as bright */
+    assert_int_equal(ask(0, 1, 0).action, LULL_STOP);
+}
+
 static uint8_t *codes_of(const struct seq_block *b, const struct seq_record *r, struct pic_image *image)
 {
     uint8_t *codes = malloc(3 * (size_t)SIDE * SIDE);
@@ -300,7 +321,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_equal_halves), cmocka_unit_test(even_light),   cmocka_unit_test(gaussian_noise),
-        cmocka_unit_test(skewed_noise),     cmocka_unit_test(surroundings), cmocka_unit_test(one_unit),
+        cmocka_unit_test(skewed_noise),     cmocka_unit_test(surroundings), cmocka_unit_test(one_bright_sample),
+        cmocka_unit_test(one_unit),
     };
     return cmocka_run_group_tests_name("evidence", tests, NULL, NULL);
 }
