@@ -14,7 +14,7 @@ static const float weight[RADIUS + 1] = {1.0f,         0.969233234f, 0.882496903
 static const float PIXELS = 201.0f;
 
 /* Standard errors that a pooled gain must exceed to count. */
-static const float SURE = 2.0f;
+static const float SURE = 1.5f;
 
 /* A pixel whose own square is more than this many of its neighbourhood's is a speck: four standard deviations. */
 static const float SPECK = 16.0f;
@@ -108,20 +108,34 @@ void lull_blend_weights_blind(const struct lull_estimate *estimate, int width, i
     }
 }
 
-void lull_blend_weights(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha,
-                        float *apart)
+void lull_blend_shares(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha)
 {
     const size_t n = (size_t)width * (size_t)height;
     square_all(estimate->gain, n, alpha);
-    memcpy(apart, estimate->agreed, n * sizeof *apart);
     pool(alpha, width, height, scratch);
     pool(estimate->gain, width, height, scratch);
     pool(estimate->doubt, width, height, scratch);
     pool(estimate->moved, width, height, scratch);
+    for (size_t i = 0; i < n; i++)
+        alpha[i] = share(sure_gain(estimate->gain[i], alpha[i], estimate->doubt[i]), estimate->moved[i]);
+}
+
+void lull_blend_mix(const float *other, const float *alpha, size_t n, float *to)
+{
+    for (size_t i = 0; i < 3 * n; i++)
+        to[i] += alpha[i / 3] * (other[i] - to[i]);
+}
+
+void lull_blend_weights(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha,
+                        float *apart)
+{
+    const size_t n = (size_t)width * (size_t)height;
+    lull_blend_shares(estimate, width, height, scratch, alpha);
+    memcpy(apart, estimate->agreed, n * sizeof *apart);
     pool(estimate->agreed, width, height, scratch);
     for (size_t i = 0; i < n; i++) {
-        const float gain = sure_gain(estimate->gain[i], alpha[i], estimate->doubt[i]);
-        alpha[i] = share(gain, fmaxf(estimate->moved[i], estimate->noisy[i] / SPECK));
+        const float moved = estimate->moved[i], speck = estimate->noisy[i] / SPECK;
+        alpha[i] *= speck > moved ? moved / speck : 1.0f;
         apart[i] = apart[i] > SPECK * estimate->agreed[i] ? sqrtf(SPECK * estimate->agreed[i] / apart[i]) : 1.0f;
     }
 }

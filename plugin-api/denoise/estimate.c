@@ -19,15 +19,15 @@ void lull_estimate_pixels(const struct lull_estimate_in *in, size_t n, const str
     const double split = in->share * (1.0 - in->share);
     for (size_t i = 0; i < n; i++) {
         const double a = (double)in->a[i], b = (double)in->b[i], fa = (double)in->fa[i], fb = (double)in->fb[i];
+        const double xa = (double)in->xa[i], xb = (double)in->xb[i], away = fa - xa - (fb - xb);
         const double slope = lull_lightness_slope(0.5 * (fa + fb)), unit = slope * slope;
-        const double halves = (a - b) * (a - b), filtered = (fa - fb) * (fa - fb);
-        const double crossed = 0.5 * ((fa - b) * (fa - b) + (fb - a) * (fb - a));
-        const double moved = 0.5 * (fa + fb) - (in->share * a + (1.0 - in->share) * b);
-        out->gain[i] = bounded(unit * (crossed - 0.5 * halves - 0.25 * filtered - 0.25 * (fa - fb) * (a - b)));
-        const double apart = unit * (fa - fb + a - b) * moved;
-        out->doubt[i] = bounded(apart * apart);
-        out->moved[i] = bounded(unit * moved * moved);
-        out->agreed[i] = bounded(unit * 0.25 * filtered);
-        out->noisy[i] = bounded(unit * split * halves);
+        const double crossed = 0.5 * ((fa - b) * (fa - xa) + (fb - a) * (fb - xb));
+        const double other = 0.5 * (fa + fb - xa - xb), mean = 0.5 * (fa + fb - a - b);
+        const double doubt = 0.5 * unit * ((fa - fb + a - b) * other - away * mean);
+        out->gain[i] = bounded(unit * (crossed - 0.25 * (fa - fb) * away));
+        out->doubt[i] = bounded(doubt * doubt);
+        out->moved[i] = bounded(unit * other * other);
+        out->agreed[i] = bounded(unit * 0.25 * (fa - fb) * (fa - fb));
+        out->noisy[i] = bounded(unit * split * (a - b) * (a - b));
     }
 }

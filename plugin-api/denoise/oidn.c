@@ -264,6 +264,7 @@ int lull_oidn_run(struct lull_oidn *o, const struct lull_oidn_pictures *p, int (
         clean(p->albedo, &s->form, 0.0f, 1.0f, shared_picture(s, SHARED_ALBEDO));
     if (s->form.albedo && s->form.normal)
         clean(p->normal, &s->form, -1.0f, 1.0f, shared_picture(s, SHARED_NORMAL));
+    s->prefiltered = p->prefiltered;
     int rc = ask_program(o, cancelled, data, err);
     for (int k = 0; k < s->colors && !rc; k++)
         take(s, k, p->out[k]);

@@ -53,6 +53,7 @@ struct lull_oidn_pictures {
     const float *albedo;                  /* of the first non-specular hit, in [0, 1] */
     const float *normal;                  /* there, in [-1, 1] */
     float *out[LULL_OIDN_COLORS];         /* of each color, in its units; finite everywhere */
+    int32_t prefiltered;                  /* albedo and normal are denoised first, each by itself, and count as clean */
 };
 
 /* Which of the pixels [0, n) stands at i, which may lie outside, where a picture is mirrored; n > 0. */

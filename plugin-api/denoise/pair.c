@@ -59,6 +59,7 @@ void lull_denoised_close(struct lull_denoised_pair *pair)
 {
     lull_oidn_close(pair->oidn);
     free(pair->memory);
+    free(pair->again);
     *pair = (struct lull_denoised_pair){0};
 }
 
@@ -158,13 +159,34 @@ void lull_denoised_mirror(struct lull_denoised_pair *pair, struct lull_denoised_
 
 /* --- what becomes of it ------------------------------------------------------------------------------------------------ */
 
-int lull_denoised_run(struct lull_denoised_pair *pair, int (*cancelled)(void *data), void *data, struct base_err *err)
+static int run(struct lull_denoised_pair *pair, float *const out[2], int prefiltered, int (*cancelled)(void *data),
+               void *data, struct base_err *err)
 {
     const struct lull_oidn_pictures pictures = {.color = {pair->half[0], pair->half[1]},
                                                 .albedo = pair->albedo,
                                                 .normal = pair->normal,
-                                                .out = {pair->denoised[0], pair->denoised[1]}};
+                                                .out = {out[0], out[1]},
+                                                .prefiltered = prefiltered};
     return lull_oidn_run(pair->oidn, &pictures, cancelled, data, err);
+}
+
+int lull_denoised_run(struct lull_denoised_pair *pair, int (*cancelled)(void *data), void *data, struct base_err *err)
+{
+    return run(pair, pair->denoised, 0, cancelled, data, err);
+}
+
+int lull_denoised_again(struct lull_denoised_pair *pair, int (*cancelled)(void *data), void *data, struct base_err *err)
+{
+    if (!pair->albedo)
+        return 0;
+    if (!pair->again) {
+        float **const pictures[] = {&pair->other[0], &pair->other[1]};
+        float *next = pair->again = malloc(2 * 3 * pair->room * sizeof *next);
+        if (!next)
+            return base_fail_nomem(err, "pictures to denoise");
+        lay_out(pictures, 2, 3 * pair->room, &next);
+    }
+    return run(pair, pair->other, 1, cancelled, data, err);
 }
 
 void lull_denoised_cut(struct lull_denoised_part *part, const struct lull_denoised_pair *pair,
@@ -189,6 +211,13 @@ void lull_denoised_estimate(struct lull_denoised_part *part, size_t first, size_
     const struct lull_estimate some = {all->gain + first, all->doubt + first, all->moved + first, all->agreed + first,
                                        all->noisy + first};
     lull_estimate_pixels(in, n, &some);
+}
+
+void lull_denoised_mix(struct lull_denoised_part *part, const struct lull_denoised_pair *pair)
+{
+    lull_blend_shares(&part->error, part->width, part->height, part->scratch, part->weight);
+    for (int k = 0; k < 2; k++)
+        lull_blend_mix(pair->other[k], part->weight, part->pixels, part->denoised[k]);
 }
 
 void lull_denoised_weigh(struct lull_denoised_part *part)

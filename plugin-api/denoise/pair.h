@@ -7,8 +7,11 @@
  *     lull_denoised_begin     the size of the next one
  *     lull_denoised_put       half, albedo, normal: the caller reads the rectangle, pixel by pixel
  *     lull_denoised_run       denoised
+ *     lull_denoised_again     denoised with clean auxiliaries, of the frame alone
  *     lull_denoised_cut       a part: pixels that are kept, without what lies around them
  *     lull_denoised_estimate  error: the caller tells how bright the part's pixels are shown
+ *     lull_denoised_mix       the denoised halves take what they gain by those with clean auxiliaries
+ *     lull_denoised_estimate  again, by the noisy halves
  *     lull_denoised_weigh     weight and apart; specks leave the denoised halves, the error is pooled
  *     lull_denoised_blend     each half of what is kept
  *
@@ -35,6 +38,8 @@ struct lull_denoised_pair { /* owns all memory; callers read and fill the buffer
     float *half[2];         /* [pixels][3]: A and B, linear */
     float *albedo, *normal; /* [pixels][3], NULL: not in the form */
     float *denoised[2];     /* [pixels][3]: F(A) and F(B) */
+    float *other[2];        /* [pixels][3]: with clean auxiliaries; NULL until lull_denoised_again */
+    void *again;            /* owns these */
     void *memory;
 };
 
@@ -68,6 +73,10 @@ void lull_denoised_mirror(struct lull_denoised_pair *pair, struct lull_denoised_
 /* As lull_oidn_run. */
 int lull_denoised_run(struct lull_denoised_pair *pair, int (*cancelled)(void *data), void *data, struct base_err *err);
 
+/* Denoises both halves once more with albedo and normal that are denoised first, into `other`, whose memory it takes; without
+ * albedo it does nothing. As lull_oidn_run, and BASE_ENOMEM. */
+int lull_denoised_again(struct lull_denoised_pair *pair, int (*cancelled)(void *data), void *data, struct base_err *err);
+
 /* A part of at most `pixels`, which has pictures of its own; all are 0. On failure *part is zeroed. */
 int lull_denoised_part_open(struct lull_denoised_part *part, size_t pixels, struct base_err *err);
 /* The whole rectangle, whose pictures are the pair's: borrows them until the pair is closed. */
@@ -80,7 +89,9 @@ void lull_denoised_cut(struct lull_denoised_part *part, const struct lull_denois
                        struct lull_denoised_rect rect);
 /* Fills the error of the part's pixels [first, first + n). */
 void lull_denoised_estimate(struct lull_denoised_part *part, size_t first, size_t n, const struct lull_estimate_in *in);
-/* Of an error that all pixels have. */
+/* Of an error that all pixels have, by the pair's other pictures; the part is the whole rectangle. */
+void lull_denoised_mix(struct lull_denoised_part *part, const struct lull_denoised_pair *pair);
+/* Of an error that all pixels have, by the noisy halves. */
 void lull_denoised_weigh(struct lull_denoised_part *part);
 /* kept: two pictures [pixels][3] of the part: of each half, `weight` of the noisy and the rest of the denoised. */
 void lull_denoised_blend(const struct lull_denoised_part *part, const float *weight, float *const kept[2]);

@@ -95,22 +95,28 @@ static float shown(const struct picture *p, const float *rgb)
     return (float)(y > 0.0 ? fmin(y, 1.0) : 0.0);
 }
 
-/* Where there are no halves it stays 0: the denoised picture is kept. */
-static void estimate(struct picture *p, const struct lull_kit_span *s, size_t at)
+/* What the denoised halves gain by two other pictures. Where there are no halves it stays 0: the denoised picture is kept. */
+static void estimate(struct picture *p, const struct lull_kit_span *s, size_t at, float *const other[2])
 {
     const struct lull_denoised_part *part = &p->part;
     const double share = (double)s->block->half_spp / (double)s->block->spp;
-    float light[4][LULL_KIT_SPAN_MAX];
+    float *const pictures[6] = {part->half[0], part->half[1], part->denoised[0], part->denoised[1], other[0], other[1]};
+    float light[6][LULL_KIT_SPAN_MAX];
     if (s->block->half_spp == 0 || s->block->half_spp >= s->block->spp)
         return;
     for (size_t i = 0; i < (size_t)s->count; i++)
-        for (int k = 0; k < 2; k++) {
-            light[k][i] = shown(p, part->half[k] + 3 * (at + i));
-            light[2 + k][i] = shown(p, part->denoised[k] + 3 * (at + i));
-        }
-    const struct lull_estimate_in in = {light[0], light[1], light[2], light[3], share};
+        for (int k = 0; k < 6; k++)
+            light[k][i] = shown(p, pictures[k] + 3 * (at + i));
+    const struct lull_estimate_in in = {light[0], light[1], light[2], light[3], light[4], light[5], share};
     lull_denoised_estimate(&p->part, at, (size_t)s->count, &in);
 }
+
+static void estimate_other(struct picture *p, const struct lull_kit_span *s, size_t at)
+{
+    estimate(p, s, at, p->pair.other);
+}
+
+static void estimate_noisy(struct picture *p, const struct lull_kit_span *s, size_t at) { estimate(p, s, at, p->part.half); }
 
 /* The mean of the denoised halves, and how much of the noisy picture each pixel takes. */
 static int32_t denoise_halves(struct picture *p, float *denoised, struct lull_error *err)
@@ -118,9 +124,14 @@ static int32_t denoise_halves(struct picture *p, float *denoised, struct lull_er
     const struct lull_denoised_part *part = &p->part;
     struct base_err why = {0};
     each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF), read_halves);
-    if (lull_denoised_run(&p->pair, p->how->cancelled, p->how->context, &why))
+    if (lull_denoised_run(&p->pair, p->how->cancelled, p->how->context, &why) ||
+        lull_denoised_again(&p->pair, p->how->cancelled, p->how->context, &why))
         return lull_host_translate(&why, err);
-    each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), estimate);
+    if (p->pair.other[0]) {
+        each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), estimate_other);
+        lull_denoised_mix(&p->part, &p->pair);
+    }
+    each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), estimate_noisy);
     lull_denoised_weigh(&p->part);
     for (size_t i = 0; i < 3 * part->pixels; i++)
         denoised[i] = 0.5f * part->denoised[0][i] + 0.5f * part->denoised[1][i];

@@ -6,6 +6,8 @@
  *     no-device, commit (fails when a filter is committed), crash (there), memory (fails when one is executed), endless,
  *     auxiliary (albedo + normal), despeckle (the box where a value is more than four times its mean)
  *
+ * Albedo or normal alone become their box: clean auxiliaries.
+ *
  * It also refuses what the real library would take in silence and get wrong: pictures that are not finite, no inputScale.
  */
 #include <math.h>
@@ -46,7 +48,7 @@ struct image {
 struct filter {
     struct device *device;
     struct image color, albedo, normal, output;
-    bool hdr;
+    bool hdr, clean;
     float scale;
 };
 
@@ -151,6 +153,8 @@ void oidnSetFilterBool(void *filter, const char *name, bool value)
 {
     if (!strcmp(name, "hdr"))
         ((struct filter *)filter)->hdr = value;
+    if (!strcmp(name, "cleanAux"))
+        ((struct filter *)filter)->clean = value;
 }
 
 void oidnSetFilterInt(void *filter, const char *name, int value)
@@ -173,6 +177,12 @@ static int within(const struct image *i, float lo, float hi)
     return 1;
 }
 
+/* The picture that a filter is about. */
+static const struct image *main_of(const struct filter *f)
+{
+    return f->color.data ? &f->color : f->albedo.data ? &f->albedo : &f->normal;
+}
+
 void oidnCommitFilter(void *filter)
 {
     const struct filter *f = filter;
@@ -180,10 +190,12 @@ void oidnCommitFilter(void *filter)
         abort();
     if (f->device->kind == COMMIT)
         fail(f->device, INVALID_OPERATION, "the stub was told to refuse");
-    else if (!f->hdr || !(f->scale > 0))
+    else if (f->color.data && (!f->hdr || !(f->scale > 0)))
         fail(f->device, INVALID_OPERATION, "hdr and inputScale are missing");
-    else if (!f->color.data || !f->output.data || (f->normal.data && !f->albedo.data))
+    else if (!main_of(f)->data || !f->output.data || (f->color.data && f->normal.data && !f->albedo.data))
         fail(f->device, INVALID_OPERATION, "an image is missing");
+    else if (f->clean && !f->albedo.data)
+        fail(f->device, INVALID_OPERATION, "no auxiliary is clean");
 }
 
 static float mean_at(const struct image *i, size_t x, size_t y, size_t c)
@@ -203,11 +215,31 @@ static float despeckled_at(const struct image *i, size_t k, size_t x, size_t y, 
 
 static float value_of(const struct image *i, size_t k) { return i->data ? i->data[k] : 0.0f; }
 
+/* In place. */
+static void clean(const struct image *i)
+{
+    const size_t bytes = 3 * i->width * i->height * sizeof(float);
+    float *copy = malloc(bytes);
+    if (!copy)
+        abort();
+    memcpy(copy, i->data, bytes);
+    const struct image from = {copy, i->width, i->height};
+    for (size_t y = 0, k = 0; y < i->height; y++)
+        for (size_t x = 0; x < i->width; x++)
+            for (size_t c = 0; c < 3; c++, k++)
+                i->data[k] = mean_at(&from, x, y, c);
+    free(copy);
+}
+
 void oidnExecuteFilter(void *filter)
 {
     const struct filter *f = filter;
     const struct image *in = &f->color;
     const int kind = f->device->kind;
+    if (!in->data) {
+        clean(main_of(f));
+        return;
+    }
     if (!within(in, 0, INFINITY) || !within(&f->albedo, 0, 1) || !within(&f->normal, -1, 1))
         fail(f->device, INVALID_ARGUMENT, "a picture is not finite or out of its range");
     if (kind == MEMORY)

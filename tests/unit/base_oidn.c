@@ -154,7 +154,7 @@ static void bad_numbers(void **unused)
         albedo[i] = i % 3 ? 2.0f : NAN;
         normal[i] = i % 3 ? -3.0f : INFINITY;
     }
-    struct lull_oidn_pictures p = {{color, color}, albedo, normal, {out, other}};
+    struct lull_oidn_pictures p = {{color, color}, albedo, normal, {out, other}, 0};
     struct lull_oidn_form form = {
         .width = W, .height = H, .albedo = 1, .normal = 1, .quality = LULL_OIDN_FAST, .threads = 1, .exposure = 0.5f};
     static const char *const kinds[] = {"identity", "nan"};
@@ -168,6 +168,30 @@ static void bad_numbers(void **unused)
         assert_memory_equal(out, other, sizeof out);
         lull_oidn_close(o);
     }
+}
+
+/* Auxiliaries are denoised first where that is asked for, each by itself; the caller's stay as they are. */
+static void prefiltered(void **unused)
+{
+    (void)unused;
+    enum { W = 15, H = 15, N = 3 * W * H, MIDDLE = 3 * (7 * W + 7) };
+    static float color[N], albedo[N], normal[N], out[N];
+    const struct lull_oidn_form form = {
+        .width = W, .height = H, .albedo = 1, .normal = 1, .quality = LULL_OIDN_HIGH, .threads = 1, .exposure = 1};
+    struct lull_oidn_pictures p = {.color = {color}, .albedo = albedo, .normal = normal, .out = {out}};
+    struct lull_oidn *o = open_stub("auxiliary");
+    struct base_err err = {0};
+    albedo[MIDDLE] = 1;
+    normal[MIDDLE + 3] = -0.5f;
+    for (int clean = 0; clean < 2; clean++) {
+        p.prefiltered = clean;
+        if (lull_oidn_prepare(o, &form, &err) || lull_oidn_run(o, &p, NULL, NULL, &err))
+            fail_msg("%s", err.text);
+        assert_true(fabsf(out[MIDDLE] - (clean ? 0.5f / 25 : 1)) < 1e-6f);
+        assert_true(fabsf(out[MIDDLE - 6] - (clean ? 1.0f / 25 : 0)) < 1e-6f);
+        assert_true(albedo[MIDDLE] == 1 && normal[MIDDLE + 3] == -0.5f);
+    }
+    lull_oidn_close(o);
 }
 
 /* The margin is the picture, mirrored, and does not come back: at each pixel the stub's mean of 5x5 reaches into it. */
@@ -309,9 +333,9 @@ int main(void)
     if (api_folder(stub, sizeof stub, "../oidn-stub") != 0)
         return 1;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(finding),      cmocka_unit_test(failures),    cmocka_unit_test(cancelling),
-        cmocka_unit_test(staying),      cmocka_unit_test(bad_numbers), cmocka_unit_test(mirrored),
-        cmocka_unit_test(real_library), cmocka_unit_test(real_margin),
+        cmocka_unit_test(finding),  cmocka_unit_test(failures),     cmocka_unit_test(cancelling),
+        cmocka_unit_test(staying),  cmocka_unit_test(bad_numbers),  cmocka_unit_test(prefiltered),
+        cmocka_unit_test(mirrored), cmocka_unit_test(real_library), cmocka_unit_test(real_margin),
     };
     return cmocka_run_group_tests_name("oidn", tests, NULL, NULL);
 }

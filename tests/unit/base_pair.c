@@ -106,9 +106,10 @@ static void estimate_all(struct lull_denoised_part *part, double share)
             light[2 + k][i] = shown(part->denoised[k] + 3 * i);
         }
     const size_t first = part->pixels / 3; /* in two goes */
-    struct lull_estimate_in in = {light[0], light[1], light[2], light[3], share};
+    struct lull_estimate_in in = {light[0], light[1], light[2], light[3], light[0], light[1], share};
     lull_denoised_estimate(part, 0, first, &in);
-    in = (struct lull_estimate_in){light[0] + first, light[1] + first, light[2] + first, light[3] + first, share};
+    in = (struct lull_estimate_in){
+        light[0] + first, light[1] + first, light[2] + first, light[3] + first, light[0] + first, light[1] + first, share};
     lull_denoised_estimate(part, first, part->pixels - first, &in);
 }
 
@@ -147,7 +148,7 @@ static void a_part_is_a_picture_of_its_own(void **unused)
         light[0][i] = part.half[0][3 * i], light[1][i] = part.half[1][3 * i];
         light[2][i] = fa[3 * i], light[3][i] = fb[3 * i];
     }
-    const struct lull_estimate_in in = {light[0], light[1], light[2], light[3], 0.4};
+    const struct lull_estimate_in in = {light[0], light[1], light[2], light[3], light[0], light[1], 0.4};
     const struct lull_estimate error = {maps[0], maps[1], maps[2], maps[3], maps[4]};
     lull_estimate_pixels(&in, PART, &error);
     lull_blend_weights(&error, PW, PH, scratch, weight, apart);

@@ -89,8 +89,13 @@ static void show_halves(struct gd_block_view *seen, const struct lull_kit *kit)
 static void blend_halves(struct gd_block_view *seen, double share)
 {
     struct lull_denoised_part *part = &seen->part;
-    const struct lull_estimate_in in = {seen->noisy_light[0], seen->noisy_light[1], seen->denoised_light[0],
-                                        seen->denoised_light[1], share};
+    const struct lull_estimate_in in = {seen->noisy_light[0],
+                                        seen->noisy_light[1],
+                                        seen->denoised_light[0],
+                                        seen->denoised_light[1],
+                                        seen->noisy_light[0],
+                                        seen->noisy_light[1],
+                                        share};
     lull_denoised_estimate(part, 0, part->pixels, &in);
     lull_blend_weights_blind(&part->error, part->width, part->height, seen->around, seen->weight);
     lull_denoised_weigh(part);

@@ -188,10 +188,8 @@ static void give(const struct library *o, filter_t filter, const char *name, str
     o->set_image(filter, name, shared_picture(s, which), FORMAT_FLOAT3, width, height, 0, pixel, pixel * width);
 }
 
-static int run(const struct library *o, filter_t filter, struct shared *s, int which, struct base_err *err)
+static int execute(const struct library *o, filter_t filter, struct base_err *err)
 {
-    give(o, filter, "color", s, SHARED_COLOR + which);
-    give(o, filter, "output", s, SHARED_OUT + which);
     o->commit_filter(filter);
     int rc = check(o, "prepare its filter", err);
     if (rc)
@@ -200,21 +198,60 @@ static int run(const struct library *o, filter_t filter, struct shared *s, int w
     return check(o, "denoise", err);
 }
 
-static int run_all(const struct library *o, struct shared *s, struct base_err *err)
+static int make_filter(const struct library *o, filter_t *filter, struct base_err *err)
 {
-    filter_t filter = o->new_filter(o->device, "RT");
+    *filter = o->new_filter(o->device, "RT");
     int rc = check(o, "make its filter", err);
-    if (rc || !filter)
-        return rc ? rc : base_fail(err, BASE_EINVAL, "Open Image Denoise makes no filter");
+    return rc || *filter ? rc : base_fail(err, BASE_EINVAL, "Open Image Denoise makes no filter");
+}
+
+/* An auxiliary picture by itself, in place. */
+static int prefilter(const struct library *o, const char *name, struct shared *s, int which, struct base_err *err)
+{
+    filter_t filter;
+    int rc = make_filter(o, &filter, err);
+    if (rc)
+        return rc;
+    give(o, filter, name, s, which);
+    give(o, filter, "output", s, which);
+    o->set_int(filter, "quality", s->form.quality);
+    rc = execute(o, filter, err);
+    o->release_filter(filter);
+    return rc;
+}
+
+static int run_colors(const struct library *o, filter_t filter, struct shared *s, struct base_err *err)
+{
+    int rc = 0;
     if (s->form.albedo)
         give(o, filter, "albedo", s, SHARED_ALBEDO);
     if (s->form.albedo && s->form.normal)
         give(o, filter, "normal", s, SHARED_NORMAL);
     o->set_bool(filter, "hdr", true);
+    o->set_bool(filter, "cleanAux", s->prefiltered != 0);
     o->set_float(filter, "inputScale", s->form.exposure); /* else an exposure of this very crop */
     o->set_int(filter, "quality", s->form.quality);
-    for (int i = 0; i < s->colors && !rc; i++)
-        rc = run(o, filter, s, i, err);
+    for (int i = 0; i < s->colors && !rc; i++) {
+        give(o, filter, "color", s, SHARED_COLOR + i);
+        give(o, filter, "output", s, SHARED_OUT + i);
+        rc = execute(o, filter, err);
+    }
+    return rc;
+}
+
+static int run_all(const struct library *o, struct shared *s, struct base_err *err)
+{
+    filter_t filter;
+    int rc = 0;
+    if (s->prefiltered && s->form.albedo)
+        rc = prefilter(o, "albedo", s, SHARED_ALBEDO, err);
+    if (!rc && s->prefiltered && s->form.albedo && s->form.normal)
+        rc = prefilter(o, "normal", s, SHARED_NORMAL, err);
+    if (!rc)
+        rc = make_filter(o, &filter, err);
+    if (rc)
+        return rc;
+    rc = run_colors(o, filter, s, err);
     o->release_filter(filter);
     return rc;
 }

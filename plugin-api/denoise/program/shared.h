@@ -21,10 +21,10 @@ enum {
 
 struct shared {
     struct lull_oidn_form form; /* width 0: only say the version */
-    int32_t colors;
+    int32_t colors, prefiltered;
     int32_t code; /* BASE_ */
     char version[32];
-    char text[440]; /* the pictures begin at byte 512 */
+    char text[436]; /* the pictures begin at byte 512 */
 };
 
 static inline float *shared_picture(struct shared *s, int which)
