@@ -1,15 +1,15 @@
 /*
  * What a denoised picture gains by a share of another one, from two halves of the samples and no reference.
  *
- * A and B are the means of the halves, M that of all samples, F the denoiser, D = (F(A) + F(B)) / 2 the picture, T the truth. The
- * other picture, X = (X(A) + X(B)) / 2, is the noisy one (X(A) = A) or that of another denoiser. Of all D + alpha (X - D) the one
- * with the least mean square error has
+ * A and B are the means of the halves, M that of all samples, F the denoiser, D = (F(A) + F(B)) / 2 the picture, T the
+ * truth. The other picture, X = (X(A) + X(B)) / 2, is the noisy one (X(A) = A) or that of another denoiser. Of all D + alpha
+ * (X - D) the one with the least mean square error has
  *
  *     alpha = E (D - T)(D - X) / E (D - X)^2
  *
  * whether the errors of D and X are independent or not. They are not, since both are made of the same samples: where the
- * denoiser only averages, alpha of the noisy picture is 0. In the numerator the half that a picture is not made of stands for T,
- * unbiased and independent of it,
+ * denoiser only averages, alpha of the noisy picture is 0. In the numerator the half that a picture is not made of stands
+ * for T, unbiased and independent of it,
  *
  *     E ((F(A) - B)(F(A) - X(A)) + (F(B) - A)(F(B) - X(B))) / 2 - (F(A) - F(B))((F(A) - X(A)) - (F(B) - X(B))) / 4
  *

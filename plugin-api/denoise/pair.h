@@ -63,8 +63,8 @@ void lull_denoised_close(struct lull_denoised_pair *pair);
 
 /* A rectangle of at most pair->room pixels; all four pictures that are read are 0. */
 void lull_denoised_begin(struct lull_denoised_pair *pair, int32_t width, int32_t height);
-/* Both halves of pixel `at` of the rectangle, from the mean of n samples and that of h of them; the mean twice where these
- * are none or all. Returns whether all are finite. */
+/* Both halves of pixel `at` of the rectangle, from the mean of n samples and that of h of them; the mean twice where
+ * these are none or all. Returns whether all are finite. */
 int lull_denoised_put(struct lull_denoised_pair *pair, size_t at, const double mean[3], const double half[3], double n,
                       double h);
 /* What lies outside `known` is its pixels mirrored on, in all four pictures. */
@@ -73,8 +73,8 @@ void lull_denoised_mirror(struct lull_denoised_pair *pair, struct lull_denoised_
 /* As lull_oidn_run. */
 int lull_denoised_run(struct lull_denoised_pair *pair, int (*cancelled)(void *data), void *data, struct base_err *err);
 
-/* Denoises both halves once more with albedo and normal that are denoised first, into `other`, whose memory it takes; without
- * albedo it does nothing. As lull_oidn_run, and BASE_ENOMEM. */
+/* Denoises both halves once more with albedo and normal that are denoised first, into `other`, whose memory it takes;
+ * without albedo it does nothing. As lull_oidn_run, and BASE_ENOMEM. */
 int lull_denoised_again(struct lull_denoised_pair *pair, int (*cancelled)(void *data), void *data, struct base_err *err);
 
 /* A part of at most `pixels`, which has pictures of its own; all are 0. On failure *part is zeroed. */

@@ -95,7 +95,7 @@ static float shown(const struct picture *p, const float *rgb)
     return (float)(y > 0.0 ? fmin(y, 1.0) : 0.0);
 }
 
-/* What the denoised halves gain by two other pictures. Where there are no halves it stays 0: the denoised picture is kept. */
+/* What the denoised halves gain by two others. Where there are no halves it stays 0: the denoised picture is kept. */
 static void estimate(struct picture *p, const struct lull_kit_span *s, size_t at, float *const other[2])
 {
     const struct lull_denoised_part *part = &p->part;
