@@ -85,14 +85,16 @@ static void read_auxiliary(struct picture *p, const struct lull_kit_span *s, siz
 
 /* --- denoising --------------------------------------------------------------------------------------------------------- */
 
-/* Luminance as a display shows it, 1 is its white. */
-static float shown(const struct picture *p, const float *rgb)
+/* Luminance by which pictures are compared, 1 is the display's white: what is far beyond shows no noise. What is little beyond
+ * counts as it is, since a noisy half that is cut off at white is darker than the truth in the mean. */
+static float compared(const struct picture *p, const float *rgb)
 {
+    const double most = 4.0;
     double y = 0.0;
     for (int c = 0; c < 3; c++)
         y += p->luminance[c] * (double)rgb[c];
     y *= p->exposure;
-    return (float)(y > 0.0 ? fmin(y, 1.0) : 0.0);
+    return (float)(y > 0.0 ? fmin(y, most) : 0.0);
 }
 
 /* What the denoised halves gain by two others. Where there are no halves it stays 0: the denoised picture is kept. */
@@ -106,7 +108,7 @@ static void estimate(struct picture *p, const struct lull_kit_span *s, size_t at
         return;
     for (size_t i = 0; i < (size_t)s->count; i++)
         for (int k = 0; k < 6; k++)
-            light[k][i] = shown(p, pictures[k] + 3 * (at + i));
+            light[k][i] = compared(p, pictures[k] + 3 * (at + i));
     const struct lull_estimate_in in = {light[0], light[1], light[2], light[3], light[4], light[5], share};
     lull_denoised_estimate(&p->part, at, (size_t)s->count, &in);
 }
