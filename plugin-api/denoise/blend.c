@@ -91,21 +91,11 @@ static float share(float gain, float moved) { return gain > 0.0f ? fminf(gain / 
 void lull_blend_weights_blind(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha)
 {
     const size_t n = (size_t)width * (size_t)height;
-    float *gain = scratch + n, *square = scratch + 2 * n, *doubt = scratch + 3 * n;
-    square_all(estimate->gain, n, alpha);
-    sum_without_middle(alpha, width, height, scratch, square);
+    float *gain = scratch + n;
     sum_without_middle(estimate->gain, width, height, scratch, gain);
-    sum_without_middle(estimate->doubt, width, height, scratch, doubt);
     sum_without_middle(estimate->moved, width, height, scratch, alpha);
-    for (int y = 0; y < height; y++) {
-        const double rows = weigh_around(height, y, 0, RADIUS), beside = weigh_around(height, y, HOLE + 1, RADIUS);
-        for (int x = 0; x < width; x++) {
-            const size_t i = (size_t)y * (size_t)width + (size_t)x;
-            const double total = weigh_around(width, x, HOLE + 1, RADIUS) * rows + weigh_around(width, x, 0, HOLE) * beside;
-            const float scale = total > 0.0 ? (float)(1.0 / total) : 0.0f; /* a picture that is all middle */
-            alpha[i] = share(sure_gain(scale * gain[i], scale * square[i], scale * doubt[i]), scale * alpha[i]);
-        }
-    }
+    for (size_t i = 0; i < n; i++) /* of sums: their weights are the same */
+        alpha[i] = share(gain[i], alpha[i]);
 }
 
 void lull_blend_shares(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha)

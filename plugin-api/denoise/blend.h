@@ -32,10 +32,10 @@ void lull_blend_mix(const float *other, const float *alpha, size_t n, float *to)
 void lull_blend_weights(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha,
                         float *apart);
 
-/* alpha from the neighbourhood alone, without the 5x5 pixels in its middle. The maps as they are before they are pooled;
- * scratch: [4][height][width]. Weights that a pixel's own samples have chosen make its error look small, by a third of the
- * mean square in the scenes of docs/results/denoised.md: what crosses a blend with the other half crosses one of these,
- * whose own error is larger by a few per cent. */
+/* alpha from the neighbourhood alone, without the 5x5 pixels in its middle, of the whole gain. The maps as they are before
+ * they are pooled; scratch: [2][height][width]. Weights that a pixel's own samples have chosen make its error look small, by
+ * a third of the mean square in the scenes of docs/results/denoised.md: what crosses a blend with the other half crosses one
+ * of these, whose own error is larger by a few per cent. */
 void lull_blend_weights_blind(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha);
 
 /* Takes the specks from denoised halves [n][3]. */

@@ -85,8 +85,8 @@ static void read_auxiliary(struct picture *p, const struct lull_kit_span *s, siz
 
 /* --- denoising --------------------------------------------------------------------------------------------------------- */
 
-/* Luminance by which pictures are compared, 1 is the display's white: what is far beyond shows no noise. What is little beyond
- * counts as it is, since a noisy half that is cut off at white is darker than the truth in the mean. */
+/* Luminance by which pictures are compared, 1 is the display's white: what is far beyond shows no noise. What is little
+ * beyond counts as it is, since a noisy half that is cut off at white is darker than the truth in the mean. */
 static float compared(const struct picture *p, const float *rgb)
 {
     const double most = 4.0;

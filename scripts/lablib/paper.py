@@ -58,6 +58,8 @@ def judged(replay, published):
     for i, block in enumerate(replay["blocks"]):
         view = views[block["view"]]["name"]
         for k, (spp, noisy, error) in enumerate(zip(block["spp"], block["noisy"], block["error"])):
+            if noisy is None:
+                continue  # beyond where the study ended
             share = statistics.NormalDist().cdf(math.log2(max(error, 1e-6)) / spread)
             for name, score in (("lull-3", model["scores"][i][k]), ("law", share), ("-spp", -spp)):
                 windows[name].append((view, score, noisy))

@@ -282,7 +282,7 @@ static void blind_weights_are_no_flattery(void **unused)
 {
     (void)unused;
     enum { PICTURES = 16 };
-    static float blind[N], around[4 * N], one[1], rest[4];
+    static float blind[N], around[2 * N], one[1], rest[2];
     const double truth = 0.4, sigma = 0.02;
     double own[2] = {0}, others[2] = {0};
     state = 7;

@@ -26,7 +26,7 @@ struct gd_block_view {
     float *apart_lightness[2];      /* [P]: L* of the mean and of the darker kept half, each where it belongs */
     float *slope, *apart;           /* [P]: struct ggn_kept */
     float *weight;                  /* [P]: of the neighbourhood */
-    float *around;                  /* [4][P]: scratch of it */
+    float *around;                  /* [2][P]: scratch of it */
     float *crossed[2];              /* [P][3]: those blends */
     float *kept[2];                 /* [P][3] */
     double *judging;                /* scratch of observer/kept.h */
