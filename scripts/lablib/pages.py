@@ -8,7 +8,7 @@ import os
 import re
 import sys
 
-from lablib import (agreement, ablation, bench, cost_page, denoised, kept, peers, profile, published, quote_accuracy, references, scale,
+from lablib import (agreement, ablation, bench, cost_page, denoised, kept, paper, peers, profile, published, quote_accuracy, references, scale,
                     shots, tool, truth)
 
 TEMPLATES = os.path.join(tool.ROOT, "scripts", "lablib", "templates")
@@ -43,7 +43,7 @@ def made(docs):
                              undefined=jinja2.StrictUndefined)
     jobs = {name: Job(module, tool.results(docs, name)) for name, module in (
         ("agreement", agreement), ("ablation", ablation), ("bench", bench), ("cost", cost_page), ("quote", quote_accuracy),
-        ("references", references), ("profile", profile), ("scale", scale), ("denoised", denoised), ("kept", kept),
+        ("references", references), ("profile", profile), ("scale", scale), ("denoised", denoised), ("kept", kept), ("paper", paper),
         ("peers", peers), ("shots", shots), ("published", published), ("truth", truth))}
 
     def of_figures(name, make):

@@ -205,7 +205,8 @@ static int make_filter(const struct library *o, filter_t *filter, struct base_er
     return rc || *filter ? rc : base_fail(err, BASE_EINVAL, "Open Image Denoise makes no filter");
 }
 
-/* An auxiliary picture by itself, in place. */
+/* An auxiliary picture by itself, in place. The fast network does: with the best one, at 2.5 times the price, what is made of
+ * it is up to 2 % less wrong. */
 static int prefilter(const struct library *o, const char *name, struct shared *s, int which, struct base_err *err)
 {
     filter_t filter;
@@ -214,7 +215,7 @@ static int prefilter(const struct library *o, const char *name, struct shared *s
         return rc;
     give(o, filter, name, s, which);
     give(o, filter, "output", s, which);
-    o->set_int(filter, "quality", s->form.quality);
+    o->set_int(filter, "quality", LULL_OIDN_FAST);
     rc = execute(o, filter, err);
     o->release_filter(filter);
     return rc;
