@@ -205,8 +205,8 @@ static int make_filter(const struct library *o, filter_t *filter, struct base_er
     return rc || *filter ? rc : base_fail(err, BASE_EINVAL, "Open Image Denoise makes no filter");
 }
 
-/* An auxiliary picture by itself, in place. The fast network does: with the best one, at 2.5 times the price, what is made of
- * it is up to 2 % less wrong. */
+/* An auxiliary picture by itself, in place. The fast network does: by the best one, at 2.5 times the price, what is made
+ * of it is up to 2 % less wrong. */
 static int prefilter(const struct library *o, const char *name, struct shared *s, int which, struct base_err *err)
 {
     filter_t filter;
