@@ -53,9 +53,7 @@ int pt_watch_display(struct pt_watch *w, struct base_err *err)
     const struct pt_open *o = w->open;
     int32_t code = lull_host_display_open(o->render->frame, o->cli->display, base_file_name(o->frame->paths[PT_SCENE]),
                                           &w->display, &e);
-    return code == LULL_OK
-               ? 0
-               : base_fail(err, code == LULL_E_MEMORY ? BASE_ENOMEM : BASE_EINVAL, "--display-server %s", e.message);
+    return code == LULL_OK ? 0 : base_fail(err, pt_host_result(code, &e, NULL), "--display-server %s", e.message);
 }
 
 void pt_watch_end(struct pt_watch *w)
