@@ -289,8 +289,8 @@ static void cut_block(const struct row *row, const struct pair *p, int x0, uint3
             }
 }
 
-/* What can be told without the samples' squares: errors by the half buffer, its tail. */
-static uint32_t tell(const struct row *row, uint32_t spp, struct seq_stat stats[SEQ_STATISTICS])
+/* What is known without the samples' squares: errors by the half buffer, its tail. */
+static uint32_t fill_stats(const struct row *row, uint32_t spp, struct seq_stat stats[SEQ_STATISTICS])
 {
     static const int known[] = {SEQ_DAMMERTZ, SEQ_HALF_UNSETTLED, SEQ_TAIL999, SEQ_GINI};
     struct seq_stat all[SEQ_STATISTICS];
@@ -314,7 +314,7 @@ static int add_picture(struct row *row, const struct pair *p, uint32_t spp, int 
             f.half_spp = spp / 2;
             f.full = full;
             f.stats = stats;
-            f.n_stats = tell(row, spp, stats);
+            f.n_stats = fill_stats(row, spp, stats);
         }
         rc = seq_builder_add(&row->builders[c], &f, err);
     }

@@ -67,7 +67,7 @@ void ggn_window_planes(const struct ggn_level_series *series, int last, int leng
 int ggn_noise_map_plane(const struct ggn_level_series *series, int last, int width, int height,
                         const struct ggn_augment *augment, float *plane);
 
-/* What a residual network is told of the window that ends at `last`, whose error is so many octaves; with measures. */
+/* The scalars for a residual network of the window that ends at `last`, whose error is so many octaves; with measures. */
 void ggn_window_scalars(const struct ggn_level_series *series, int last, int length, double error,
                         float scalars[GGN_SCALARS]);
 

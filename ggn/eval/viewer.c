@@ -91,8 +91,8 @@ static uint16_t *denoised(struct ggn_viewer *v, int level, const int *needed, in
     return v->denoised[spare];
 }
 
-/* What a residual model is told of a window. */
-static void tell(const struct ggn_viewer *v, const int *levels, float scalars[GGN_SCALARS])
+/* The scalars of a window for a residual model. */
+static void fill_scalars(const struct ggn_viewer *v, const int *levels, float scalars[GGN_SCALARS])
 {
     struct ggn_measure window[GGN_WINDOW_MAX];
     double spp[GGN_WINDOW_MAX];
@@ -125,7 +125,7 @@ double ggn_viewer_logit(void *viewer, const int *levels)
         v->noise_maps && v->series->has_noise_map[last] ? v->series->noise_map + pixels * (size_t)last : NULL;
     float scalars[GGN_SCALARS] = {0};
     if (v->law)
-        tell(v, levels, scalars);
+        fill_scalars(v, levels, scalars);
     known->logit = v->exact
                        ? ggn_exact_logit(v->exact, noisy, clean, noise_map, scalars)
                        : ggn_inference_logit(v->inference, noisy, clean, noise_map, scalars, v->set->width, v->set->height);

@@ -1,6 +1,6 @@
 /*
  * What is measured of a block's image beside its pixels: the law of visible noise (model/visibility.h), and what tells when
- * that law may err. Residual networks are anchored to the first and told the rest.
+ * that law may err. Residual networks are anchored to the first and given the rest.
  *
  * A meter owns the scratch memory for blocks of any shape up to its number of pixels; one call at a time per meter.
  */
@@ -20,7 +20,7 @@ struct ggn_measure {
     double uneven;    /* log2 of the noisiest patch over r, >= 0 */
 };
 
-/* What a residual network is told of a window: log2 of the newest image's error, how far log2 r has moved from -1/2 log2 n
+/* A residual network's scalars of a window: log2 of the newest image's error, how far log2 r has moved from -1/2 log2 n
  * over the window and since the last image, and the newest image's texture, lightness, peak and unevenness, each about 0. */
 enum { GGN_SCALARS = 7 };
 

@@ -127,7 +127,7 @@ static void build_discriminator(struct ggn_graph *g, const struct ggn_hyper *p)
     int x = 0;
 
     ggn_graph_begin(g, "discriminator", p->noise_map ? 4 : 2, p->height, p->width);
-    const int told = p->scalars ? ggn_graph_input(g, p->scalars) : -1;
+    const int scalars = p->scalars ? ggn_graph_input(g, p->scalars) : -1;
     for (int i = 0; i < 3; i++) {
         ggn_graph_stage(g, conv[i]);
         x = ggn_graph_conv_strided(g, x, k << i, 3, 2);
@@ -140,14 +140,14 @@ static void build_discriminator(struct ggn_graph *g, const struct ggn_hyper *p)
     x = ggn_graph_flatten(g, x);
     for (int i = 0; i < 3; i++) {
         ggn_graph_stage(g, fc[i]);
-        x = ggn_graph_linear(g, x, told, 4 * k >> i);
+        x = ggn_graph_linear(g, x, scalars, 4 * k >> i);
         ggn_graph_mark(g, x, fc[i]);
         x = ggn_graph_bn(g, x);
         x = ggn_graph_lrelu(g, x, SLOPE);
         x = ggn_graph_dropout(g, x, 0.5);
     }
     ggn_graph_stage(g, "fc4");
-    x = ggn_graph_linear(g, x, told, 1);
+    x = ggn_graph_linear(g, x, scalars, 1);
     if (p->preset == GGN_PRESET_PAPER) {
         x = ggn_graph_lrelu(g, x, SLOPE);
         ggn_graph_dropout(g, x, 0.5);

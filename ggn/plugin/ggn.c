@@ -155,7 +155,7 @@ static double law(void *data)
         ggn_observer_error(&ggn_observer_default, w->measure.visible, (size_t)lull_kit_pixels(seen->block)));
 }
 
-/* What the network is told of the window whose newest image has just been measured. */
+/* The scalars of the window whose newest image has just been measured. */
 static void scalars_of(struct gp_block_view *seen, float scalars[GGN_SCALARS])
 {
     const struct ggn_stopper *s = &seen->head->stopper;

@@ -117,7 +117,7 @@ static void frame_release(struct lull_instance *in)
 }
 
 /* What the model has not learned with. */
-static void tell_setting(const struct lull_instance *in, const struct lull_frame *frame)
+static void log_setting(const struct lull_instance *in, const struct lull_frame *frame)
 {
     const struct lull_requirements *need = &in->kit.need;
     const struct ggn_setting learned = {(int)need->block_width, (int)need->block_height, GGN_TRANSFER_SRGB};
@@ -170,7 +170,7 @@ int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_fram
     if (in->means.count)
         gp_log(&in->kit, LULL_LOG_INFO, "ggn: no plane HALF: noise is told from how the mean changes between checks");
     in->display = gp_display_of(&in->kit);
-    tell_setting(in, frame);
+    log_setting(in, frame);
     return LULL_OK;
 }
 
@@ -212,9 +212,9 @@ long gp_windowed_read(const struct gp_block_view *seen, uint8_t *out)
     return ggn_pixel_counts_bad(&counts);
 }
 
-/* Says once that a host asks further apart than the model has learned: its windows show other images. The law of a residual
+/* Logs once that a host asks further apart than the model has learned: its windows show other images. The law of a residual
  * model needs none. */
-static void tell_late(struct lull_instance *in, const struct ggn_stopper *before, uint64_t spp)
+static void log_late(struct lull_instance *in, const struct ggn_stopper *before, uint64_t spp)
 {
     if (in->rule.reach > 0 || !before->used)
         return;
@@ -241,7 +241,7 @@ static void read_block(struct lull_instance *in, const struct lull_view *view, c
     const struct ggn_stopper before = head->stopper;
     const int what = ggn_stopper_ask(&in->rule, &head->stopper, b->spp);
     if (what == GGN_LOOK_IMAGE)
-        tell_late(in, &before, b->spp);
+        log_late(in, &before, b->spp);
     head->measured = what != GGN_LOOK_NONE;
     if (what == GGN_LOOK_NONE)
         return;

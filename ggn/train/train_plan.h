@@ -33,7 +33,7 @@ struct ggn_train_plan {
     double jitter;    /* octaves of exposure; see ggn_augment_options */
     double noise_map; /* preset lull: share of windows that come with the noise map; 0: networks without it */
     double reach;     /* preset lull: of a residual model, octaves of noise (model/networks.h); 0: the networks alone */
-    int scalars;      /* with reach: the discriminator is told what was measured */
+    int scalars;      /* with reach: the discriminator is given what was measured */
     int synthetic;    /* synthetic series per block */
     int extend;       /* continue recorded series beyond their last level, see ggn_series_set_extend */
     int validation_windows; /* most windows per validation */

@@ -7,7 +7,7 @@
 #include "actions.h"
 #include "quote_output.h"
 
-/* What a pilot said of one frame. */
+/* The responses of a pilot about one frame. */
 struct pilot {
     size_t at;                            /* index of its frame */
     struct lull_host_quote_block *blocks; /* owns */

@@ -24,7 +24,7 @@ static int speaks_utf8(void)
            (strstr(locale, "UTF-8") || strstr(locale, "utf8") || strstr(locale, "UTF8") || strstr(locale, "utf-8"));
 }
 
-static void tell_quality(const struct pt_open *o, char *text, size_t room)
+static void format_quality(const struct pt_open *o, char *text, size_t room)
 {
     static const char *const names[] = {"error", "visible", "threshold"};
     const char *value = NULL;
@@ -44,7 +44,7 @@ void pt_watch_init(struct pt_watch *w, const struct pt_open *open, const struct 
                            .checkpoint_at_s = base_clock_wall_s() + open->cli->checkpoint_every_s};
     pt_progress_init(&w->progress, w->log);
     w->progress.map = w->log->terminal && speaks_utf8();
-    tell_quality(open, w->progress.quality, sizeof w->progress.quality);
+    format_quality(open, w->progress.quality, sizeof w->progress.quality);
 }
 
 int pt_watch_display(struct pt_watch *w, struct base_err *err)

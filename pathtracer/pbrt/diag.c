@@ -71,9 +71,9 @@ void pt_diag_warn(struct pt_diag *diag, struct pt_loc loc, const char *format, .
         pt_diag_fail(diag, loc, "%s (an error because of --strict)", text);
         return;
     }
-    if (pt_names_get(&diag->said, text) >= 0)
+    if (pt_names_get(&diag->reported, text) >= 0)
         return;
-    if (pt_names_set(&diag->said, text, 0) != 0) {
+    if (pt_names_set(&diag->reported, text, 0) != 0) {
         pt_diag_nomem(diag, "warnings");
         return;
     }
@@ -86,4 +86,4 @@ void pt_diag_warn(struct pt_diag *diag, struct pt_loc loc, const char *format, .
         base_log_note(diag->log, "%s: warning: %s", file, text);
 }
 
-void pt_diag_release(struct pt_diag *diag) { pt_names_release(&diag->said); }
+void pt_diag_release(struct pt_diag *diag) { pt_names_release(&diag->reported); }

@@ -1,5 +1,5 @@
 /*
- * Where in a scene file something is, and what is said about it.
+ * Where in a scene file something is, and messages about it.
  *
  * A pt_diag is the one place where building a scene fails or warns. The first failure sticks (rc, err); later ones are
  * dropped, so that code may go on with default values until its directive ends. Not thread-safe; one per load.
@@ -20,11 +20,11 @@ struct pt_loc {
 };
 
 struct pt_diag {
-    struct base_err *err; /* may be NULL */
-    int rc;               /* 0 until the first failure */
-    int strict;           /* warnings are failures */
-    struct base_log *log; /* may be NULL */
-    struct pt_names said; /* owns: texts of the warnings given, each once */
+    struct base_err *err;     /* may be NULL */
+    int rc;                   /* 0 until the first failure */
+    int strict;               /* warnings are failures */
+    struct base_log *log;     /* may be NULL */
+    struct pt_names reported; /* owns: texts of the warnings given, each once */
 };
 
 /* Records `file:line:column: text` with BASE_EINVAL unless something failed before. Control characters become '?', so the

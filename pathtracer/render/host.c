@@ -16,7 +16,7 @@ struct services {
     struct base_log *log;
 };
 
-static void tell(void *context, int32_t level, const char *text)
+static void log_message(void *context, int32_t level, const char *text)
 {
     const struct services *s = context;
     if (level <= LULL_LOG_WARNING)
@@ -43,7 +43,7 @@ int pt_criterion_create(const struct lull_criterion *table, const struct lull_pa
                                           .threads = threads ? (uint32_t)base_threads_count(threads) : 1,
                                           .name = "lull-render " BASE_VERSION,
                                           .context = s,
-                                          .log = tell,
+                                          .log = log_message,
                                           .parallel_for = run_tasks,
                                           .release = free};
     int32_t code = lull_host_create(&services, table, pairs, pair_count, out, &e);

@@ -6,14 +6,14 @@
 
 #include "render/host.h"
 
-struct teller {
+struct message_log {
     struct base_log *log;
     int32_t level; /* of what is passed on, LULL_LOG_ */
 };
 
-static void tell(void *context, int32_t level, const char *text)
+static void log_message(void *context, int32_t level, const char *text)
 {
-    const struct teller *t = context;
+    const struct message_log *t = context;
     if (level <= t->level)
         base_log_note(t->log, "%s", text);
 }
@@ -21,8 +21,8 @@ static void tell(void *context, int32_t level, const char *text)
 int pt_criterion_find(const char *spec, struct base_inputs *inputs, struct base_log *log, const struct lull_criterion **out,
                       struct base_err *err)
 {
-    struct teller teller = {log, LULL_LOG_WARNING};
-    struct lull_search search = {.log = tell, .log_context = &teller};
+    struct message_log messages = {log, LULL_LOG_WARNING};
+    struct lull_search search = {.log = log_message, .log_context = &messages};
     struct lull_error e = {.struct_size = sizeof e};
     struct lull_found found;
     int32_t code = lull_open(&search, spec, &found, &e);
@@ -65,8 +65,8 @@ static int32_t list_one(void *context, const struct lull_found *found)
 
 int pt_criterion_list(FILE *out, struct base_log *log)
 {
-    struct teller teller = {log, LULL_LOG_ERROR}; /* what loading does to this process, nobody asked */
-    struct lull_search search = {.log = tell, .log_context = &teller};
+    struct message_log messages = {log, LULL_LOG_ERROR}; /* what loading does to this process, nobody asked */
+    struct lull_search search = {.log = log_message, .log_context = &messages};
     struct listing listing = {.out = out};
     lull_list(&search, list_one, &listing);
     return listing.count;

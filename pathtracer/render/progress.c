@@ -60,7 +60,7 @@ void pt_progress_text(struct pt_progress_pace *p, const struct pt_render *r, dou
                        room);
 }
 
-/* Half of the terminal, of which something else was said before. A longer line would be broken by the terminal. */
+/* Half of the terminal, which the message before it may fill. A longer line would be broken by the terminal. */
 static void show_map(struct pt_progress *p, const struct pt_render *r, const char *line)
 {
     enum { MOST_COLUMNS = 160, MOST_LINES = 40 };

@@ -21,7 +21,7 @@ struct pt_progress {
     struct base_log *log; /* borrows */
     double next_s;        /* wall time of the next line */
     struct pt_progress_pace pace;
-    double percent;   /* of the work, as the last line said … */
+    double percent;   /* of the work, as of the last line … */
     uint64_t samples; /* … when the render had so many */
     int map;          /* above the line stand the blocks (render/progress_map.h), as large as a terminal has room */
     char quality[48]; /* the criterion's quality parameter, told beside the map; "": it has none */
@@ -39,7 +39,7 @@ void pt_progress_init(struct pt_progress *progress, struct base_log *log);
 /* Shows a line if it is time for one. */
 void pt_progress_update(struct pt_progress *progress, const struct pt_render *render);
 
-/* The line itself, without newline. *percent: what the line before said, at first 0; it never falls. */
+/* The line itself, without newline. *percent: that of the line before, at first 0; it never falls. */
 void pt_progress_text(struct pt_progress_pace *pace, const struct pt_render *render, double *percent, char *text,
                       size_t room);
 

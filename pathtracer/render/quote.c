@@ -21,8 +21,8 @@ static int add_row(struct pt_quote *q, struct pt_quote_setting setting, int aske
     snprintf(value, sizeof value, "%.17g", setting.value);
     q->settings[q->row_count++] = setting;
     if (!asked && setting.parameter && strcmp(setting.parameter, "error") == 0)
-        return pt_host_result(lull_host_quote_add_error(q->told, setting.value, &e), &e, err);
-    return pt_host_result(lull_host_quote_add(q->told, setting.parameter ? &changed : NULL, asked, &e), &e, err);
+        return pt_host_result(lull_host_quote_add_error(q->quote, setting.value, &e), &e, err);
+    return pt_host_result(lull_host_quote_add(q->quote, setting.parameter ? &changed : NULL, asked, &e), &e, err);
 }
 
 /* Rows by falling value, the one that the options ask for among them unless it has its row already (*met). */
@@ -83,7 +83,7 @@ static int add_pictures(struct pt_quote *q, const struct pt_render *r, const str
         return rc;
     asked.name = "noisy";
     q->settings[q->row_count++] = asked;
-    return pt_host_result(lull_host_quote_add_other(q->told, judge, &e), &e, err);
+    return pt_host_result(lull_host_quote_add_other(q->quote, judge, &e), &e, err);
 }
 
 int pt_quote_create(const struct pt_render *r, const struct lull_pair *pairs, uint32_t pair_count,
@@ -102,7 +102,7 @@ int pt_quote_create(const struct pt_render *r, const struct lull_pair *pairs, ui
     if (!q)
         return base_fail_nomem(err, "quote");
     q->threads = pt_render_threads(r);
-    int rc = pt_host_result(lull_host_quote_begin(r->frame, q->threads, &q->told, &e), &e, err);
+    int rc = pt_host_result(lull_host_quote_begin(r->frame, q->threads, &q->quote, &e), &e, err);
     if (!rc)
         rc = noisy ? add_pictures(q, r, noisy, known[0], asked, log, err) : add_rows(q, known[1], known[0], asked, err);
     if (rc) {
@@ -116,14 +116,14 @@ int pt_quote_create(const struct pt_render *r, const struct lull_pair *pairs, ui
 void pt_quote_destroy(struct pt_quote *q)
 {
     if (q)
-        lull_host_quote_end(q->told);
+        lull_host_quote_end(q->quote);
     free(q);
 }
 
 void pt_quote_ask(struct pt_quote *q, struct pt_render *r, const uint32_t *due, uint32_t count)
 {
     struct pt_host_view show;
-    lull_host_quote_ask(q->told, pt_host_show(&r->film, r->blocks, &show), due, count);
+    lull_host_quote_ask(q->quote, pt_host_show(&r->film, r->blocks, &show), due, count);
 }
 
 int pt_quote_finish(struct pt_quote *q, struct pt_render *r, struct base_err *err)
@@ -131,5 +131,5 @@ int pt_quote_finish(struct pt_quote *q, struct pt_render *r, struct base_err *er
     struct lull_error e = {.struct_size = sizeof e};
     struct pt_host_view show;
     const struct lull_host_view *view = pt_host_show(&r->film, r->blocks, &show);
-    return pt_host_result(lull_host_quote_finish(q->told, view, &q->rows, &q->row_count, &e), &e, err);
+    return pt_host_result(lull_host_quote_finish(q->quote, view, &q->rows, &q->row_count, &e), &e, err);
 }

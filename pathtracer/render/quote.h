@@ -18,7 +18,7 @@ struct pt_quote_setting {
 };
 
 struct pt_quote {
-    struct lull_host_quote *told;                    /* owns */
+    struct lull_host_quote *quote;                   /* owns */
     struct pt_quote_setting settings[PT_QUOTE_ROWS]; /* of the rows */
     const struct lull_host_quote_row *rows;          /* the answer, of pt_quote_finish; borrows */
     uint32_t row_count;

@@ -184,8 +184,8 @@ int base_identity_compare(const struct base_identity *ours, const char *theirs, 
     const struct lines a = {theirs, size}, b = {ours->text, ours->size};
     struct line line, instead = {0};
     char one[SHOWN + 4], other[SHOWN + 4];
-    unsigned unheard = 0;
-    unsigned *to = changed ? changed : &unheard;
+    unsigned unused = 0;
+    unsigned *to = changed ? changed : &unused;
     *to = 0;
     if (!are_text(&a))
         return base_fail(err, BASE_EINVAL, "%s%s other settings", name, w->with);

@@ -168,7 +168,7 @@ static void add_option(struct base_identity *id, const struct base_option *o, co
         for (int i = 0; i < *(const int *)(const void *)((const char *)from + o->to.count); i++)
             base_identity_add(id, o->name, "%s", ((const char *const *)at)[i]);
         return;
-    case BASE_STORE_NONE: return; /* it is told by its row */
+    case BASE_STORE_NONE: return; /* its row identifies it */
     }
 }
 
@@ -177,8 +177,8 @@ void base_options_identify(const struct base_option *list, const void *from, str
     for (const struct base_option *o = list; o->name || o->help; o++) {
         if (o->role > BASE_DECIDES)
             base_identity_role(id, o->name, o->role);
-        if (o->role != BASE_NO_IDENTITY && o->tell)
-            o->tell(from, id);
+        if (o->role != BASE_NO_IDENTITY && o->identify)
+            o->identify(from, id);
         else if (o->role != BASE_NO_IDENTITY)
             add_option(id, o, from);
     }

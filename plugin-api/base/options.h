@@ -72,7 +72,7 @@ struct base_option {
     const char *const *files;          /* of a folder: names written there that an input might have; ends with NULL */
     int role; /* in the identity of the result (base/identity.h): does another value make another one? */
     /* For a value of several parts, or a key of another name: appends its lines to the identity. */
-    void (*tell)(const void *from, struct base_identity *to);
+    void (*identify)(const void *from, struct base_identity *to);
 };
 
 struct base_options {

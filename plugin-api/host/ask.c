@@ -118,15 +118,15 @@ int32_t lull_host_evaluate(struct lull_host_criterion *c, const struct lull_host
     for (uint32_t k = 0; k < count && code != LULL_OK; k++)
         decisions[k] = lull_host_undecided();
     lull_host_hide(&shown);
-    return code == LULL_OK ? lull_host_tell(c, err) : code;
+    return code == LULL_OK ? lull_host_pass_warning(c, err) : code;
 }
 
-/* A criterion of halves stops no block whose half_spp is never written: that is said once. */
+/* A criterion of halves stops no block whose half_spp is never written: one warning says so. */
 static void miss_halves(struct lull_host_frame *f, const uint32_t *due, uint32_t count)
 {
     const struct lull_host_block *b = NULL;
     char text[256];
-    if (f->told_halves || !(f->criterion->needs.planes_required & LULL_PLANE_BIT(LULL_PLANE_HALF)))
+    if (f->warned_halves || !(f->criterion->needs.planes_required & LULL_PLANE_BIT(LULL_PLANE_HALF)))
         return;
     for (uint32_t k = 0; k < count; k++) {
         b = &f->blocks.list[due[k]];
@@ -135,7 +135,7 @@ static void miss_halves(struct lull_host_frame *f, const uint32_t *due, uint32_t
     }
     if (!b)
         return;
-    f->told_halves = 1;
+    f->warned_halves = 1;
     snprintf(
         text, sizeof text,
         "half_spp is %llu where spp is %llu, in every block: without a half of the samples no block stops. The renderer "
@@ -161,5 +161,5 @@ int32_t lull_host_ask(struct lull_host_frame *f, const struct lull_host_view *vi
     if (code != LULL_OK)
         return code;
     miss_halves(f, due, count);
-    return lull_host_tell(f->criterion, err);
+    return lull_host_pass_warning(f->criterion, err);
 }

@@ -39,19 +39,19 @@ struct lull_host_criterion {
     double begin_s;
     int open;
 
-    /* The first warning, where the services have no log; another LULL_UNHEARD_ state says what became of it. */
-    atomic_int unheard_state;
-    char unheard[600];
+    /* The first warning, where the services have no log; the LULL_WARNING_ state says what became of it. */
+    atomic_int warning_state;
+    char warning[600];
 };
 
-enum { LULL_UNHEARD_NONE, LULL_UNHEARD_BEING_WRITTEN, LULL_UNHEARD_WAITING, LULL_UNHEARD_TOLD };
+enum { LULL_WARNING_NONE, LULL_WARNING_BEING_WRITTEN, LULL_WARNING_WAITING, LULL_WARNING_PASSED };
 
 static inline int lull_host_wants_counts(const struct lull_host_criterion *c)
 {
     return (c->needs.planes_required & LULL_HOST_COUNTS) != 0;
 }
 
-/* What was said about a block at each check, for the report; of a loaded state from there on. */
+/* The responses about a block at each check, for the report; of a loaded state from there on. */
 struct lull_host_answer {
     uint64_t spp;
     double error, p_noisy;
@@ -73,24 +73,24 @@ struct lull_host_frame {
     struct lull_host_answer *answers; /* owns; [blocks][answer_room] */
     uint32_t *answer_count;           /* owns; [blocks] */
     uint32_t answer_room;             /* 0: none are kept */
-    int told_halves;                  /* that half_spp is never written */
+    int warned_halves;                /* that half_spp is never written */
 };
 
-/* What a criterion said about a block last. */
+/* The last response of a criterion about a block. */
 struct lull_host_response {
     uint64_t spp;         /* samples when it was asked; 0: it never was */
     double predicted;     /* samples at which it expects to stop; NaN: it does not say */
-    int32_t stopped;      /* it said stop: `predicted` is where, at most spp */
+    int32_t stopped;      /* its response is stop: `predicted` is where, at most spp */
     int32_t undersampled; /* its noise sits in few pixels or grows: light that most of its pixels have not met yet */
 };
 
-/* What a row of a quote asks, and what it was told. */
+/* What a row of a quote asks, and the responses to it. */
 struct lull_host_quote_asked {
     struct lull_host_criterion *criterion; /* owns; NULL: nobody is asked */
     struct lull_host_response *response;   /* owns; [blocks] */
-    struct lull_host_response *first;      /* owns; [blocks] what it said when it was asked first */
+    struct lull_host_response *first;      /* owns; [blocks] its first response */
     struct lull_host_quote_block *blocks;  /* owns; the answer */
-    double *errors;                        /* owns; [blocks] that it heard of at response->spp; of rows by error alone */
+    double *errors;                        /* owns; [blocks] that it was given at response->spp; of rows by error alone */
     double limit;                          /* the error at which a row by error stops; 0: another row */
     int other;                             /* not the frame's criterion: its checks take their own time */
     double asked_s;                        /* wall seconds that it was asked */
@@ -112,10 +112,10 @@ struct lull_host_quote {
 int32_t lull_host_offer(struct lull_host_criterion *criterion, const struct lull_host_services *services,
                         struct lull_error *err);
 void lull_host_withdraw(struct lull_host_criterion *criterion);
-/* A line to the renderer's log; the first warning without one is kept for lull_host_tell. */
+/* A line to the renderer's log; the first warning without one is kept for lull_host_pass_warning. */
 void lull_host_say(struct lull_host_criterion *criterion, int32_t level, const char *text);
-/* Puts a warning that nobody has heard into err, once, with the code LULL_OK; returns LULL_OK. */
-int32_t lull_host_tell(struct lull_host_criterion *criterion, struct lull_error *err);
+/* Passes a warning that was logged nowhere to err, once, with the code LULL_OK; returns LULL_OK. */
+int32_t lull_host_pass_warning(struct lull_host_criterion *criterion, struct lull_error *err);
 
 /* --- given.c: what the renderer hands in ----------------------------------------------------------------------------- */
 
@@ -227,7 +227,7 @@ struct cJSON *lull_host_report_block(struct cJSON *list, const struct lull_host_
 
 /* --- failure.c ------------------------------------------------------------------------------------------------------ */
 
-/* "criterion ID: ", `what` and what the criterion said; returns its code. */
+/* "criterion ID: ", `what` and its message; returns its code. */
 int32_t lull_host_blame(const struct lull_host_criterion *criterion, const char *what, int32_t code,
                         const struct lull_error *why, struct lull_error *err);
 /* A failure of plugin-api/base in the words of the ABI. */

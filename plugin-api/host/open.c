@@ -80,10 +80,10 @@ int32_t lull_host_create(const struct lull_host_services *services, const struct
         return code;
     }
     *out = c;
-    return lull_host_tell(c, err);
+    return lull_host_pass_warning(c, err);
 }
 
-/* What is told while a criterion is looked for, and there is nobody to hear it. */
+/* Messages from the search of a criterion that no log takes. */
 static void keep_first(void *context, int32_t level, const char *text)
 {
     char *kept = context;
@@ -107,7 +107,7 @@ int32_t lull_host_open(const struct lull_host_services *services, const char *sp
         return code;
     }
     code = lull_host_create(services, found.criterion, pairs, pair_count, out, err);
-    if (code == LULL_OK && kept[0] != '\0' && atomic_load(&(*out)->unheard_state) == LULL_UNHEARD_NONE)
+    if (code == LULL_OK && kept[0] != '\0' && atomic_load(&(*out)->warning_state) == LULL_WARNING_NONE)
         lull_error_set(err, LULL_OK, "%s", kept);
     return code;
 }
@@ -218,9 +218,9 @@ static struct lull_frame describe(const struct lull_host_frame *f, const struct 
                                   const struct lull_rect *rects)
 {
     const struct lull_host_config *g = &f->config;
-    const uint32_t told = LULL_FRAME_DETERMINISTIC | LULL_FRAME_INDEPENDENT | LULL_FRAME_SHARED;
+    const uint32_t passed_on = LULL_FRAME_DETERMINISTIC | LULL_FRAME_INDEPENDENT | LULL_FRAME_SHARED;
     struct lull_frame frame = {.struct_size = sizeof frame,
-                               .flags = (g->flags & told) | (c->open ? LULL_FRAME_RESTART : 0),
+                               .flags = (g->flags & passed_on) | (c->open ? LULL_FRAME_RESTART : 0),
                                .width = g->width,
                                .height = g->height,
                                .blocks = rects,
@@ -347,7 +347,7 @@ int32_t lull_host_begin(const struct lull_host_config *config, struct lull_host_
         return code;
     }
     *out = f;
-    return criterion ? lull_host_tell(criterion, err) : LULL_OK;
+    return criterion ? lull_host_pass_warning(criterion, err) : LULL_OK;
 }
 
 void lull_host_end(struct lull_host_frame *f)

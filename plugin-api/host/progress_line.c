@@ -14,15 +14,15 @@ static void format_time(double s, char text[32])
 
 /* The share done, which never falls: a prediction that grows holds it where it was. What is only a lower bound says so, and
  * says nothing while it is below a hundredth. */
-static void format_share(double *percent_told, double share, int known, char text[16])
+static void format_share(double *percent_shown, double share, int known, char text[16])
 {
     double percent = floor(100.0 * share);
-    int is_bound = !known && percent >= *percent_told;
-    *percent_told = fmax(*percent_told, percent);
+    int is_bound = !known && percent >= *percent_shown;
+    *percent_shown = fmax(*percent_shown, percent);
     if (is_bound && percent < 1.0)
         snprintf(text, 16, "  ?%%");
     else
-        snprintf(text, 16, "%s%3.0f%%", is_bound ? ">=" : "", *percent_told);
+        snprintf(text, 16, "%s%3.0f%%", is_bound ? ">=" : "", *percent_shown);
 }
 
 void lull_host_progress(const struct lull_host_blocks *blocks, const struct lull_host_totals *totals,

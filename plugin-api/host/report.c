@@ -123,13 +123,13 @@ static void add_memory(cJSON *root, const struct lull_host_report *r, int *faile
     base_json_number(o, "scene_bytes", r->scene_bytes, failed);
 }
 
-/* What was said at each check, by block: [samples, error, p_noisy]. */
+/* The response at each check, by block: [samples, error, p_noisy]. */
 static void add_history(cJSON *root, const struct lull_host_frame *f, int *failed)
 {
-    uint32_t told = 0;
+    uint32_t responses = 0;
     for (uint32_t i = 0; i < f->blocks.count && f->answer_room > 0; i++)
-        told += f->answer_count[i];
-    if (told == 0)
+        responses += f->answer_count[i];
+    if (responses == 0)
         return;
     cJSON *list = base_json_array(root, "history", failed);
     for (uint32_t i = 0; i < f->blocks.count; i++) {

@@ -6,24 +6,24 @@
 
 void lull_host_say(struct lull_host_criterion *c, int32_t level, const char *text)
 {
-    int none = LULL_UNHEARD_NONE;
-    char line[sizeof c->unheard];
+    int none = LULL_WARNING_NONE;
+    char line[sizeof c->warning];
     if (!c->offered.log && level > LULL_LOG_WARNING)
         return;
     snprintf(line, sizeof line, "criterion %s: %s", c->table->id, text);
     if (c->offered.log)
         c->offered.log(c->offered.context, level, line);
-    else if (atomic_compare_exchange_strong(&c->unheard_state, &none, LULL_UNHEARD_BEING_WRITTEN)) {
-        memcpy(c->unheard, line, sizeof line);
-        atomic_store(&c->unheard_state, LULL_UNHEARD_WAITING);
+    else if (atomic_compare_exchange_strong(&c->warning_state, &none, LULL_WARNING_BEING_WRITTEN)) {
+        memcpy(c->warning, line, sizeof line);
+        atomic_store(&c->warning_state, LULL_WARNING_WAITING);
     }
 }
 
-int32_t lull_host_tell(struct lull_host_criterion *c, struct lull_error *err)
+int32_t lull_host_pass_warning(struct lull_host_criterion *c, struct lull_error *err)
 {
-    int waiting = LULL_UNHEARD_WAITING;
-    if (err && atomic_compare_exchange_strong(&c->unheard_state, &waiting, LULL_UNHEARD_TOLD))
-        lull_error_set(err, LULL_OK, "%s", c->unheard);
+    int waiting = LULL_WARNING_WAITING;
+    if (err && atomic_compare_exchange_strong(&c->warning_state, &waiting, LULL_WARNING_PASSED))
+        lull_error_set(err, LULL_OK, "%s", c->warning);
     return LULL_OK;
 }
 

@@ -234,7 +234,7 @@ struct serving {
     pthread_mutex_t lock;
     pthread_cond_t work;
     struct queued *first, *last; /* guarded by lock, with all below: tasks in the order of their arrival */
-    int over;                    /* rank 0 has said so, or something has failed */
+    int over;                    /* by a message of rank 0, or something has failed */
     struct base_err failed;
     double look_s; /* wall time of the next look for messages; of the thread that serves */
 };

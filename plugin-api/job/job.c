@@ -242,8 +242,8 @@ static int hear_hello(struct job *job, int rank, const struct job_message *messa
     return 0;
 }
 
-/* The first worker that rank 0 has not heard of; count: it has heard of all. */
-static int unheard(const struct job *job)
+/* The first worker without a message to rank 0 yet; count: none. */
+static int first_silent(const struct job *job)
 {
     int rank = 1;
     while (rank < job->transport->count && job->workers[rank].threads > 0)
@@ -257,7 +257,7 @@ int job_handshake(struct job *job, const char *settings, int threads, struct bas
         say_hello(job, settings, threads);
     } else if (job) {
         const double start_s = base_clock_wall_s();
-        while (unheard(job) < job->transport->count && !job->failed.code) {
+        while (first_silent(job) < job->transport->count && !job->failed.code) {
             int rank;
             struct job_message *message;
             size_t size;
@@ -266,7 +266,7 @@ int job_handshake(struct job *job, const char *settings, int threads, struct bas
                 hear_hello(job, rank, message, size, settings);
                 free(message);
             } else if (got == 0) {
-                look_round(job, unheard(job), base_clock_wall_s() - start_s);
+                look_round(job, first_silent(job), base_clock_wall_s() - start_s);
             }
         }
     }
@@ -307,7 +307,7 @@ static int hear_farewells(struct job *job, int status, struct base_err *err)
         if (job->workers[r].gone)
             r++;
         else if (job_receive(job, LOOK_S, &rank, &message, &size) > 0)
-            free(message); /* on its way when the end was said */
+            free(message); /* on its way when rank 0 ended the job */
         else if (!job->workers[r].gone)
             look_round(job, r, base_clock_wall_s() - start_s);
     }

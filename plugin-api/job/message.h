@@ -38,8 +38,8 @@ struct job_held {
 enum { JOB_HELD = 2 }; /* the one that a worker works on and the next */
 
 struct job_worker {
-    int threads; /* 0: not heard of yet */
-    int gone;    /* it has said its farewell */
+    int threads; /* 0: no message from it yet */
+    int gone;    /* its last message has come */
     struct job_farewell farewell;
     struct job_held held[JOB_HELD]; /* in the order in which they were sent */
     int held_count;
@@ -54,7 +54,7 @@ struct job {
     int threads;                /* of all workers */
     uint32_t serial;            /* farms so far */
     int lost;                   /* somebody is gone for good: there is no orderly end */
-    int over, status;           /* rank 0 has said the end; with which status, of a worker */
+    int over, status;           /* rank 0 has ended the job; with which status, of a worker */
     struct job_traffic traffic;
     struct base_err failed;
 };
@@ -66,9 +66,9 @@ int job_send(struct job *job, int rank, void *message, size_t size);
 int job_receive(struct job *job, double wait_s, int *rank, struct job_message **message, size_t *size);
 /* A message of its head alone. */
 int job_send_head(struct job *job, int rank, enum job_kind kind, uint32_t serial);
-/* A failure: what a process said makes no sense. */
+/* A failure: the message of a process makes no sense. */
 int job_nonsense(struct job *job, int rank);
-/* A failure if rank 0 has waited too long for a worker, or it has said its farewell. */
+/* A failure if rank 0 has waited too long for a worker, or its last message has come. */
 int job_give_up(struct job *job, int rank, double waited_s);
 
 #endif

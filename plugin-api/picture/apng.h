@@ -14,7 +14,7 @@
 struct pic_apng {
     struct base_file_out file;
     int32_t width, height;
-    uint32_t frames, frame, chunks; /* told, so far; numbered chunks so far */
+    uint32_t frames, frame, chunks; /* announced, written; numbered chunks so far */
     uint16_t delay_ms;
 };
 

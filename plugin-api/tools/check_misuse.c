@@ -35,7 +35,7 @@ struct misuse {
     size_t mapped[SLOTS];
     struct lc_session s;         /* what must not be disturbed */
     struct lc_image image;       /* of its film */
-    struct lull_instance *loose; /* owns; whatever it is told */
+    struct lull_instance *loose; /* owns; whatever it is given */
     const struct lull_state *state;
     struct lc_buffer saved; /* a state of the session */
     int open;               /* the session's frame is */

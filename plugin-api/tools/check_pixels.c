@@ -324,9 +324,10 @@ static int grey_stops_at(struct lc *c, int fireflies)
  * hardly shows it. Only what would stop the block without these pixels can fail. */
 static void check_firefly(struct lc *c)
 {
-    int told = (c->req.planes_required & (LULL_PLANE_BIT(LULL_PLANE_HALF) | LULL_PLANE_BIT(LULL_PLANE_MOMENT2))) != 0;
+    int has_evidence =
+        (c->req.planes_required & (LULL_PLANE_BIT(LULL_PLANE_HALF) | LULL_PLANE_BIT(LULL_PLANE_MOMENT2))) != 0;
     int calm = grey_stops_at(c, 0), hot = grey_stops_at(c, 1);
-    if (!told)
+    if (!has_evidence)
         lc_note(c, "it requires neither HALF nor MOMENT2: what it does with a firefly is its own affair");
     else if (calm == LC_STEPS)
         lc_note(c, "it does not stop an even grey block either");

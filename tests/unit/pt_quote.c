@@ -139,7 +139,7 @@ static void rows_by_error_follow_the_law(void **state)
     struct run pilot;
     start(&pilot, "0.25", 100);
     for (int i = 0; i < 3; i++)
-        assert_int_equal(lull_host_quote_add_error(pilot.quote->told, limits[i], &e), LULL_OK);
+        assert_int_equal(lull_host_quote_add_error(pilot.quote->quote, limits[i], &e), LULL_OK);
     assert_int_equal(go(&pilot), PT_RENDER_PILOT);
     assert_int_equal(pt_quote_finish(pilot.quote, pilot.render, &err), 0);
     assert_int_equal(pilot.quote->row_count, 6);
@@ -149,7 +149,7 @@ static void rows_by_error_follow_the_law(void **state)
             const double expected = fmax(law, (double)pilot.render->blocks->spp_min);
             assert_true(fabs(pilot.quote->rows[3 + i].blocks[k].stop.spp / expected - 1.0) < 0.03);
         }
-    assert_int_equal(lull_host_quote_add_error(pilot.quote->told, 0.0, &e), LULL_E_INVALID);
+    assert_int_equal(lull_host_quote_add_error(pilot.quote->quote, 0.0, &e), LULL_E_INVALID);
     end(&pilot);
 }
 
@@ -185,11 +185,11 @@ static void what_was_asked_has_a_row(void **state)
     struct run run;
     start(&run, "0.1", 64);
     assert_int_equal(run.quote->row_count, 4);
-    assert_true(run.quote->settings[2].value == 0.1 && run.quote->told->rows[2].asked &&
+    assert_true(run.quote->settings[2].value == 0.1 && run.quote->quote->rows[2].asked &&
                 run.quote->settings[3].value == 0.05);
     end(&run);
     start(&run, "0.01", 64);
-    assert_true(run.quote->row_count == 4 && run.quote->settings[3].value == 0.01 && run.quote->told->rows[3].asked);
+    assert_true(run.quote->row_count == 4 && run.quote->settings[3].value == 0.01 && run.quote->quote->rows[3].asked);
     end(&run);
 }
 
@@ -392,15 +392,15 @@ static char *quote_of(struct approve_case *c)
     if (strstr(c->text, "unasked"))
         r->blocks->list[3].spp = r->blocks->list[3].half_spp = r->blocks->list[3].asked = 0;
     for (uint32_t i = 0; i < run.quote->row_count && strstr(c->text, "unsaid"); i++)
-        run.quote->told->asked[i].response[2] =
+        run.quote->quote->asked[i].response[2] =
             (struct lull_host_response){.spp = r->blocks->list[2].spp, .predicted = (double)NAN};
     r->totals->criterion_s = 0.25 * (double)r->totals->checks;
     assert_int_equal(pt_quote_finish(run.quote, r, &err), 0);
-    fprintf(out, "a check takes %.9g\n", run.quote->told->check_s);
+    fprintf(out, "a check takes %.9g\n", run.quote->quote->check_s);
     for (uint32_t i = 0; i < run.quote->row_count; i++) {
         const struct lull_host_quote_row *row = &run.quote->rows[i];
-        const struct lull_host_response *response = run.quote->told->asked[i].response,
-                                        *first = run.quote->told->asked[i].first;
+        const struct lull_host_response *response = run.quote->quote->asked[i].response,
+                                        *first = run.quote->quote->asked[i].first;
         fprintf(
             out,
             "row %g asked %d spp %.9g %.9g %.9g from %.9g to %.9g thread %.9g %.9g %.9g wall %.9g %.9g %.9g of uniform %.9g",

@@ -154,7 +154,7 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
     d->error = now->error;
 }
 
-static void tell(const struct lull_instance *in, const struct lull_block *b, const struct past *now)
+static void log_response(const struct lull_instance *in, const struct lull_block *b, const struct past *now)
 {
     char line[160];
     if (isnan(now->error))
@@ -264,7 +264,7 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
         const int again = in->past[b->id].spp == b->spp;
         in->past[b->id] = in->pending[b->id];
         if (!again)
-            tell(in, b, &in->past[b->id]);
+            log_response(in, b, &in->past[b->id]);
     }
     return status;
 }
