@@ -700,7 +700,7 @@ def test_progress():
         d.step()
     form = r"(>=)?\s*\d+%  \d+ of \d+ blocks active  spp \d+\.\.\d+  \d+\.\d\d Mpaths/s  ETA (at most )?(\d+:\d\d|unknown)"
     assert re.fullmatch(form, outputs.progress_text(d)), outputs.progress_text(d)
-    d.percent_told = 99.
+    d.percent_shown = 99.
     assert outputs.progress_text(d).startswith(" 99%")  # it never falls
 
 

@@ -64,7 +64,7 @@ class Driver:
         self.identity, self.totals = self._identity(identity or {}), frame.totals
         self.samples_per_s = 0.0  # recent, 0 = not known yet
         self.phases: dict[str, float] = {}  # what a host's seconds went to, by name, for the report
-        self.percent_told = 0.0  # of the work, by the progress line, which never goes back
+        self.percent_shown = 0.0  # of the work, by the progress line, which never goes back
         self.interrupted = False
         self.display = Display(frame, display_server) if display_server else None
         self.watchers: list[Watcher] = [self.display.watch] if self.display else []

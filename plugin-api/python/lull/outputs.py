@@ -130,13 +130,13 @@ def write_page(path: str, driver: Driver, scene: str = "", kernel: str = "", int
 
 def progress_text(driver: Driver) -> str:
     """Share done, active blocks, their range of samples, speed, time left; without the criterion's predictions a bound."""
-    text, percent, frame = C.create_string_buffer(256), C.c_double(driver.percent_told), driver.frame
+    text, percent, frame = C.create_string_buffer(256), C.c_double(driver.percent_shown), driver.frame
     forecast = frame.forecast(driver.threads)
     left_s = forecast.sampling_s + forecast.check_s if driver.samples_per_s else math.inf
     numbers = map(C.c_double, (frame.time_budget_s, left_s, driver.samples_per_s))
     library().lull_host_progress(C.byref(frame.layout), C.byref(frame.totals), C.byref(forecast), *numbers,
                                  C.byref(percent), text, C.c_uint64(len(text)))
-    driver.percent_told = percent.value
+    driver.percent_shown = percent.value
     return text.value.decode()
 
 

@@ -40,7 +40,7 @@ class _Told:
         """Twice a second, and the picture for a twentieth of the time."""
         now_s = time.monotonic()
         if now_s >= self._tell_at_s:
-            self.say(text=progress_text(session.driver).strip(), percent=session.driver.percent_told)
+            self.say(text=progress_text(session.driver).strip(), percent=session.driver.percent_shown)
             self._tell_at_s = now_s + _TELL_S
         if now_s >= self._show_at_s:
             self.show(session)

@@ -83,7 +83,7 @@ class Costing:
             raise Refused(f"{o['data']}: no labelled block in the split '{split}'")
 
     def put(self, criterion: str, dial: str, value: float, stops: Sequence[float], checks: Callable[[int], float]) -> dict[str, Any]:
-        blocks, pixels = self.r.blocks, self.r.told["pixels"]
+        blocks, pixels = self.r.blocks, self.r.response["pixels"]
         self.points.append({
             "criterion": criterion, "dial": dial, "value": value, "stops": [math.floor(stops[i] + 0.5) for i in self.here],
             "scenes": {s: figures([blocks[i] for i in at], [stops[i] for i in at], [checks(i) for i in at], pixels)
@@ -151,7 +151,7 @@ class Costing:
         return {scene: {"blocks": [
             {"place": self.here.index(i), "view": self.r.blocks[i].view, "id": self.r.blocks[i].id,
              **{k: getattr(self.r.blocks[i], k) for k in keys},
-             "us_per_path": 1e6 * path_s(self.r.blocks[i], self.r.told["pixels"])} for i in at]} for scene, at in self.scenes.items()}
+             "us_per_path": 1e6 * path_s(self.r.blocks[i], self.r.response["pixels"])} for i in at]} for scene, at in self.scenes.items()}
 
 
 def run(program: str, _: Sequence[str], o: dict[str, Any]) -> None:
@@ -165,14 +165,14 @@ def run(program: str, _: Sequence[str], o: dict[str, Any]) -> None:
         c.uniform()
         c.errors()
         c.observer()
-    for m in r.answered("model", lambda told: told["name"][:32] + more):
+    for m in r.answered("model", lambda method: method["name"][:32] + more):
         c.model(m)
     if not c.scores:
-        for m in r.answered("baseline", lambda told: told["name"]):
+        for m in r.answered("baseline", lambda method: method["name"]):
             c.baseline(m)
         for m in r.from_files(o.get("thresholds", []), c.split):
             c.put(m.name, "own", 0, m.stops, lambda _: 0)
-    text = print_json({"split": c.split, "labels": r.told["labels"], "ratio": r.told["ratio"], "scenes": c.listed(),
+    text = print_json({"split": c.split, "labels": r.response["labels"], "ratio": r.response["ratio"], "scenes": c.listed(),
                        "points": c.points}, True)
     if "output" not in o:
         print(text)

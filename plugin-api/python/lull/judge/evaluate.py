@@ -163,7 +163,7 @@ def _changes_line(name: str, c: dict[str, Any]) -> str:
 # --- files ---
 
 def _stops(r: Replay, methods: Sequence[Method]) -> list[dict[str, Any]]:
-    """Of every block where each method stops, and what each said of its windows."""
+    """Of every block where each method stops, and the scores of its windows."""
     found = []
     for i, b in enumerate(r.blocks):
         windows = {"spp": [b.compared(v) for v in b.spp], "noisy": b.noisy, "scores": {m.name: m.scores[i] for m in methods if m.scores is not None}}
@@ -174,9 +174,9 @@ def _stops(r: Replay, methods: Sequence[Method]) -> list[dict[str, Any]]:
 
 
 def _score_at_stop(m: Method, index: int) -> str:
-    """What the method last said until the stop: a verdict stands until the next check."""
-    said = [s for s in (m.scores[index] if m.scores else [])[:m.blocks[index].case(m.stops[index]) + 1] if not math.isnan(s)]
-    return "%.17g" % said[-1] if said and math.isfinite(said[-1]) else ""
+    """The last score of the method until the stop: a verdict stands until the next check."""
+    scores = [s for s in (m.scores[index] if m.scores else [])[:m.blocks[index].case(m.stops[index]) + 1] if not math.isnan(s)]
+    return "%.17g" % scores[-1] if scores and math.isfinite(scores[-1]) else ""
 
 
 def _write_stops(folder: str, r: Replay, split: str, methods: Sequence[Method]) -> None:
@@ -228,8 +228,8 @@ def run(program: str, _: Sequence[str], o: dict[str, Any]) -> None:
     tuned_on = "train" if r.of("train") else r.blocks[0].split
     methods, models = _methods(r, o, tuned_on)
     splits, changes, told_json = {}, {}, "json" in o
-    lines = [f"labels: {r.told['labels']}; split: {r.told['split']}; cuts tuned on {tuned_on} for {100 * o.get('early', 0.05):.1f} % "
-             f"early stops{'; views without labels are left out' if r.told['views_without_labels'] else ''}"]
+    lines = [f"labels: {r.response['labels']}; split: {r.response['split']}; cuts tuned on {tuned_on} for {100 * o.get('early', 0.05):.1f} % "
+             f"early stops{'; views without labels are left out' if r.response['views_without_labels'] else ''}"]
     for split in filter(r.of, SPLITS):
         found = [measured(m, split) for m in methods]
         splits[split] = {m.name: f for m, f in zip(methods, found)}
@@ -240,7 +240,7 @@ def run(program: str, _: Sequence[str], o: dict[str, Any]) -> None:
         lines += [_changes_line(name, c) for name, c in changes[split].items()]
         if out:
             _write_stops(out, r, split, methods)
-    root = {"data": o["data"], "labels": r.told["labels"], "split": r.told["split"], "window": r.told["window"],
+    root = {"data": o["data"], "labels": r.response["labels"], "split": r.response["split"], "window": r.response["window"],
             "early_rate_tuned_for": o.get("early", 0.05), "tuned_on": tuned_on, "splits": splits, "changes": changes,
             "stops": _stops(r, methods)}
     print(print_json(root, True) if told_json else "\n".join(lines))

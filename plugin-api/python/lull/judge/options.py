@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the commands' options have in common: those that `ggn replay` is told, and what no output may replace."""
+"""What the commands' options have in common: those that `ggn replay` takes, and what no output may replace."""
 from __future__ import annotations
 
 import os

@@ -16,12 +16,12 @@ SPLITS = ("train", "validation", "test", "people", "none")
 
 
 def ggn(program: str, command: str, *words: Any, quiet: bool = False) -> Any:
-    """The JSON that `ggn WORDS…` prints. What it says is said as if `command` did; quiet: only what stops it."""
+    """The JSON that `ggn WORDS…` prints. Its messages are printed as those of `command`; quiet: only what stops it."""
     done = subprocess.run([program, *map(str, words)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE, check=False)
-    said = [line.replace(f"ggn {words[0]}: ", "", 1) for line in os.fsdecode(done.stderr).splitlines()]
-    failed = said.pop() if done.returncode and said else f"ggn {words[0]} ended with {done.returncode}"
-    for line in [] if quiet else said:
+    messages = [line.replace(f"ggn {words[0]}: ", "", 1) for line in os.fsdecode(done.stderr).splitlines()]
+    failed = messages.pop() if done.returncode and messages else f"ggn {words[0]} ended with {done.returncode}"
+    for line in [] if quiet else messages:
         print(f"{command}: {line}", file=sys.stderr)
     if done.returncode == 1:
         raise MemoryError
@@ -140,18 +140,18 @@ class Replay:
     """One run of `ggn replay`."""
 
     def __init__(self, program: str, command: str, words: Sequence[Any], halves: bool = True, quiet: bool = False):
-        told = ggn(program, command, "replay", *words, quiet=quiet)
-        self.program, self.command, self.told, self.halves = program, command, told, halves
-        self.views: list[dict[str, Any]] = told["views"]
-        self.blocks = [Block(self.views, b) for b in told["blocks"]]
-        self.visible: float = told["visible"]
+        response = ggn(program, command, "replay", *words, quiet=quiet)
+        self.program, self.command, self.response, self.halves = program, command, response, halves
+        self.views: list[dict[str, Any]] = response["views"]
+        self.blocks = [Block(self.views, b) for b in response["blocks"]]
+        self.visible: float = response["visible"]
 
     def of(self, split: str) -> list[int]:
         return [i for i, b in enumerate(self.blocks) if b.split == split]
 
     def answered(self, kind: str, name: Callable[[dict[str, Any]], str]) -> list[Method]:
         """The models, or the baselines, by their own policies."""
-        return [self._answered(m, name(m)) for m in self.told["methods"] if m["kind"] == kind]
+        return [self._answered(m, name(m)) for m in self.response["methods"] if m["kind"] == kind]
 
     def _answered(self, m: dict[str, Any], name: str) -> Method:
         policy, scores = m["policy"], [_numbers(s) for s in m["scores"]]
