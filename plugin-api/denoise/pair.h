@@ -16,7 +16,7 @@
  *     lull_denoised_blend     each half of what is kept
  *
  * One thread per struct; different parts of one pair may be cut and judged at the same time. Nothing is allocated after
- * lull_denoised_open and lull_denoised_part_open.
+ * lull_denoised_open and lull_denoised_part_open, but by the first lull_denoised_again.
  */
 #ifndef DENOISE_PAIR_H
 #define DENOISE_PAIR_H
