@@ -94,6 +94,7 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     data.mean_for_reference = 1;
     int rc = s->threads ? ggn_series_set_load(&s->set, &data, err) : BASE_ENOMEM;
 
+    /* After loading, since a small block is smaller than the usual crop. */
     s->crop = p->crop || paper ? p->crop : side_of(s) < GGN_TRAIN_CROP ? side_of(s) : GGN_TRAIN_CROP;
     if (!rc && p->synthetic > 0)
         rc = ggn_series_set_add_synthetic(&s->set, p->synthetic, p->seed, err);
@@ -127,6 +128,7 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     s->r = rc ? NULL : ggn_weights_create(&s->r_graph, NULL, 0, err);
     if (!s->r)
         return rc ? rc : BASE_ENOMEM;
+    /* One buffer for both phases, which never run at the same time. */
     size_t crops = 6 * (size_t)p->batch_r * (size_t)s->crop * (size_t)s->crop;
     size_t windows = (size_t)p->batch * (2 * (size_t)p->window + 1) * ggn_series_set_values(&s->set);
     size_t pointers = 6 * (size_t)p->batch_r + (6 * (size_t)p->window + 2) * (size_t)p->batch;
