@@ -3,22 +3,20 @@
 The views of people are replayed (`ggn replay`): lull-3 and the observer's law, each view judged by an observer that was fitted to the
 others, and the number of samples alone. What the published models said of the same views are thresholds, so of these only
 decisions are known. Figures of the paper are Buisine et al., Deep Learning Applications 4, Springer 2022. Two minutes of processor time."""
+import itertools
 import json
 import math
 import os
 import statistics
-import sys
 
 from lablib import tables, tool
 from lablib.recordings import people_views
 from lablib.tool import ggn
 
-sys.path.insert(0, os.path.join(tool.ROOT, "plugin-api", "python"))
-from lull.judge import stats  # noqa: E402
-
 CUTS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.98)
 PUBLISHED = ("SVD-Entropy", "26-attributes")
-NAMES = {"lull-3": "lull-3, as shipped", "law": "the observer's law", "-spp": "number of samples alone", "SVD-Entropy": "SVD-Entropy LSTM, as published",
+NAMES = {"lull-3": "lull-3, as shipped", "law": "the observer's law",
+         "-spp": "number of samples alone, by what other views want", "SVD-Entropy": "SVD-Entropy LSTM, as published",
          "26-attributes": "26 attributes + SVM, as published"}
 
 
@@ -29,18 +27,54 @@ def options(parser):
     tool.writes(parser)
 
 
-def accuracy(score, noisy, cut):
-    """Of "a score of at least the cut is noisy"."""
-    return sum((s >= cut) == bool(n) for s, n in zip(score, noisy)) / len(noisy)
+class Windows:
+    """Scores of windows, whether they are noisy, and by how many samples the next one is away: so each counts as often as with windows a fixed
+    number of samples apart, which is how the paper has them."""
+
+    def __init__(self):
+        self.rows = []
+
+    def add(self, view, score, noisy, weight):
+        self.rows.append((view, score, noisy, weight))
+
+    def views(self):
+        """Those of each view."""
+        of = {}
+        for row in self.rows:
+            of.setdefault(row[0], Windows()).add(*row)
+        return list(of.values())
+
+    def accuracy(self, cut):
+        """Of "a score of at least the cut is noisy"."""
+        return sum(w for _, s, n, w in self.rows if (s >= cut) == bool(n)) / sum(w for *_, w in self.rows)
+
+    def best(self):
+        """At the best cut."""
+        right = most = sum(w for _, _, n, w in self.rows if n)  # below all scores: everything is called noisy
+        for _, tied in itertools.groupby(sorted(self.rows, key=lambda r: r[1]), key=lambda r: r[1]):
+            right += sum(-w if n else w for _, _, n, w in tied)
+            most = max(most, right)
+        return most / sum(w for *_, w in self.rows)
+
+    def auc(self):
+        """Of pairs of a noisy and a clean window the share whose scores are in order; ties count half."""
+        below = won = 0.0
+        for _, tied in itertools.groupby(sorted(self.rows, key=lambda r: r[1]), key=lambda r: r[1]):
+            tied = list(tied)
+            clean, noisy = (sum(w for _, _, n, w in tied if bool(n) is is_noisy) for is_noisy in (False, True))
+            won += noisy * (below + 0.5 * clean)
+            below += clean
+        noisy = sum(w for _, _, n, w in self.rows if n)
+        return won / (noisy * below) if noisy * below else math.nan
 
 
-def of_windows(windows, cuts=CUTS):
-    """windows: [(view, score, noisy)]. AUC of all, its mean over views, accuracy at each cut and at the best."""
-    columns = lambda chosen: ([w[1] for w in chosen], [w[2] for w in chosen])
-    score, noisy = columns(windows)
-    views = sorted({w[0] for w in windows})
-    return {"auc": stats.auc(score, noisy), "auc_views": statistics.mean(stats.auc(*columns([w for w in windows if w[0] == v])) for v in views),
-            "accuracy": [accuracy(score, noisy, cut) for cut in cuts], "best": stats.best_accuracy(score, noisy)}
+def figures(windows, cuts=CUTS):
+    """Of all windows and of the views' mean: AUC, accuracy at each cut and at the best."""
+    of = lambda w: {"auc": w.auc(), "accuracy": [w.accuracy(cut) for cut in cuts], "best": w.best()}
+    views = [of(w) for w in windows.views()]
+    mean = lambda values: statistics.mean(v for v in values if not math.isnan(v))
+    return {"pooled": of(windows), "views": {"auc": mean(v["auc"] for v in views), "best": mean(v["best"] for v in views),
+                                             "accuracy": [mean(column) for column in zip(*(v["accuracy"] for v in views))]}}
 
 
 def thresholds(path):
@@ -50,38 +84,43 @@ def thresholds(path):
     return {row[0]: [float(v) for v in row[1:]] for row in rows if row[0].startswith("p3d")}
 
 
+def wanted_above(replay, view, spp):
+    """The share of the other views' blocks that want more samples."""
+    return statistics.mean(b["threshold"] > spp for b in replay["blocks"] if b["view"] != view)
+
+
 def judged(replay, published):
     """{name: figures of its windows} and their number."""
     views, model = replay["views"], replay["methods"][0]
     spread = tool.load(tool.ROOT, "ggn", "observer", "observer.json")["spread"]
-    windows = {name: [] for name in NAMES}
+    windows = {name: Windows() for name in NAMES}
     for i, block in enumerate(replay["blocks"]):
         view = views[block["view"]]["name"]
-        for k, (spp, noisy, error) in enumerate(zip(block["spp"], block["noisy"], block["error"])):
-            if noisy is None:
+        levels = block["spp"]
+        for k, (spp, noisy, error) in enumerate(zip(levels, block["noisy"], block["error"])):
+            if noisy is None or k + 1 == len(levels):
                 continue  # beyond where the study ended
-            share = statistics.NormalDist().cdf(math.log2(max(error, 1e-6)) / spread)
-            for name, score in (("lull-3", model["scores"][i][k]), ("law", share), ("-spp", -spp)):
-                windows[name].append((view, score, noisy))
+            add = lambda name, score: windows[name].add(view, score, noisy, levels[k + 1] - spp)
+            add("lull-3", model["scores"][i][k])
+            add("law", statistics.NormalDist().cdf(math.log2(max(error, 1e-6)) / spread))
+            add("-spp", wanted_above(replay, block["view"], spp))
             for name, of in published.items():
                 said = next((t for v, t in of.items() if v.startswith(view)), None)
                 if said:
-                    windows[name].append((view, float(spp < said[block["id"]]), noisy))
-    found = {name: of_windows(w) for name, w in windows.items() if w}
-    for name in found:
-        if name == "-spp":
-            found[name]["accuracy"] = None  # no probability
-        elif name in published:
-            found[name] = {"auc": None, "auc_views": None, "accuracy": None, "best": found[name]["accuracy"][CUTS.index(0.5)]}
-    return found, len(windows["law"])
+                    add(name, float(spp < said[block["id"]]))
+    found = {name: figures(w) for name, w in windows.items() if w.rows}
+    for name in published:  # a decision, no probability
+        for way in found.get(name, {}).values():
+            way.update(auc=None, best=way["accuracy"][0], accuracy=None)
+    return found, len(windows["law"].rows)
 
 
 def page(results):
     number = lambda v, form="%.3f": tables.figure(v, form)
-    first = tables.table(["%d windows of %d views" % (results["windows"], results["views"]), "AUC", "AUC, mean of views",
-                          *("at %g" % c for c in CUTS), "best"],
-                         [[NAMES[name], number(r["auc"]), number(r["auc_views"]), *([number(a) for a in r["accuracy"]] if r["accuracy"] else ["–"] * len(CUTS)),
-                           number(r["best"])] for name, r in results["windows_of"].items()])
+    way = lambda key, title: tables.table([title, "AUC", *("at %g" % c for c in CUTS), "best"], [
+        [NAMES[name], number(r[key]["auc"]), *([number(a) for a in r[key]["accuracy"]] if r[key]["accuracy"] else ["–"] * len(CUTS)),
+         number(r[key]["best"])] for name, r in results["windows_of"].items()])
+    first = "%s\n%s" % (way("pooled", "%d windows, all" % results["windows"]), way("views", "mean of %d views" % results["views"]))
     second = tables.table(["", "blocks", "r, thresholds below 10,000", "early", "samples"],
                           [[name, str(r["blocks"]), number(r["pearson"], "%.2f"), tables.percent(r["early"]), number(r["samples"], "%.2f")]
                            for name, r in results["blocks_of"].items()])
