@@ -176,7 +176,7 @@ int job_send_head(struct job *job, int rank, enum job_kind kind, uint32_t serial
     return send_copy(job, rank, &head, sizeof head);
 }
 
-static int hear_farewell(struct job *job, int rank, const void *message, size_t size)
+static int receive_farewell(struct job *job, int rank, const void *message, size_t size)
 {
     struct job_farewell *f = &job->workers[rank].farewell;
     if (size != sizeof *f)
@@ -207,7 +207,7 @@ int job_receive(struct job *job, double wait_s, int *rank, struct job_message **
         job->over = 1;
         job->status = (int)(*message)->serial;
     } else {
-        rc = worker ? job_nonsense(job, *rank) : hear_farewell(job, *rank, data, *size);
+        rc = worker ? job_nonsense(job, *rank) : receive_farewell(job, *rank, data, *size);
     }
     free(data);
     return rc;
@@ -226,7 +226,7 @@ static int say_hello(struct job *job, const char *settings, int threads)
     return job_send(job, 0, hello, size);
 }
 
-static int hear_hello(struct job *job, int rank, const struct job_message *message, size_t size, const char *ours)
+static int receive_hello(struct job *job, int rank, const struct job_message *message, size_t size, const char *ours)
 {
     static const struct base_identity_words words = {" has", " has no", "rank 0"};
     const struct job_hello *hello = (const struct job_hello *)message;
@@ -263,7 +263,7 @@ int job_handshake(struct job *job, const char *settings, int threads, struct bas
             size_t size;
             int got = job_receive(job, LOOK_S, &rank, &message, &size);
             if (got > 0) {
-                hear_hello(job, rank, message, size, settings);
+                receive_hello(job, rank, message, size, settings);
                 free(message);
             } else if (got == 0) {
                 look_round(job, first_silent(job), base_clock_wall_s() - start_s);
@@ -292,7 +292,7 @@ static void say_farewell(struct job *job, int status, const char *text)
 }
 
 /* Rank 0 has no more to say; the others end when they are done. */
-static int hear_farewells(struct job *job, int status, struct base_err *err)
+static int receive_farewells(struct job *job, int status, struct base_err *err)
 {
     const int count = job->transport->count;
     const double start_s = base_clock_wall_s();
@@ -327,7 +327,7 @@ int job_close(struct job *job, int status, const char *text, struct base_err *er
     if (job->transport->rank > 0)
         say_farewell(job, status, text);
     else if (!job->lost)
-        status = hear_farewells(job, status, err);
+        status = receive_farewells(job, status, err);
     if (job->lost)
         job->transport->calls->abort(job->transport, job->transport->rank > 0 ? job->status : status);
     status = job->transport->rank > 0 ? 0 : status;

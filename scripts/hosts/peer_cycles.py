@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Blender, headless: renders with Cycles what it is told line by line, and answers with processor seconds (scripts/lab peers).
+"""Blender, headless: renders with Cycles what each line requests, and responds with processor seconds (scripts/lab peers).
 
     build/hosts/bpy/bin/python3 scripts/hosts/peer_cycles.py         or         blender -b --factory-startup --python …
 
@@ -36,31 +36,31 @@ def equal_terms(scene, seed):
     settings.file_format, settings.color_depth, settings.exr_codec = "OPEN_EXR", "32", "NONE"
 
 
-def own(scene, told):
+def own(scene, request):
     """By Cycles alone."""
     cycles = scene.cycles
-    cycles.samples, cycles.use_adaptive_sampling = told["spp"], "threshold" in told
-    if "threshold" in told:
-        cycles.adaptive_threshold, cycles.adaptive_min_samples = told["threshold"], 0
-    cycles.use_denoising = bool(told.get("denoise"))
+    cycles.samples, cycles.use_adaptive_sampling = request["spp"], "threshold" in request
+    if "threshold" in request:
+        cycles.adaptive_threshold, cycles.adaptive_min_samples = request["threshold"], 0
+    cycles.use_denoising = bool(request.get("denoise"))
     if cycles.use_denoising:
         cycles.denoiser, cycles.denoising_input_passes = "OPENIMAGEDENOISE", "RGB_ALBEDO_NORMAL"
-    scene.render.filepath, scene.render.use_file_extension = told["out"], False
+    scene.render.filepath, scene.render.use_file_extension = request["out"], False
     bpy.ops.render.render(write_still=True)
 
 
-def answer(told):
-    """Seconds of what was told."""
-    bpy.ops.wm.open_mainfile(filepath=told["file"])
+def respond(request):
+    """Processor seconds of one request."""
+    bpy.ops.wm.open_mainfile(filepath=request["file"])
     scene = bpy.context.scene
-    equal_terms(scene, told["seed"])
-    if "host" not in told:
+    equal_terms(scene, request["seed"])
+    if "host" not in request:
         start = cpu_s()
-        own(scene, told)
+        own(scene, request)
         return cpu_s() - start
-    scene.cycles.samples = told["spp"]
+    scene.cycles.samples = request["spp"]
     start = cpu_s()
-    if cli.main([*told["host"], "-q", "-o", told["out"]]) != 0:
+    if cli.main([*request["host"], "-q", "-o", request["out"]]) != 0:
         raise RuntimeError("lull.blender failed")
     return cpu_s() - start
 
@@ -68,6 +68,6 @@ def answer(told):
 for line in sys.stdin:
     try:
         reply = {"s": answer(json.loads(line))}
-    except Exception as why:  # whatever Blender raises is told to who asked
+    except Exception as why:  # whatever Blender raises goes into the response
         reply = {"error": f"{type(why).__name__}: {why}"}
     print("\nPEER " + json.dumps(reply), flush=True)

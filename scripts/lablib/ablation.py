@@ -92,7 +92,7 @@ def table(rows, auc="%.4f", early="%.1f %%", times="%.1f"):
 
 
 def page(results):
-    return "%s; all with\n`%s`.\n\n%s" % (tables.told(results["measured"]), results["common"], table(results["rows"], "%.3f", "%.0f %%", "%.0f"))
+    return "%s; all with\n`%s`.\n\n%s" % (tables.provenance(results["measured"]), results["common"], table(results["rows"], "%.3f", "%.0f %%", "%.0f"))
 
 
 SETS = {"people": "people's four views, made from halves, each left out of the observer's fit", "test": "test scenes of the plan",
@@ -108,9 +108,9 @@ def judge(root, models):
             continue
         rows = found[name] = {}
         for model in models:
-            told = json.loads(ggn("evaluate", "-d", os.path.join(root, name), "-O", os.path.join(tool.ROOT, "ggn/observer/observer.json"),
+            result = json.loads(ggn("evaluate", "-d", os.path.join(root, name), "-O", os.path.join(tool.ROOT, "ggn/observer/observer.json"),
                                   *(["--recorded"] if name == "test" else []), "--no-quality", "--json", "-t", 1, "-m", model))
-            split = next(s for s in told["splits"].values())
+            split = next(s for s in result["splits"].values())
             for method in ("observer", os.path.basename(model)):
                 rows[method] = {"blocks": split[method]["blocks"], **{k: split[method].get(k) for k in JUDGED}}
     return found
@@ -123,7 +123,7 @@ def sets(results):
         for method, r in methods.items():
             shown = [None if r[k] is None else (100 if k == "early_stop_rate" else 1) * r[k] for k in JUDGED]
             rows.append([SETS[name], str(r["blocks"]), method, *[tables.figure(v, f) for v, f in zip(shown, forms)]])
-    return "%s.\n\n%s" % (tables.told(results["sets_measured"]), tables.table(
+    return "%s.\n\n%s" % (tables.provenance(results["sets_measured"]), tables.table(
         ("set", "blocks", "judged by", "early", "samples", "median \\|log2\\|", "bias", "ρ"), rows))
 
 

@@ -52,7 +52,7 @@ def evaluate(folder, o, *more, models=None):
 
 
 def others(o):
-    """The baselines that are shipped, and what published models said of the views of people."""
+    """The baselines that are shipped, and responses of published models to the views of people."""
     published = [os.path.join(o.human, f"{n}-thresholds.csv") for n in ("SVD-Entropy", "26-attributes")]
     return ([w for b in BASELINES for w in ("--baseline", f"ggn/models/{b}.ggn")]
             + [w for p in published if os.access(p, os.R_OK) for w in ("--thresholds", p)])
@@ -118,10 +118,10 @@ def page_table(results, name):
     """A table of the page: each row says when it was measured, and if with another observer than today's."""
     kept = results[name]
     m = kept["measured"]
-    told = "%s, %s" % (m["date"], m["commit"])
+    source = "%s, %s" % (m["date"], m["commit"])
     if m["level"] != tool.observer_law():
-        told += ", an earlier observer (`--visible %g`)" % m["visible"]
-    return table(kept["rows"], ("measured", lambda *_: told))
+        source += ", an earlier observer (`--visible %g`)" % m["visible"]
+    return table(kept["rows"], ("measured", lambda *_: source))
 
 
 def main(o):
@@ -140,8 +140,8 @@ def main(o):
         result |= {"test": {k: r for k, r in rows["test"].items() if not k.endswith(".csv")}, **half_of_the_viewers(o, work)}
     if os.path.isdir(o.rendered) and os.listdir(o.rendered):
         result |= rendered_views(o)
-    told = tool.measured(level=tool.load(o.observer)["level"], visible=tool.default("observer", "visible"))
-    result = {name: {"measured": told, "rows": rows} for name, rows in result.items()}
+    source = tool.measured(level=tool.load(o.observer)["level"], visible=tool.default("observer", "visible"))
+    result = {name: {"measured": source, "rows": rows} for name, rows in result.items()}
     tool.save(result, o.out, "agreement.json")
     for name, kept in result.items():
         print(f"Against {TITLES[name]}:\n")

@@ -101,8 +101,8 @@ ROWS = []  # of the part that is being measured
 
 def row(name, value, want=None, unit="", limit=None, most=False):
     """A figure, what it is held against (`limit`, same unit), what is wanted (at most, with `most`)."""
-    told = {"name": name, "value": value, "unit": unit, "limit": limit, "want": want, "most": most}
-    ROWS.append({k: v for k, v in told.items() if v or k == "value"})
+    row = {"name": name, "value": value, "unit": unit, "limit": limit, "want": want, "most": most}
+    ROWS.append({k: v for k, v in row.items() if v or k == "value"})
     print("bench: %s: %.3f%s" % (name, value, unit), file=sys.stderr, flush=True)
 
 
@@ -122,7 +122,7 @@ def cells(r):
 
 def machine(parts, part):
     m = parts[part]["measured"]
-    return "%s, load before %.2f" % (tables.told(m), m["load"])
+    return "%s, load before %.2f" % (tables.provenance(m), m["load"])
 
 
 def page(parts):
@@ -426,7 +426,7 @@ def main(o):
     for name in chosen:
         if name not in parts:
             raise tool.Refused("--only %s: expected some of %s" % (name, ",".join(parts)))
-    told, found, failed = tool.measured(load=os.getloadavg()[0]), {}, 0
+    row, found, failed = tool.measured(load=os.getloadavg()[0]), {}, 0
     build(chosen)
     for name in chosen:
         ROWS.clear()
@@ -435,7 +435,7 @@ def main(o):
         except (tool.Refused, subprocess.CalledProcessError, OSError, ValueError, TypeError) as e:
             missing(name, str(e))  # the rest of the table is worth having
             failed = 1
-        found[name] = {"measured": told, "rows": list(ROWS)}
+        found[name] = {"measured": row, "rows": list(ROWS)}
     print(page(found))
     if o.write:
         before = tool.results(o.write, "bench")

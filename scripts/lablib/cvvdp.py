@@ -112,10 +112,10 @@ def serve(ppd, peak):
               for heatmap in (None, "raw")]
     for line in sys.stdin:
         try:
-            said = answer(judges, numpy, **json.loads(line))
+            response = answer(judges, numpy, **json.loads(line))
         except (OSError, ValueError, subprocess.CalledProcessError) as why:
-            said = {"why": str(why)}
-        print(json.dumps(said), flush=True)
+            response = {"why": str(why)}
+        print(json.dumps(response), flush=True)
 
 
 def transient():

@@ -58,9 +58,9 @@ def measure(o, scene):
     """Of every look at every block what was believed, and of every picture what is true."""
     paths, mean = references(o, scene)
     folder = os.path.join(o.work, name_of(scene))
-    told = tool.run(os.path.join(tool.BUILD, "bench", "pt_looks"), scene, SIZE, BLOCK, SEED, folder, ",".join(map(str, LEVELS)),
+    output = tool.run(os.path.join(tool.BUILD, "bench", "pt_looks"), scene, SIZE, BLOCK, SEED, folder, ",".join(map(str, LEVELS)),
                     "quality=" + o.quality, "first-spp=%d" % LEVELS[0])
-    looks = [json.loads(line) for line in told.splitlines()]
+    looks = [json.loads(line) for line in output.splitlines()]
     report = os.path.join(o.work, name_of(scene) + ".price.json")
     tool.run(tool.RENDER, scene, "--size", "%dx%d" % (SIZE, SIZE), "--block", BLOCK, "--spp", PRICE_SPP, "-q", "--report", report)
     price = [b["thread_s"] / PRICE_SPP for b in tool.load(report)["blocks"]]
@@ -204,7 +204,7 @@ def text(rows, s):
 
 
 def page(results):
-    return "%s.\n\n%s" % (tables.told(results["measured"]), text(results["rows"], results["summary"]))
+    return "%s.\n\n%s" % (tables.provenance(results["measured"]), text(results["rows"], results["summary"]))
 
 
 def judged(o, scene):

@@ -29,16 +29,16 @@ def opinions(folder, mean, block):
     return out
 
 
-def ratios(said, judge, kind):
+def ratios(opinions, judge, kind):
     """At every look: noise that the judge finds as bad over what the observer says, from one scene's opinions."""
-    line = statistics.linear_regression([math.log(x[judge]) for x in said if x["kind"] == "noisy"],
-                                        [math.log(x["observer"]) for x in said if x["kind"] == "noisy"])
-    return [math.exp(line.intercept + line.slope * math.log(x[judge])) / x["observer"] for x in said if x["kind"] == kind]
+    line = statistics.linear_regression([math.log(x[judge]) for x in opinions if x["kind"] == "noisy"],
+                                        [math.log(x["observer"]) for x in opinions if x["kind"] == "noisy"])
+    return [math.exp(line.intercept + line.slope * math.log(x[judge])) / x["observer"] for x in opinions if x["kind"] == kind]
 
 
 def summary(scenes):
     """scenes: opinions of each. Medians over scenes and looks."""
-    return {"scenes": len(scenes), **{"%s_%s" % (judge, kind): statistics.median(r for said in scenes for r in ratios(said, judge, kind))
+    return {"scenes": len(scenes), **{"%s_%s" % (judge, kind): statistics.median(r for opinions in scenes for r in ratios(opinions, judge, kind))
                                       for judge in JUDGES for kind in KINDS[1:]}}
 
 

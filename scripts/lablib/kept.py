@@ -83,7 +83,7 @@ def row(spp, blocks):
 
 def page(results):
     table = tables.table(HEAD, [row(spp, [b for scene in results["scenes"].values() for b in scene[str(spp)]]) for spp in SPP])
-    return "%s: %s.\n\n%s" % (tables.told(results["measured"]), ", ".join(results["scenes"]), table)
+    return "%s: %s.\n\n%s" % (tables.provenance(results["measured"]), ", ".join(results["scenes"]), table)
 
 
 def main(o):

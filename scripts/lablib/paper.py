@@ -124,7 +124,7 @@ def page(results):
     second = tables.table(["", "blocks", "r, thresholds below 10,000", "early", "samples"],
                           [[name, str(r["blocks"]), number(r["pearson"], "%.2f"), tables.percent(r["early"]), number(r["samples"], "%.2f")]
                            for name, r in results["blocks_of"].items()])
-    return "%s.\n\n%s\n%s" % (tables.told(results["measured"]), first, second)
+    return "%s.\n\n%s\n%s" % (tables.provenance(results["measured"]), first, second)
 
 
 def compared(o, name):

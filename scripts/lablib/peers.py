@@ -54,22 +54,22 @@ class Cycles:
         if not os.path.exists(pbrt):
             raise tool.Refused("%s cannot be exported: %s" % (scene, EXPORT))
 
-    def seconds(self, **told):
+    def seconds(self, **request):
         """Processor seconds of one render."""
         if not self.process:
             env = {**os.environ, "LULL_PLUGIN_PATH": os.path.join(tool.BUILD, "lib", "lull")}
             self.process = subprocess.Popen([*self.command, WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                             stderr=subprocess.DEVNULL, text=True, errors="replace", env=env)
-        self.process.stdin.write(json.dumps(told) + "\n")
+        self.process.stdin.write(json.dumps(request) + "\n")
         self.process.stdin.flush()
         for line in self.process.stdout:
             if line.startswith("PEER "):
                 reply = json.loads(line[5:])
                 if "error" in reply:
-                    raise tool.Refused("%s: %s" % (told["file"], reply["error"].strip()))
+                    raise tool.Refused("%s: %s" % (request["file"], reply["error"].strip()))
                 return reply["s"]
         self.process = None
-        raise tool.Refused("%s: Blender died" % told["file"])
+        raise tool.Refused("%s: Blender died" % request["file"])
 
     def version(self):
         asked = ["--version"] if self.blender else ["-c", "import bpy; print('Blender', bpy.app.version_string)"]
@@ -149,8 +149,8 @@ class Scene:
     def ours(self, seed, name, *words):
         return self.way(seed, name, "ours", lambda out: ours_seconds(self.pbrt, self.o, seed, out, *words))
 
-    def cycles_way(self, seed, name, **told):
-        return self.way(seed, name, "cycles", lambda out: self.cycles.seconds(file=self.blend, out=out, seed=seed, **told))
+    def cycles_way(self, seed, name, **request):
+        return self.way(seed, name, "cycles", lambda out: self.cycles.seconds(file=self.blend, out=out, seed=seed, **request))
 
     def measure_raw(self, seed):
         ours = self.ours(seed, "ours")
@@ -290,7 +290,7 @@ def head(results):
     o = results["options"]
     left = ["%s (%.0f %%)" % (name, 100 * f["differ"]) for name, f in results["scenes"].items() if f["differ"] > AGREE]
     text = "%s, Blender %s; films of %d×%d in blocks of %d, references of 2 × %d samples.\n" % (
-        tables.told(results["measured"]), results["blender"], o["size"], o["size"], o["block"], o["reference_spp"])
+        tables.provenance(results["measured"]), results["blender"], o["size"], o["size"], o["block"], o["reference_spp"])
     return text + ("Left out, as the references differ by more than %.0f %% somewhere: %s.\n" % (100 * AGREE, ", ".join(left)) if left else "")
 
 

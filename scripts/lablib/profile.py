@@ -101,7 +101,7 @@ def page(results):
     heads = ["share of the time"] + ["%s, %s" % (scene, column) for scene in scenes for column in ("before", "now")]
     bound = ", ".join("%s %.2f" % (scene, 1.0 / now["scenes"][scene][EMBREE]) for scene in scenes)
     return "%s\nIf all but Embree cost nothing, now would be so many times as fast: %s.\nMeasured by `%s`, %s; before: commit %s.\n" % (
-        tables.table(heads, rows), bound, now["measured"]["command"], tables.told(now["measured"]), before["measured"]["commit"])
+        tables.table(heads, rows), bound, now["measured"]["command"], tables.provenance(now["measured"]), before["measured"]["commit"])
 
 
 def main(o):

@@ -71,9 +71,9 @@ def judge(o, scenes, models):
     """What ggn evaluate says of them and of what is trivial, on the blocks of these scenes."""
     folder, alone = os.path.join(o.data, "validation"), os.path.join(o.out, "judged")
     views_of(folder if os.path.isdir(folder) else o.data, scenes, alone)
-    told = json.loads(ggn("evaluate", "-d", alone, "--no-quality", "--json", "-t", 1, *[w for m in models for w in ("-m", m)]))
+    result = json.loads(ggn("evaluate", "-d", alone, "--no-quality", "--json", "-t", 1, *[w for m in models for w in ("-m", m)]))
     keys = ("blocks", "windows", "auc", "early_stop_rate", "samples_ratio", "median_abs_log2")
-    return {name: {k: r.get(k) for k in keys} for name, r in told["splits"]["test"].items()
+    return {name: {k: r.get(k) for k in keys} for name, r in result["splits"]["test"].items()
             if name in TRIVIAL or name in map(os.path.basename, models)}
 
 
@@ -98,7 +98,7 @@ def page(r):
     rows += [row(shown, "", r["judged"][name]) for name, shown in beside(r)]
     data, first = r["data"], r["runs"][0]
     text = "%s. %d blocks of %d scenes (%d windows) to train on, %d blocks of %d other scenes to validate; all with\n`%s`.\n\n" % (
-        tables.told(r["measured"]), data["training_blocks"], len(data["train"]), data["training_windows"], data["validation_blocks"], len(data["validation"]), r["common"])
+        tables.provenance(r["measured"]), data["training_blocks"], len(data["train"]), data["training_windows"], data["validation_blocks"], len(data["validation"]), r["common"])
     text += "![validation AUC against processor hours](published-curve.png)\n\n" + tables.table(
         ("network", "options", "processor hours", "windows", "passes", "s per window", "AUC", "early", "samples", "median \\|log2\\|"), rows)
     text += "\nAt %.2f s per window %d passes over the %d windows of `scripts/dataset.plan` would take %.0f processor hours, a tenth of them %.0f; " \

@@ -56,7 +56,7 @@ def render(o, scene, report):
     child = subprocess.Popen(base(o, scene) + ["--report", report, "--preview", report[:-12] + ".png"], stderr=slave,
                              stdout=subprocess.DEVNULL, preexec_fn=lambda: os.nice(10)) # so that we are never late to look
     os.close(slave)
-    told = []
+    line_states = []
     while True:
         try:
             text = os.read(master, 65536).decode(errors="replace")
@@ -64,19 +64,19 @@ def render(o, scene, report):
             break
         percent = re.findall(r"(>=)? *(\d+)%", text)
         if percent:
-            told.append([cpu_s(child.pid), int(percent[-1][1]), percent[-1][0] == ""])
+            line_states.append([cpu_s(child.pid), int(percent[-1][1]), percent[-1][0] == ""])
     if child.wait() != 0:
         raise tool.Refused("%s: the render failed" % scene)
-    return told
+    return line_states
 
 
 def measure(o, role, scene, path):
     quote = subprocess.run(base(o, scene) + ["--quote", "--json", "-q"], stdout=subprocess.PIPE, check=True,
                            preexec_fn=lambda: os.nice(10)).stdout
     report = path[:-5] + ".report.json"
-    told = render(o, scene, report)
+    states = render(o, scene, report)
     report = tool.load(report)
-    result = {"role": role, "scene": scene, "quote": json.loads(quote), "told": told, "startup_s": startup_s(o, scene),
+    result = {"role": role, "scene": scene, "quote": json.loads(quote), "told": states, "startup_s": startup_s(o, scene),
               "wall_s": report["totals"]["render_s"], "threads": o.threads,
               "real": [{"spp": b["spp"], "thread_s": b["thread_s"], "reason": b["reason"]} for b in report["blocks"]]}
     tool.save(result, path, indent=None)
@@ -121,7 +121,7 @@ def summary(rows):
             "eta": [[statistics.median(x), x[-1], len(x)] if x else None for x in etas]}
 
 
-def told(s, name):
+def accuracy(s, name):
     share = lambda part, whole: "%d of %d (%.0f %%)" % (s[part], s[whole], 100 * s[part] / max(1, s[whole]))
     eta = ["at %d %% of the time %.2f (worst %.2f; %d scenes)" % (at, *e) for at, e in zip((10, 25, 50), s["eta"]) if e]
     lines = ["time within 35 %% in %s, median factor off %.2f, worst %.2f" % (share("near", "scenes"), s["median"], s["worst"]),
@@ -142,7 +142,7 @@ def kept(rows, large):
 
 def text(run):
     shown = walls(run["rows"]) if "Together" in run["summary"] else tables.table(HEAD, [cells(r) for r in sorted(run["rows"], key=lambda r: r["role"])])
-    return "\n".join([shown, *[told(s, name) for name, s in run["summary"].items()]])
+    return "\n".join([shown, *[accuracy(s, name) for name, s in run["summary"].items()]])
 
 
 def draw(rows, folder):
@@ -160,9 +160,9 @@ def draw(rows, folder):
 def with_walls(result):
     """Wall seconds, quoted for free processors, and how many of the threads were at work meanwhile."""
     f, row = figures(result), [r for r in result["quote"]["rows"] if r["as_asked"]][0]
-    said, wall, busy = row["wall_s"]["expected"], result["wall_s"], f["s"] / result["wall_s"]
-    return {**f, "said_wall_s": said, "wall_s": wall, "wall_ratio": said / wall, "busy": busy, "threads": result["threads"],
-            "free_ratio": said / (wall * min(busy, result["threads"]) / result["threads"])}
+    expected, wall, busy = row["wall_s"]["expected"], result["wall_s"], f["s"] / result["wall_s"]
+    return {**f, "said_wall_s": expected, "wall_s": wall, "wall_ratio": expected / wall, "busy": busy, "threads": result["threads"],
+            "free_ratio": expected / (wall * min(busy, result["threads"]) / result["threads"])}
 
 
 def walls(rows):
@@ -174,7 +174,7 @@ def walls(rows):
 
 def page(results, kind):
     """One of the runs (small, large), and who measured it."""
-    return "%s.\n\n%s" % (tables.told(results[kind]["measured"]), text(results[kind]))
+    return "%s.\n\n%s" % (tables.provenance(results[kind]["measured"]), text(results[kind]))
 
 
 def main(o):

@@ -82,7 +82,7 @@ def main(o):
         return 0
     if o.pictures:
         os.makedirs(o.pictures, exist_ok=True)
-    found, missed, told = {}, 0, tool.measured()
+    found, missed, measured = {}, 0, tool.measured()
     print("%-52s %9s %8s %11s" % ("reference", "exposure", "median", "within 15 %"))
     with tempfile.TemporaryDirectory() as scratch:
         for name, scene, reference, share, median in wanted(o.shared):
@@ -97,7 +97,7 @@ def main(o):
             scale, middle, within = compare(tiles(out, size, scratch), tiles(reference, size, scratch))
             good = middle <= median and within >= share
             missed += not good
-            found[name] = {"spp": o.spp, "exposure": scale, "median": middle, "within": within, "measured": told}
+            found[name] = {"spp": o.spp, "exposure": scale, "median": middle, "within": within, "measured": measured}
             print("%-52s %9.3f %7.1f%% %10.0f%%%s" % (name, scale, 100 * middle, 100 * within, "" if good else "  <-- misses"), flush=True)
             if o.pictures:
                 picture(out, reference, size, scale, os.path.join(o.pictures, name.replace(" ", "-") + ".png"))

@@ -217,7 +217,7 @@ def table(rows):
 
 def page(results, name):
     """One of the tables, and who measured it."""
-    return "%s.\n\n%s" % (tables.told(results[name]["measured"]), table(results[name]["rows"]))
+    return "%s.\n\n%s" % (tables.provenance(results[name]["measured"]), table(results[name]["rows"]))
 
 
 def draw(rows, path):

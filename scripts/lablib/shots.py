@@ -195,7 +195,7 @@ def page(results):
     rows = [[name, kind, *("%.2f" % r[way]["jod"] for way in ("criterion", "table")),
              *("%.2f" % r[way]["against"][key] for key in ("seconds", "flicker", "flicker_share") for way in ("criterion", "table")), tables.percent(r["pilots"])]
             for name, kind, r in rows_of(results)]
-    return tables.table(heads, rows) + "\n%s.\n" % tables.told(results["measured"])
+    return tables.table(heads, rows) + "\n%s.\n" % tables.provenance(results["measured"])
 
 
 def beside(results):

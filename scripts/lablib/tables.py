@@ -15,7 +15,7 @@ def percent(value):
     return figure(100 * value, "%.0f %%") if value is not None else "–"
 
 
-def told(measured):
+def provenance(measured):
     """When, where and at which commit something was measured."""
     day = datetime.date.fromisoformat(measured["date"]).strftime("%-d %B %Y")
     return "%s, %s, commit %s" % (day, measured["processor"], measured["commit"])

@@ -168,7 +168,7 @@ def row(blocks, usual):
 
 def rows(results):
     """[(criterion, size, kind, row)]"""
-    told = []
+    found = []
     scenes = results["scenes"]
     keys = [(name, size) for size in results["sizes"] for name in results["criteria"]]
     for kind, wanted in (("rare light", True), ("other scenes", False)):
@@ -177,17 +177,17 @@ def rows(results):
             blocks = [b for s in of for b in scenes[s]["%s %d" % (name, size)]]
             usual = [b for s in of for b in scenes[s]["%s %d" % (results["criteria"][0], size)]]
             if blocks:
-                told.append((name, size, kind, row(blocks, usual)))
-    return told
+                found.append((name, size, kind, row(blocks, usual)))
+    return found
 
 
 def wrong(results):
     """Which scenes hold the stops of the first criterion that are off, by size of block: a list of the page."""
     lines, name = [], results["criteria"][0]
     for size in results["sizes"]:
-        told = {s: row(of["%s %d" % (name, size)], None) for s, of in results["scenes"].items()}
-        stopped = sum(r["stopped"] for r in told.values())
-        off = sorted(((round(r["off"][0] * r["stopped"]), s, r) for s, r in told.items() if r["off"][0]), key=lambda x: (-x[0], x[1]))
+        by_scene = {s: row(of["%s %d" % (name, size)], None) for s, of in results["scenes"].items()}
+        stopped = sum(r["stopped"] for r in by_scene.values())
+        off = sorted(((round(r["off"][0] * r["stopped"]), s, r) for s, r in by_scene.items() if r["off"][0]), key=lambda x: (-x[0], x[1]))
         lines.append("- %d px: %d of %d stops off at %g%s." % (
             size, sum(count for count, _, _ in off), stopped, OFF[0],
             "".join("%s %s %d of %d (worst %.2f)" % ("," if i else ":", s, count, r["stopped"], r["worst"])

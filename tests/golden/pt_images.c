@@ -91,7 +91,7 @@ static void add_sample(const struct pt_path_result *r, struct picture *out, int 
 #undef ADD
 }
 
-static void tell_scene(const struct pt_scene *s, const char *kernel, char *out, size_t room)
+static void print_scene(const struct pt_scene *s, const char *kernel, char *out, size_t room)
 {
     snprintf(out, room, "%s %x shapes %d %d %d %d triangles %lld placed %d %d lights %d %d %d %d images %d %d %d %d", kernel,
              s->effects, s->shape_count, s->world_shape_count, s->mesh_count, s->quadric_count, s->stats.triangles,
@@ -121,7 +121,7 @@ static void draw(const char *path, const struct way *way, struct picture *out)
     const char *kernel_name;
     pt_kernel *kernel = pt_kernel_select(scene->effects, NULL, &kernel_name);
     memset(out, 0, sizeof *out);
-    tell_scene(scene, kernel_name, out->made, sizeof out->made);
+    print_scene(scene, kernel_name, out->made, sizeof out->made);
     for (uint32_t i = 0; i < PIXELS; i++)
         pt_kernel_census(scene, &settings, i % WIDTH, i / WIDTH, 0, out->met);
     for (int y = 0; y < HEIGHT; y++)

@@ -16,15 +16,15 @@ t "a picture of numbers" sh -c "printf 'view;block;threshold;censored;stop;score
 t "a man page of each program" sh -c "for p in $at/bin/*; do [ -s $at/share/man/man1/\${p##*/}.1 ] || exit 1; done"
 # As people press Tab: $@ are the words of the line, the last one is completed.
 complete() { bash -c 'PATH=$0/bin:$PATH; . $0/share/bash-completion/completions/${1##*/}; COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)); _lull; echo "${COMPREPLY[@]}"' "$at" "$@"; }
-said() { want=$1; shift; complete "$@"; [ "$(complete "$@")" = "$want" ]; }
-t "Tab: options" said "--spp= --spp-max= --spp-min=" lull-render --spp
-t "  …with a short form" said "--criterion=" lull-render --crit
-t "  …their choices" said "box triangle gaussian" lull-render --filter =
-t "  …as they begin" said triangle lull-render --filter = t
-t "  …criteria" said observer lull-render -c obs
-t "  …files" said scenes/demo.pbrt lull-render scenes/demo.
-t "  …commands" said train ggn tr
-t "  …and their options" said "--preset=" ggn train --pres
+completes() { want=$1; shift; complete "$@"; [ "$(complete "$@")" = "$want" ]; }
+t "Tab: options" completes "--spp= --spp-max= --spp-min=" lull-render --spp
+t "  …with a short form" completes "--criterion=" lull-render --crit
+t "  …their choices" completes "box triangle gaussian" lull-render --filter =
+t "  …as they begin" completes triangle lull-render --filter = t
+t "  …criteria" completes observer lull-render -c obs
+t "  …files" completes scenes/demo.pbrt lull-render scenes/demo.
+t "  …commands" completes train ggn tr
+t "  …and their options" completes "--preset=" ggn train --pres
 t "  …of every program" sh -c "for p in $at/bin/*; do [ -e $at/share/bash-completion/completions/\${p##*/} ] || exit 1; done"
 t "uninstall" make uninstall
 t "  …leaves no file" sh -c "! find $tmp/root ! -type d | grep ." 

@@ -11,20 +11,20 @@
 #include <cmocka.h>
 
 #include "pbrt/load.h"
-#include "support/pt_heard.h"
+#include "support/pt_captured.h"
 
 static int load(const char *text, int strict, int *warnings, struct pt_scene **scene, struct pt_scene_defaults *defaults,
                 struct base_err *err)
 {
-    struct heard heard;
+    struct captured messages;
     struct pt_source_single single = {"t.pbrt", text, strlen(text)};
     struct pt_source source = pt_source_from_memory(&single);
-    struct pt_load_options options = {.strict = strict, .log = &heard.log};
-    hear_begin(&heard);
+    struct pt_load_options options = {.strict = strict, .log = &messages.log};
+    capture_begin(&messages);
     int rc = pt_scene_load_source("t.pbrt", &source, &options, scene, defaults, err);
     if (warnings)
-        *warnings += heard_lines(&heard);
-    hear_end(&heard);
+        *warnings += captured_lines(&messages);
+    capture_end(&messages);
     return rc;
 }
 

@@ -264,7 +264,7 @@ static void print_thresholds(FILE *f, int rc, struct ggn_thresholds *t, const st
     ggn_thresholds_release(t);
 }
 
-static void tell_table(FILE *f, const char *name, const char *contents)
+static void print_table(FILE *f, const char *name, const char *contents)
 {
     struct ggn_thresholds t = {0};
     struct base_err err = {0};
@@ -327,29 +327,29 @@ static void thresholds_are_told_word_by_word(void **state)
     FILE *f = transcript_begin(&t);
     (void)state;
     for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++)
-        tell_table(f, "t.csv", tables[i]);
-    tell_table(f, "t", "a;1");
-    tell_table(f, "t.json.csv", "a;1");
+        print_table(f, "t.csv", tables[i]);
+    print_table(f, "t", "a;1");
+    print_table(f, "t.json.csv", "a;1");
     for (size_t i = 0; i < sizeof reports / sizeof reports[0]; i++)
-        tell_table(f, "r.json", reports[i]);
+        print_table(f, "r.json", reports[i]);
     for (int length = GGN_VIEW_NAME - 1; length <= GGN_VIEW_NAME; length++) {
         char line[256];
         snprintf(line, sizeof line, "%0*d;1", length, 0);
-        tell_table(f, "long.csv", line);
+        print_table(f, "long.csv", line);
     }
     for (int n = GGN_VIEW_BLOCKS; n <= GGN_VIEW_BLOCKS + 1; n++) {
         char *line = malloc(2 * (size_t)n + 8);
         strcpy(line, "a");
         for (int i = 0; i < n; i++)
             strcpy(line + 1 + 2 * i, ";7");
-        tell_table(f, "wide.csv", line);
+        print_table(f, "wide.csv", line);
         free(line);
     }
     transcript_hide(&t, root, "ROOT");
     transcript_end(&t, "data-thresholds");
 }
 
-static void tell_dataset(FILE *f, const char *name)
+static void print_dataset(FILE *f, const char *name)
 {
     struct ggn_dataset d;
     struct base_err err = {0};
@@ -389,41 +389,41 @@ static void datasets_are_told_word_by_word(void **state)
     (void)state;
     snprintf(path, sizeof path, "rm -rf %s/*", root);
     assert_int_equal(system(path), 0);
-    tell_dataset(f, "");
-    tell_dataset(f, "/none");
+    print_dataset(f, "");
+    print_dataset(f, "/none");
     add_view("b-view0", "b");
     add_view("a-view1", "a");
     add_view("a-view0", "a");
     add_view("c", "c");
     add_view(".hidden", "c");
     put_file("note", "");
-    tell_dataset(f, "");
-    tell_dataset(f, "/c");
+    print_dataset(f, "");
+    print_dataset(f, "/c");
     for (size_t i = 0; i < sizeof splits / sizeof splits[0]; i++) {
         write_split(splits[i]);
-        tell_dataset(f, "");
+        print_dataset(f, "");
     }
     for (int i = 0; i < 3; i++) {
         static const char *const views[] = {"a-view0", "c", "b-view0"};
         snprintf(path, sizeof path, "%s/%s", root, views[i]);
         snprintf(l.source, sizeof l.source, "%s", i == 1 ? "human" : "observer");
         assert_int_equal(ggn_labels_write(path, &l, 1, NULL), 0);
-        tell_dataset(f, "");
+        print_dataset(f, "");
         if (i == 0)
-            tell_dataset(f, "/c");
+            print_dataset(f, "/c");
     }
     put_file("c/labels.json", "{}");
-    tell_dataset(f, "");
+    print_dataset(f, "");
     snprintf(path, sizeof path, "rm -r %s/c %s/split.json; mkdir %s/train %s/people %s/none", root, root, root, root, root);
     assert_int_equal(system(path), 0);
     add_view("train/a-view2", "a2");
     add_view("people/b-view1", "b1");
     add_view("none/x", "x");
-    tell_dataset(f, "");
+    print_dataset(f, "");
     add_view("people/a-view3", "a2");
-    tell_dataset(f, "");
+    print_dataset(f, "");
     put_file("people/b-view1/manifest.json", "{}");
-    tell_dataset(f, "/people/b-view1");
+    print_dataset(f, "/people/b-view1");
     transcript_hide(&t, root, "ROOT");
     transcript_end(&t, "data-sets");
 }

@@ -349,12 +349,12 @@ static void names_of_levels(FILE *f)
     }
 }
 
-static void tell_progress(void *data, const char *view, int done, int of)
+static void print_progress(void *data, const char *view, int done, int of)
 {
     fprintf(data, "  %s %d of %d\n", view, done, of);
 }
 
-static void tell_import(FILE *f, const char *name, const char *dir, const char *out, const struct ggn_import_options *o)
+static void print_import(FILE *f, const char *name, const char *dir, const char *out, const struct ggn_import_options *o)
 {
     struct base_err err = {0};
     struct seq_manifest m;
@@ -420,7 +420,7 @@ static void views_are_told_word_by_word(void **state)
     names_of_levels(f);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct ggn_import_options o = {
-            .block = cases[i].block, .allow_gaps = cases[i].gaps, .progress = i == 0 ? tell_progress : NULL, .data = f};
+            .block = cases[i].block, .allow_gaps = cases[i].gaps, .progress = i == 0 ? print_progress : NULL, .data = f};
         struct ggn_thresholds thresholds = {0};
         char csv[200];
         const char *dir = make_view(cases[i].name);
@@ -431,13 +431,13 @@ static void views_are_told_word_by_word(void **state)
             o.thresholds = &thresholds;
         }
         snprintf(out, sizeof out, "%s/%s-out", root, cases[i].name);
-        tell_import(f, cases[i].name, dir, out, &o);
+        print_import(f, cases[i].name, dir, out, &o);
         if (i == 0) { /* and once more, with other options */
-            tell_import(f, "again", dir, out, &o);
-            tell_import(f, "in larger blocks", dir, out, &(struct ggn_import_options){.block = SIDE});
+            print_import(f, "again", dir, out, &o);
+            print_import(f, "in larger blocks", dir, out, &(struct ggn_import_options){.block = SIDE});
             snprintf(out, sizeof out, "%s/none/x", root);
-            tell_import(f, "into no folder", dir, out, &o);
-            tell_import(f, "nothing", out, dir, &o);
+            print_import(f, "into no folder", dir, out, &o);
+            print_import(f, "nothing", out, dir, &o);
         }
         ggn_thresholds_release(&thresholds);
     }
@@ -446,7 +446,7 @@ static void views_are_told_word_by_word(void **state)
 }
 
 /* A line for each run of equal answers. */
-static void tell_rawls(FILE *f, const char *what, long value, const char *file, size_t n, char last[256])
+static void print_rawls(FILE *f, const char *what, long value, const char *file, size_t n, char last[256])
 {
     struct pic_image image;
     struct base_err err = {0};
@@ -476,23 +476,23 @@ static void rawls_are_told_word_by_word(void **state)
     (void)state;
     size_t n = make_rawls(file, 2, 2, 3, v);
     for (size_t i = 0; i <= n; i++)
-        tell_rawls(f, "bytes", (long)i, file, i, last);
+        print_rawls(f, "bytes", (long)i, file, i, last);
     for (size_t i = 0; i < n; i++) {
         file[i] ^= 0x20;
-        tell_rawls(f, "otherwise at", (long)i, file, n, last);
+        print_rawls(f, "otherwise at", (long)i, file, n, last);
         file[i] ^= 0x20;
     }
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
         n = make_rawls(file, 2, 2, 3, v);
         memcpy(file + 8, sizes[i], 12);
         last[0] = '\0';
-        tell_rawls(f, "size", (long)i, file, n, last);
+        print_rawls(f, "size", (long)i, file, n, last);
     }
     for (int i = 0; i < 12; i++) {
         float kept = v[i];
         v[i] = i % 2 ? INFINITY : NAN;
         n = make_rawls(file, 2, 2, 3, v);
-        tell_rawls(f, "value", i, file, n, last);
+        print_rawls(f, "value", i, file, n, last);
         v[i] = kept;
     }
     transcript_end(&t, "data-rawls");

@@ -19,7 +19,7 @@
 #include "render/farm.h"
 #include "render/render.h"
 #include "support/pt_fake.h"
-#include "support/pt_heard.h"
+#include "support/pt_captured.h"
 #include "support/base_transport.h"
 #include "support/pt_identity.h"
 
@@ -345,9 +345,10 @@ static void ends_well(enum behaviour last, int interrupt_after, const char *word
     struct base_err err = {0};
     enum pt_render_outcome outcome;
     struct watch watch = {.checkpoint = "/tmp/pt_farm_test.ckp"};
-    struct heard heard;
-    hear_begin(&heard);
-    const struct pt_render_hooks hooks = {.interrupted = &interrupted, .suspend = save, .log = &heard.log, .data = &watch};
+    struct captured messages;
+    capture_begin(&messages);
+    const struct pt_render_hooks hooks = {
+        .interrupted = &interrupted, .suspend = save, .log = &messages.log, .data = &watch};
     struct run one = {0}, lost = {0}, rest = {0};
     struct stage stage;
     config.planes = PT_FILM_ALL;
@@ -366,13 +367,13 @@ static void ends_well(enum behaviour last, int interrupt_after, const char *word
     assert_int_equal(pt_checkpoint_load(watch.checkpoint, rest.render, PT_IDENTITY("settings\n"), &err), 0);
     finish(&rest);
     if (words)
-        assert_non_null(strstr(heard.text, words));
+        assert_non_null(strstr(messages.text, words));
     assert_same(one.render, rest.render);
     release(&one);
     release(&lost);
     release(&rest);
     remove(watch.checkpoint);
-    hear_end(&heard);
+    capture_end(&messages);
 }
 
 static void a_silent_worker_is_named_and_nothing_is_lost(void **state)

@@ -23,7 +23,7 @@
 #include "support/api_folders.h"
 #include "support/approve.h"
 #include "support/pt_fake.h"
-#include "support/pt_heard.h"
+#include "support/pt_captured.h"
 
 /* --- the film ----------------------------------------------------------------------------------------------------------- */
 
@@ -152,18 +152,18 @@ static void failures_are_told_once(void **state)
     struct lull_criterion table = *pt_fake_criterion();
     struct lull_host_criterion *criterion;
     struct pt_render *render = NULL;
-    struct heard heard;
-    const struct pt_render_hooks hooks = {.log = &heard.log};
+    struct captured messages;
+    const struct pt_render_hooks hooks = {.log = &messages.log};
     enum pt_render_outcome outcome;
     struct pt_render_config config = pt_fake_config();
-    hear_begin(&heard);
+    capture_begin(&messages);
     table.evaluate = fail_to_evaluate;
     config.spp_max = 20;
     assert_int_equal(pt_criterion_create(&table, NULL, 0, NULL, NULL, &criterion, &err), 0);
     assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, pool, criterion, &render, &err), 0);
     assert_int_equal(pt_render_run(render, &hooks, &outcome, &err), 0);
-    assert_string_equal(heard.text, "criterion fake: no such luck\n");
-    hear_end(&heard);
+    assert_string_equal(messages.text, "criterion fake: no such luck\n");
+    capture_end(&messages);
     assert_true(render->totals->failed_checks > 1);
     for (uint32_t i = 0; i < render->blocks->count; i++)
         assert_true(render->blocks->list[i].spp == 20 && render->blocks->list[i].reason == LULL_REASON_SPP_MAX);
@@ -185,20 +185,20 @@ static void services(void **state)
     (void)state;
     struct base_err err = {0};
     struct base_threads *threads = base_threads_create(3, &err);
-    struct heard heard;
-    hear_begin(&heard);
+    struct captured messages;
+    capture_begin(&messages);
     struct lull_host_criterion *few = NULL, *busy = NULL;
-    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, NULL, &heard.log, &few, &err), 0);
+    assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, NULL, &messages.log, &few, &err), 0);
     assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, threads, NULL, &busy, &err), 0);
     const struct lull_host *alone = &few->host, *many = &busy->host;
     assert_true(alone->max_workers == 1 && many->max_workers == 3);
     assert_string_equal(alone->name, "lull-render " BASE_VERSION);
     alone->log(alone, LULL_LOG_INFO, "psst");
-    assert_string_equal(heard.text, "");
+    assert_string_equal(messages.text, "");
     alone->log(alone, LULL_LOG_WARNING, "mind the gap");
-    assert_string_equal(heard.text, "criterion fake: mind the gap\n");
+    assert_string_equal(messages.text, "criterion fake: mind the gap\n");
     many->log(many, LULL_LOG_ERROR, "nobody hears it");
-    hear_end(&heard);
+    capture_end(&messages);
     for (int k = 0; k < 2; k++) {
         int done[20] = {0};
         const struct lull_host *host = k ? many : alone;
@@ -309,21 +309,21 @@ static char *listed(struct approve_case *c)
     }
     FILE *out = fopen(path[2], "w");
     assert_true(out && fclose(out) == 0);
-    struct heard heard;
-    hear_begin(&heard);
+    struct captured messages;
+    capture_begin(&messages);
     assert_non_null(out = open_memstream(&text, &size));
-    int count = pt_criterion_list(out, &heard.log);
+    int count = pt_criterion_list(out, &messages.log);
     fclose(out);
     char *all = text;
     assert_non_null(out = open_memstream(&text, &size));
     print_first_two(out, all, count);
     free(all);
-    assert_int_equal(pt_criterion_find("halfbuf", &inputs, &heard.log, &found, &err), 0);
+    assert_int_equal(pt_criterion_find("halfbuf", &inputs, &messages.log, &found, &err), 0);
     fprintf(out, "found %s; an input is %s\n", found->id, inputs.paths[0]);
-    int rc = pt_criterion_find("nobody", &inputs, &heard.log, &found, &err);
+    int rc = pt_criterion_find("nobody", &inputs, &messages.log, &found, &err);
     fprintf(out, "%d: %s; %zu input\n", rc, err.text, inputs.count);
-    print_skipped(out, heard.text);
-    hear_end(&heard);
+    print_skipped(out, messages.text);
+    capture_end(&messages);
     assert_int_equal(pt_criterion_find("fixed", NULL, NULL, &found, &err), 0);
     assert_string_equal(found->id, "fixed");
     fclose(out);

@@ -27,7 +27,7 @@
 #include "support/api_folders.h"
 #include "support/approve.h"
 #include "support/pt_fake.h"
-#include "support/pt_heard.h"
+#include "support/pt_captured.h"
 #include "support/pt_text_scene.h"
 
 /* --- command lines ------------------------------------------------------------------------------------------------------ */
@@ -447,7 +447,7 @@ static int tear_down_quote(void **state)
     return 0;
 }
 
-static char *tell_quote(struct approve_case *c)
+static char *print_quote(struct approve_case *c)
 {
     char *text = NULL;
     size_t size;
@@ -476,7 +476,7 @@ static char *tell_quote(struct approve_case *c)
 static void quotes(void **state)
 {
     (void)state;
-    approve_cases("tests/golden/lull-render/quotes.txt", tell_quote);
+    approve_cases("tests/golden/lull-render/quotes.txt", print_quote);
 }
 
 /* --- at the end of a render --------------------------------------------------------------------------------------------- */
@@ -548,22 +548,22 @@ static void outputs_are_kept(void **state)
 static void the_last_line(void **state)
 {
     (void)state;
-    struct heard heard;
+    struct captured messages;
     for (int i = 0; i < 7; i++)
         list[i].reason = i < 3 ? LULL_REASON_CRITERION : i < 5 ? LULL_REASON_SPP_MAX : LULL_REASON_DROPPED;
     render.totals->paths = 123456789;
     render.totals->dropped = 12;
     lull_host_drop(render.frame, 7, 8, 9);
-    hear_begin(&heard);
-    heard.log.name = "lull-render";
-    pt_action_summary(&render, &heard.log);
-    heard.log.quiet = 1;
-    pt_action_summary(&render, &heard.log);
+    capture_begin(&messages);
+    messages.log.name = "lull-render";
+    pt_action_summary(&render, &messages.log);
+    messages.log.quiet = 1;
+    pt_action_summary(&render, &messages.log);
     render.totals->dropped = 0;
-    pt_action_summary(&render, &heard.log);
-    hear_end(&heard);
+    pt_action_summary(&render, &messages.log);
+    capture_end(&messages);
     assert_string_equal(
-        heard.text,
+        messages.text,
         "lull-render: 22 spp on average, 111.2 s, 2.44 Mpaths/s, criterion 54.6 %; blocks: 3 criterion 2 spp-max 2 dropped\n"
         "lull-render: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n"
         "lull-render: 12 samples were not finite and were dropped, the first seen at --debug-path 7,8,9\n");
@@ -579,12 +579,12 @@ static void between_two_slices(void **state)
     struct base_err err = {0};
     struct pt_cli cli = {.checkpoint_every_s = 1000};
     struct pt_shot_frame frame = {.paths = {[PT_CHECKPOINT] = "/missing/c"}};
-    struct heard heard;
-    struct pt_open open = {.cli = &cli, .frame = &frame, .log = &heard.log, .render = &render};
+    struct captured messages;
+    struct pt_open open = {.cli = &cli, .frame = &frame, .log = &messages.log, .render = &render};
     struct pt_watch w;
     double before_s = base_clock_wall_s();
-    hear_begin(&heard);
-    heard.log.quiet = 1;
+    capture_begin(&messages);
+    messages.log.quiet = 1;
     pt_watch_init(&w, &open, NULL);
     assert_true(w.checkpoint_at_s >= before_s + 1000 && w.checkpoint_at_s <= base_clock_wall_s() + 1000);
     const struct pt_render_hooks hooks = pt_watch_hooks(&w);
@@ -602,9 +602,9 @@ static void between_two_slices(void **state)
     assert_int_equal(hooks.slice(hooks.data, &render, &err), 0);
     double after_s = base_clock_wall_s();
     assert_true(w.checkpoint_at_s >= before_s + 1000 && w.checkpoint_at_s <= after_s + 1000);
-    assert_string_equal(heard.text,
+    assert_string_equal(messages.text,
                         "no checkpoint, the render goes on: /missing/c: cannot write there: No such file or directory\n");
-    hear_end(&heard);
+    capture_end(&messages);
     assert_int_equal(hooks.suspend(hooks.data, &render, &err), BASE_EIO);
     frame.paths[PT_CHECKPOINT] = NULL;
     assert_int_equal(hooks.suspend(hooks.data, &render, &err), 0);

@@ -17,7 +17,7 @@
 #include "pbrt/load.h"
 #include "sample/rng.h"
 #include "shade/warp.h"
-#include "support/pt_heard.h"
+#include "support/pt_captured.h"
 
 enum { CORNERS = 6, FACES = 8, RAYS = 200 };
 /* An octahedron, whose corners are the outward normals at them. */
@@ -89,16 +89,16 @@ static struct pt_scene *scene_of(const char *before, const struct normals *norma
     write_mesh(mesh, sizeof mesh, normals, 0);
     snprintf(files.scene, sizeof files.scene, "Camera \"perspective\" WorldBegin %s AreaLightSource \"diffuse\" Shape %s %s",
              before, ply ? "\"plymesh\" \"string filename\" \"m.ply\"" : "\"trianglemesh\"", ply ? "" : mesh);
-    struct heard heard;
+    struct captured messages;
     struct pt_source source = {.read = read_file, .data = &files};
-    struct pt_load_options options = {.log = &heard.log};
+    struct pt_load_options options = {.log = &messages.log};
     struct pt_scene_defaults defaults;
     struct base_err err = {0};
     struct pt_scene *scene = NULL;
-    hear_begin(&heard);
+    capture_begin(&messages);
     if (pt_scene_load_source("t.pbrt", &source, &options, &scene, &defaults, &err) != 0)
         fail_msg("%s", err.text);
-    hear_end(&heard);
+    capture_end(&messages);
     return scene;
 }
 

@@ -22,7 +22,7 @@ static void note_fetch(const void *address) { fetched[fetched_count++ % 64] = ad
 #include "shade/bsdf.h"
 #include "shade/medium.h"
 #include "shade/texture.h"
-#include "support/pt_heard.h"
+#include "support/pt_captured.h"
 #include "support/pt_scenes.h"
 
 static struct pt_input grey(float x) { return (struct pt_input){0, {x, x, x}}; }
@@ -193,17 +193,17 @@ static void trace_tells_the_same_path(void **state)
     struct pt_scene scene;
     struct pt_integrator settings = test_integrator(4);
     struct pt_path_result r;
-    struct heard heard;
+    struct captured messages;
     char expected[256];
     rich_scene(&scene, 1);
     pt_kernel_all(&scene, &settings, 12, 14, 1, 3, &r);
-    hear_begin(&heard);
-    pt_kernel_trace(&scene, &settings, 12, 14, 3, heard.log.out);
-    hear_end(&heard);
+    capture_begin(&messages);
+    pt_kernel_trace(&scene, &settings, 12, 14, 3, messages.log.out);
+    capture_end(&messages);
     snprintf(expected, sizeof expected, "\nend: pixel value (%g, %g, %g)\n", (double)r.radiance.x, (double)r.radiance.y,
              (double)r.radiance.z);
-    assert_string_equal(heard.text + strlen(heard.text) - strlen(expected), expected);
-    assert_true(heard_lines(&heard) >= 3);
+    assert_string_equal(messages.text + strlen(messages.text) - strlen(expected), expected);
+    assert_true(captured_lines(&messages) >= 3);
     test_scene_end(&scene);
 }
 
@@ -219,9 +219,9 @@ static void trace_says_what_it_is_told(void **state)
         "2: scattered in medium 4 at (0.1, 0.2, 0.3) throughput (0.4, 0.5, 0.6)\n"
         "3: thin dielectric at (7, 8, 9) normal (0.5, -1, 0.25) material 3 primitive 11 throughput (1, 1, 1)\n"
         "end: pixel value (12, 22, 32)\n";
-    struct heard heard;
-    hear_begin(&heard);
-    struct pt_trace trace = {.out = heard.log.out};
+    struct captured messages;
+    capture_begin(&messages);
+    struct pt_trace trace = {.out = messages.log.out};
     const struct pt_shape shape = {.material = 3};
     const struct pt_place at = {
         .p = {7, 8, 9}, .s = {.n_geometric = {0.5f, -1, 0.25f}, .n_shading = {9, 9, 9}}, .shape = &shape, .primitive = 11};
@@ -234,8 +234,8 @@ static void trace_says_what_it_is_told(void **state)
     pt_trace_scatter(&trace, 4, v3(0.1f, 0.2f, 0.3f), v3(0.4f, 0.5f, 0.6f));
     pt_trace_surface(&trace, &at, &pane, v3_splat(1));
     pt_trace_end(&trace, v3(12, 22, 32));
-    hear_end(&heard);
-    assert_string_equal(heard.text, lines);
+    capture_end(&messages);
+    assert_string_equal(messages.text, lines);
     assert_int_equal(trace.vertex, 3);
     for (int i = 0; i < PT_MET_COUNT; i++)
         assert_int_equal(trace.met[i], i == PT_BSDF_CONDUCTOR || i == PT_BSDF_THIN_DIELECTRIC || i == PT_MET_MEDIUM);

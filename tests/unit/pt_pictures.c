@@ -252,7 +252,7 @@ static size_t colours(const char *words, char *out)
 }
 
 /* Runs of one colour. */
-static size_t tell_row(const uint8_t *row, int width, char *out)
+static size_t print_row(const uint8_t *row, int width, char *out)
 {
     size_t n = 0;
     for (int x = 0, end; x < width; x = end) {
@@ -283,7 +283,7 @@ static size_t map_of_blocks(const char *words, char *out)
         for (end = y + 1; end < map.height && memcmp(row, map.rgb + (size_t)end * stride, stride) == 0; end++)
             ;
         n += (size_t)sprintf(out + n, " %d:", y);
-        n += tell_row(row, map.width, out + n);
+        n += print_row(row, map.width, out + n);
     }
     free(map.rgb);
     return n;

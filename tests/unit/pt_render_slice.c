@@ -10,7 +10,7 @@
 
 #include "render/rows.h"
 #include "support/pt_fake.h"
-#include "support/pt_heard.h"
+#include "support/pt_captured.h"
 
 /* --- what a slice does -------------------------------------------------------------------------------------------------- */
 
@@ -131,8 +131,8 @@ static struct {
 static int run_count;
 
 /* Radiance tells place and sample; of sample 7 every 50th pixel is no number. */
-static void tell_place(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y, int count,
-                       uint32_t sample, struct pt_path_result *out)
+static void print_place(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
+                        int count, uint32_t sample, struct pt_path_result *out)
 {
     (void)scene;
     (void)settings;
@@ -155,7 +155,7 @@ static void rows_are_cut_into_runs(void **state)
         struct pt_film film;
         struct base_err err = {0};
         struct pt_integrator integrator = {0};
-        const struct pt_sampler_context context = {NULL, tell_place, &integrator};
+        const struct pt_sampler_context context = {NULL, print_place, &integrator};
         struct pt_row row = {.y = 6, .x0 = 3, .x1 = 3 + width, .from = 5, .to = 8};
         assert_int_equal(pt_film_init(&film, 1, 5, 140, 8, PT_FILM_HALF, &err), 0);
         run_count = 0;
@@ -209,10 +209,10 @@ static void checks_may_be_too_dear(void **state)
         struct pt_render_config config = pt_fake_config();
         struct base_err err = {0};
         enum pt_render_outcome outcome;
-        struct heard heard;
-        const struct pt_render_hooks hooks = {.slice = enough, .log = &heard.log};
+        struct captured messages;
+        const struct pt_render_hooks hooks = {.slice = enough, .log = &messages.log};
         struct pt_fake_run r = {.pool = base_threads_create(1, &err)};
-        hear_begin(&heard);
+        capture_begin(&messages);
         config.width = config.crop[2] = 48;
         config.height = config.crop[3] = 16;
         config.spp_max = 30;
@@ -227,8 +227,8 @@ static void checks_may_be_too_dear(void **state)
         assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), BASE_EINVAL);
         const struct lull_host_totals *t = r.render->totals;
         assert_true(t->checks == (dear ? 0 : 2) && t->skipped_checks == (dear ? 2 : 0) && t->failed_checks == 0 &&
-                    !heard.text[0]);
-        hear_end(&heard);
+                    !messages.text[0]);
+        capture_end(&messages);
         assert_true(t->asked == t->checks &&
                     (dear ? t->criterion_s == 11 : t->criterion_s > 9 && t->criterion_thread_s > 0));
         for (int i = 0; i < 2; i++)

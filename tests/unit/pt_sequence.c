@@ -23,7 +23,7 @@
 #include "sequence/statistics.h"
 #include "support/lseq_oracle.h"
 #include "support/pt_fake.h"
-#include "support/pt_heard.h"
+#include "support/pt_captured.h"
 
 static void levels(void **state)
 {
@@ -152,14 +152,14 @@ static struct pt_sequence_config make_config(void)
                                        .render = pt_fake_config()};
 }
 
-static struct heard heard;
-static struct pt_render_hooks hooks = {.log = &heard.log};
+static struct captured messages;
+static struct pt_render_hooks hooks = {.log = &messages.log};
 
 /* "…, 0.1 s each, 3 s left" after what is known. */
 static void check_said(int i, const char *begin, const char *end)
 {
     double each_s, left_s;
-    const char *said = heard.text;
+    const char *said = messages.text;
     for (; i > 0; i--)
         said = strchr(said, '\n') + 1;
     assert_memory_equal(said, begin, strlen(begin));
@@ -376,12 +376,12 @@ static void recorded_folder(void **state)
     struct lull_host_criterion *criterion = NULL;
     struct base_err err = {0};
     assert_int_equal(pt_criterion_create(pt_fake_criterion(), NULL, 0, pool, NULL, &criterion, &err), 0);
-    hear_begin(&heard);
+    capture_begin(&messages);
     assert_int_equal(record(&config, criterion, &err), 0);
-    assert_int_equal(heard_lines(&heard), 2);
+    assert_int_equal(captured_lines(&messages), 2);
     check_said(0, "block 1 recorded, 1 of 2, ", " s left");
     check_said(1, "block 11 recorded, 2 of 2, ", ", 0 s left");
-    hear_end(&heard);
+    capture_end(&messages);
     lull_host_close(criterion);
     check_block("block-00001.lseq", 16, 0, 32, 16, 1);
     check_block("block-00011.lseq", 48, 32, 60, 44, 1);
@@ -414,13 +414,13 @@ static void dropped_samples_are_counted(void **state)
     config.directory = own;
     config.blocks = "0,1";
     kernel = pt_fake_nan;
-    hear_begin(&heard);
-    heard.log.quiet = 1;
+    capture_begin(&messages);
+    messages.log.quiet = 1;
     assert_int_equal(record(&config, NULL, &err), 0);
     kernel = pt_fake_noise;
-    assert_int_equal(heard_lines(&heard), 1);
-    assert_string_equal(heard.text, "block 0: 640 samples were not finite and were dropped; manifest.json counts them\n");
-    hear_end(&heard);
+    assert_int_equal(captured_lines(&messages), 1);
+    assert_string_equal(messages.text, "block 0: 640 samples were not finite and were dropped; manifest.json counts them\n");
+    capture_end(&messages);
     struct seq_manifest m;
     assert_int_equal(seq_manifest_read(own, &m, &err), 0);
     assert_int_equal(m.blocks[0].dropped, 8 * 16 * (4 + 1));
@@ -488,12 +488,12 @@ static void going_on(void **state)
     char path[128];
     snprintf(path, sizeof path, "%s/block-00001.lseq", folder);
     stat(path, &before);
-    hear_begin(&heard);
+    capture_begin(&messages);
     config.blocks = "1,2,11";
     assert_int_equal(record(&config, NULL, &err), 0);
-    assert_int_equal(heard_lines(&heard), 1);
+    assert_int_equal(captured_lines(&messages), 1);
     check_said(0, "block 2 recorded, 1 of 1, ", ", 0 s left");
-    hear_end(&heard);
+    capture_end(&messages);
     stat(path, &after);
     assert_true(before.st_ino == after.st_ino);
     check_block("block-00002.lseq", 32, 0, 48, 16, 0);
@@ -502,10 +502,10 @@ static void going_on(void **state)
     fseek(f, 100, SEEK_SET);
     fputc('x', f);
     fclose(f);
-    hear_begin(&heard);
+    capture_begin(&messages);
     assert_int_equal(record(&config, NULL, &err), 0);
-    assert_int_equal(heard_lines(&heard), 1);
-    hear_end(&heard);
+    assert_int_equal(captured_lines(&messages), 1);
+    capture_end(&messages);
     check_block("block-00001.lseq", 16, 0, 32, 16, 0);
     cJSON *m = read_manifest();
     assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(m, "blocks")), 3);

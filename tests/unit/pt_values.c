@@ -50,7 +50,7 @@ static void words(const char *format, ...)
 
 /* --- optics ----------------------------------------------------------------------------------------------------------- */
 
-static void tell_fresnel(void)
+static void print_fresnel(void)
 {
     static const float etas[] = {0.6f, 1.0f, 1.5f, 2.4f},
                        cosines[] = {-1, -0.7f, -0.3f, -1e-3f, 0, 1e-4f, 0.2f, 0.9f, 1, 1.00001f};
@@ -71,7 +71,7 @@ static void tell_fresnel(void)
     }
 }
 
-static void tell_microfacets(void)
+static void print_microfacets(void)
 {
     static const float alphas[][2] = {{0.1f, 0.5f}, {1, 1}, {0.02f, 0.02f}};
     static const pt_vec3 ways[] = {{0, 0, 1}, {0.6f, 0, 0.8f}, {0, -0.96f, 0.28f}, {0.36f, 0.48f, -0.8f}, {1, 0, 0}};
@@ -93,7 +93,7 @@ static void tell_microfacets(void)
         }
 }
 
-static void tell_warps(void)
+static void print_warps(void)
 {
     static const float us[] = {0, 0.1f, 0.1249f, 0.125f, 0.25f, 0.374f, 0.376f, 0.5f, 0.63f, 0.75f, 0.88f, PT_ONE_BELOW};
     for (size_t i = 0; i < COUNT(us); i++) {
@@ -113,7 +113,7 @@ static void tell_warps(void)
     }
 }
 
-static void tell_phases(void)
+static void print_phases(void)
 {
     static const float gs[] = {-1, -0.9f, -2e-3f, -5e-4f, 0, 9e-4f, 0.5f, 1}, us[] = {0, 0.2f, 0.5f, 0.8f, PT_ONE_BELOW};
     const pt_vec3 wo = {0.36f, 0.48f, -0.8f};
@@ -129,7 +129,7 @@ static void tell_phases(void)
         }
 }
 
-static void tell_filters(void)
+static void print_filters(void)
 {
     static const float us[] = {0, 1e-6f, 0.003f, 0.2f, 0.5f, 0.7f, 0.9999f, PT_ONE_BELOW}, half = 0.5f;
     for (int kind = 0; kind < 3; kind++)
@@ -160,7 +160,7 @@ static struct pt_bsdf uneven(struct pt_bsdf b, float y)
     return b;
 }
 
-static void tell_bsdf(const struct pt_bsdf *b, int index)
+static void print_bsdf(const struct pt_bsdf *b, int index)
 {
     static const pt_vec3 ways[] = {{0, 0, 1},       {0.6f, 0, 0.8f},       {0.36f, -0.48f, 0.8f}, {-0.64f, 0.768f, -0.024f},
                                    {0.8f, 0.6f, 0}, {0.48f, 0.64f, -0.6f}, {-0.6f, 0, 0.8f}};
@@ -194,7 +194,7 @@ static void tell_bsdf(const struct pt_bsdf *b, int index)
     }
 }
 
-static void tell_bsdfs(void)
+static void print_bsdfs(void)
 {
     const struct pt_bsdf models[] = {
         bsdf_diffuse(0.8f),
@@ -225,13 +225,13 @@ static void tell_bsdfs(void)
     for (size_t i = 0; i < COUNT(models); i++) {
         struct pt_bsdf b = models[i];
         b.walk_key = 77;
-        tell_bsdf(&b, (int)i);
+        print_bsdf(&b, (int)i);
     }
 }
 
 /* --- media ------------------------------------------------------------------------------------------------------------ */
 
-static void tell_crossing(const struct pt_medium *m, pt_vec3 origin, pt_vec3 direction, float t_max, uint32_t key)
+static void print_crossing(const struct pt_medium *m, pt_vec3 origin, pt_vec3 direction, float t_max, uint32_t key)
 {
     struct pt_rng rng = pt_rng_make(key), other = pt_rng_make(key + 100);
     struct pt_medium_event e;
@@ -244,7 +244,7 @@ static void tell_crossing(const struct pt_medium *m, pt_vec3 origin, pt_vec3 dir
     words("\n");
 }
 
-static void tell_media(void)
+static void print_media(void)
 {
     static const float inf = INFINITY;
     const struct pt_medium media[] = {
@@ -259,11 +259,11 @@ static void tell_media(void)
         for (size_t k = 0; k < COUNT(ends); k++)
             for (uint32_t key = 1; key < 5; key++) {
                 words("medium %d end %d:", (int)i, (int)k);
-                tell_crossing(&media[i], v3(0, 0, 0), v3(0, 0, 1), ends[k], key);
+                print_crossing(&media[i], v3(0, 0, 0), v3(0, 0, 1), ends[k], key);
             }
 }
 
-static void tell_grids(void)
+static void print_grids(void)
 {
     static float density[40 * 3 * 2];
     static const pt_vec3 origins[] = {{-1, 0.5f, 0.5f}, {0.5f, 0.5f, 0.5f}, {3, 0.3f, 2}, {0, 0, 0}, {2, 1.5f, -1}};
@@ -298,7 +298,7 @@ static void tell_grids(void)
     for (size_t i = 0; i < COUNT(origins) * COUNT(ways); i++)
         for (uint32_t key = 1; key < 7; key++) {
             words("ray %d:", (int)i);
-            tell_crossing(&m, origins[i % COUNT(origins)], ways[i / COUNT(origins)], key % 3 == 0 ? 1.2f : INFINITY, key);
+            print_crossing(&m, origins[i % COUNT(origins)], ways[i / COUNT(origins)], key % 3 == 0 ? 1.2f : INFINITY, key);
         }
     pt_arena_release(&arena);
 }
@@ -330,7 +330,7 @@ static struct pt_quadric quadric(int k)
     return q;
 }
 
-static void tell_point(const struct pt_quadric *q, pt_vec3 own)
+static void print_point(const struct pt_quadric *q, pt_vec3 own)
 {
     struct pt_quadric_point at;
     float u, v;
@@ -346,7 +346,7 @@ static void tell_point(const struct pt_quadric *q, pt_vec3 own)
     vector(dv);
 }
 
-static void tell_quadrics(void)
+static void print_quadrics(void)
 {
     static const pt_vec3 from[] = {{0.5f, -0.25f, 2}, {-4, 0.1f, 2.2f}, {0.6f, 5, 1.9f}, {0.3f, -0.4f, -3}},
                          ways[] = {{0, 0, 1}, {1, 0.05f, -0.1f}, {0, -1, 0.02f}, {0.1f, 0.02f, 0.9f}, {-0.3f, 0.5f, -0.8f}};
@@ -360,8 +360,8 @@ static void tell_quadrics(void)
         vector(lower);
         vector(upper);
         words("\n poles");
-        tell_point(&q, v3(0, 0, 1.25f));
-        tell_point(&q, v3(0, 0, -1.25f));
+        print_point(&q, v3(0, 0, 1.25f));
+        print_point(&q, v3(0, 0, -1.25f));
         words("\n");
         for (size_t i = 0; i < COUNT(from) * COUNT(ways) * COUNT(ends); i++) {
             const float *end = ends[i % COUNT(ends)];
@@ -374,7 +374,7 @@ static void tell_quadrics(void)
             number(t);
             vector(own);
             if (i % COUNT(ends) == 0)
-                tell_point(&q, own);
+                print_point(&q, own);
             words("\n");
         }
     }
@@ -436,7 +436,7 @@ static void add_skies(struct pt_scene *s)
     }
 }
 
-static void tell_emitter(const struct pt_scene *s, int32_t id, const struct pt_receiver *at)
+static void print_emitter(const struct pt_scene *s, int32_t id, const struct pt_receiver *at)
 {
     static const float us[][2] = {{0, 0}, {0.2f, 0.7f}, {0.6f, 0.45f}, {0.999f, 0.3f}};
     const struct pt_emitter *e = &s->emitters[id];
@@ -466,7 +466,7 @@ static void tell_emitter(const struct pt_scene *s, int32_t id, const struct pt_r
     }
 }
 
-static void tell_lights(void)
+static void print_lights(void)
 {
     static const struct pt_receiver places[] = {{{0, 0, 0}, {0, 0, 1}, PT_RECEIVER_SURFACE},
                                                 {{2, 3, -4}, {0, -0.6f, 0.8f}, PT_RECEIVER_BOTH_SIDES},
@@ -491,7 +491,7 @@ static void tell_lights(void)
                 }
                 words(" %d\n", (int)(pt_light_pick_by_power(&s, u) - s.emitters));
                 if (skies)
-                    tell_emitter(&s, i, &places[k]);
+                    print_emitter(&s, i, &places[k]);
             }
         test_scene_end(&s);
     }
@@ -504,7 +504,7 @@ static void tell_lights(void)
         .value = { v, 2 * v, 3 * v } \
     }
 
-static void tell_textures(void)
+static void print_textures(void)
 {
     static const uint8_t bytes[4 * 3 * 4] = {3,   200, 17,  90,  255, 0,   128, 64, 33,  77,  141, 250, 9,   180, 60,  30,
                                              201, 99,  150, 44,  120, 240, 5,   70, 66,  6,   166, 106, 26,  226, 86,  186,
@@ -555,7 +555,7 @@ static void tell_textures(void)
 
 /* --- numbers drawn ---------------------------------------------------------------------------------------------------- */
 
-static void tell_samplers(void)
+static void print_samplers(void)
 {
     for (uint32_t i = 0; i < 64; i++) {
         struct pt_sampler s = pt_sampler_make(i % 3 > 0, i / 8 * 1000003u, i * 7919u, i * i, i % 8 * 12345u);
@@ -576,12 +576,12 @@ static void tell_samplers(void)
 static const struct table {
     const char *name;
     void (*tell)(void);
-} tables[] = {{"fresnel", tell_fresnel},   {"microfacets", tell_microfacets},
-              {"warps", tell_warps},       {"phases", tell_phases},
-              {"filters", tell_filters},   {"models", tell_bsdfs},
-              {"media", tell_media},       {"grids", tell_grids},
-              {"quadrics", tell_quadrics}, {"lights", tell_lights},
-              {"textures", tell_textures}, {"samplers", tell_samplers}};
+} tables[] = {{"fresnel", print_fresnel},   {"microfacets", print_microfacets},
+              {"warps", print_warps},       {"phases", print_phases},
+              {"filters", print_filters},   {"models", print_bsdfs},
+              {"media", print_media},       {"grids", print_grids},
+              {"quadrics", print_quadrics}, {"lights", print_lights},
+              {"textures", print_textures}, {"samplers", print_samplers}};
 
 static char *tell(struct approve_case *c)
 {

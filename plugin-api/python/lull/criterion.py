@@ -123,11 +123,11 @@ class Criterion:
         self.info, self.parameters, self.log = info, dict(parameters or {}), log or _warn
         self.threads = limits.checked("threads", os.cpu_count() or 1 if threads is None else threads)
         log = self.log  # and not self, which would never be let go of
-        tell = abi.LogFn(lambda _, level, text: log(level, text.decode(errors="replace")))
-        services = abi.sized(abi.HostServices, threads=self.threads, name=b"lull for Python 1.0", log=tell)
+        log_fn = abi.LogFn(lambda _, level, text: log(level, text.decode(errors="replace")))
+        services = abi.sized(abi.HostServices, threads=self.threads, name=b"lull for Python 1.0", log=log_fn)
         texts = [tuple(map(os.fsencode, pair)) for pair in self.parameters.items()]
         pairs = (abi.Pair * max(len(texts), 1))(*texts)
-        handle = Handle("lull_host_close", tell)
+        handle = Handle("lull_host_close", log_fn)
         call("host_create", C.byref(services), C.c_void_p(info.table), pairs, len(self.parameters), C.byref(handle.pointer))
         self.handle: Optional[Handle] = handle
         self.needs = abi.Requirements.from_address(library().lull_host_needs(handle.pointer))

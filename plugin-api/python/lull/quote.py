@@ -80,14 +80,14 @@ def rows(driver: Driver) -> list[Row]:
             for (name, value, text), cost in zip(settings + [(*own, "noisy")] * (noisy is not None), costs)]
 
 
-def telling(tell: Callable[[str], None]) -> Watcher:
-    """For Driver.watchers: tells the line once, when every block was checked, unless it is empty."""
-    told = False
+def once_quoted(tell: Callable[[str], None]) -> Watcher:
+    """For Driver.watchers: passes the line on once, when every block was checked, unless it is empty."""
+    done = False
 
     def watch(driver: Driver, _result: Optional[Result]) -> None:
-        nonlocal told
-        if not told and all(b.asked_spp > 0 or not b.active for b in driver.frame.blocks):
-            told = True
+        nonlocal done
+        if not done and all(b.asked_spp > 0 or not b.active for b in driver.frame.blocks):
+            done = True
             if text := line(driver):
                 tell(text)
     return watch

@@ -71,7 +71,7 @@ def seed_of(seed: int, first: int, r: Rect) -> int:
     return zlib.crc32(struct.pack("<QQii", seed, first, r.x0, r.y0))
 
 
-def tell_line(line: str) -> None:
+def print_line(line: str) -> None:
     """To stderr."""
     print(f"lull: {line}", file=sys.stderr)
 
@@ -95,7 +95,7 @@ def render(open_film: Callable[[], Film], criterion: Union[str, Criterion], *, s
            read_mask: Callable[[str], np.ndarray], spp_min: int = 16, spp_max: int = 1024, time_budget_s: float = 0.0,
            block: Optional[int] = None, mask: Union[np.ndarray, str, None] = None, checkpoint: str = "",
            resume: bool = False, checkpoint_every_s: float = 60.0, after_call: Optional[Callable[[Driver], None]] = None,
-           tell: Optional[Callable[[str], None]] = tell_line, display_server: str = "", **parameters: Any) -> Picture:
+           tell: Optional[Callable[[str], None]] = print_line, display_server: str = "", **parameters: Any) -> Picture:
     """Renders what open_film gives; each block until the criterion stops it.
 
     criterion: a name, a path or a lull.Criterion, default observer, or denoised with denoise="blend" or "full", which keeps
@@ -130,7 +130,7 @@ def render(open_film: Callable[[], Film], criterion: Union[str, Criterion], *, s
         driver = Driver(frame, film.render, identity=film.identity() if checkpoint else None, after_call=after_call,
                         display_server=display_server)
         if tell:
-            driver.watchers.append(quotes.telling(tell))
+            driver.watchers.append(quotes.once_quoted(tell))
         kept = checkpoints.Keeper(checkpoint, driver, checkpoint_every_s) if checkpoint else None
         if resume and os.path.exists(checkpoint):
             checkpoints.load(checkpoint, driver)

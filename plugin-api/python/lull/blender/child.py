@@ -22,25 +22,25 @@ SAMPLES = "Lull Samples"  # the pass of samples per pixel
 _TELL_S = 0.5  # how often
 
 
-class _Told:
-    """What is said, and the picture."""
+class _Channel:
+    """Messages to the parent process, and the picture."""
 
     def __init__(self, folder: str, descriptor: int):
         self._path, self._to = os.path.join(folder, PICTURE), os.fdopen(descriptor, "w")
         self._tell_at_s = self._show_at_s = 0.0
 
-    def say(self, **message: object) -> None:
+    def send(self, **message: object) -> None:
         print(json.dumps(message), file=self._to, flush=True)
 
     def show(self, session: Session) -> None:
         session.write_layer(self._path, SAMPLES)
-        self.say(picture=True)
+        self.send(picture=True)
 
     def progress(self, session: Session) -> None:
         """Twice a second, and the picture for a twentieth of the time."""
         now_s = time.monotonic()
         if now_s >= self._tell_at_s:
-            self.say(text=progress_text(session.driver).strip(), percent=session.driver.percent_shown)
+            self.send(text=progress_text(session.driver).strip(), percent=session.driver.percent_shown)
             self._tell_at_s = now_s + _TELL_S
         if now_s >= self._show_at_s:
             self.show(session)
@@ -48,15 +48,15 @@ class _Told:
 
 
 def main(folder: str, descriptor: int) -> int:
-    """The exit status: 0, or 1 if an error was told."""
-    told = _Told(folder, descriptor)
+    """The exit status: 0, or 1 after an error."""
+    channel = _Channel(folder, descriptor)
     try:
         with Stopping() as stopping:
-            return _render(folder, told, stopping)
+            return _render(folder, channel, stopping)
     except BrokenPipeError:  # nobody waits for it any more
         shutil.rmtree(folder, ignore_errors=True)
     except REFUSED as error:
-        told.say(error=str(error))
+        channel.send(error=str(error))
     return 1
 
 
@@ -70,25 +70,25 @@ def _open(folder: str) -> tuple[bpy.types.Scene, Settings]:
     return scene, Settings(**task["settings"])
 
 
-def _render(folder: str, told: _Told, stopping: Stopping) -> int:
+def _render(folder: str, channel: _Channel, stopping: Stopping) -> int:
     scene, settings = _open(folder)
     with Session(scene, settings) as session:
         stopping.then = session.driver.interrupt
         if stopping.asked:
             session.driver.interrupt()
         for text in session.notes:
-            told.say(warning=text)
+            channel.send(warning=text)
         quoted = ""
         while (result := session.step()) is None:
             if session.quote != quoted:
                 quoted = session.quote
-                told.say(info=quoted)
-            told.progress(session)
+                channel.send(info=quoted)
+            channel.progress(session)
         _, failed = session.write(result)  # no file: denoises the picture
-        told.show(session)
-    told.say(text=session.summary(), info=session.summary(), percent=100)
+        channel.show(session)
+    channel.send(text=session.summary(), info=session.summary(), percent=100)
     if result.exception:
         failed.append(f"rendering failed, what was rendered is kept: {result.exception}")
     for text in failed:
-        told.say(error=text)
+        channel.send(error=text)
     return 1 if failed else 0

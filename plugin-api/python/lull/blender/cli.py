@@ -235,16 +235,16 @@ def _render_frame(options: argparse.Namespace, scene: bpy.types.Scene, settings:
             session.driver.interrupt()
         for text in session.notes:
             note(text)
-        told = warned = False
+        quoted = warned = False
         while (result := session.step()) is None and not (options.quote and quote.pilot_done(session.driver)):
-            if session.quote and not told and not options.quote:
-                told = True
+            if session.quote and not quoted and not options.quote:
+                quoted = True
                 note(session.quote)
             if session.unsaved and not warned:
                 warned = True
                 note(f"{session.unsaved}; the render goes on")
         if options.quote or result is None:
-            return _tell_quote(session, result, progress, costs)
+            return _print_quote(session, result, progress, costs)
         written, failed = session.write(result)
     if progress:
         progress.clear()
@@ -252,7 +252,7 @@ def _render_frame(options: argparse.Namespace, scene: bpy.types.Scene, settings:
     return _end(session, result, failed)
 
 
-def _tell_quote(session: Session, result: Optional[Result], progress: Optional[Progress],
+def _print_quote(session: Session, result: Optional[Result], progress: Optional[Progress],
                 costs: list[Optional[quote.Row]]) -> int:
     if progress:
         progress.clear()

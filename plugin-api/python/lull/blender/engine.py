@@ -43,18 +43,18 @@ class Child:
 
     def __init__(self, folder: str):
         package = str(Path(__file__).resolve().parents[2])  # last: what else lies there is of another Python
-        self._told, tell = os.pipe()
+        self._messages, write_end = os.pipe()
         code = (f"import sys; sys.path.append({package!r}); from lull.blender import child; "
-                f"sys.exit(child.main({folder!r}, {tell}))")
+                f"sys.exit(child.main({folder!r}, {write_end}))")
         self._errors = tempfile.TemporaryFile(dir=folder)
         try:
             self._process = subprocess.Popen([*_program(), code], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                                             stderr=self._errors, pass_fds=[tell], start_new_session=True)
+                                             stderr=self._errors, pass_fds=[write_end], start_new_session=True)
         except BaseException:
-            os.close(self._told)
+            os.close(self._messages)
             raise
         finally:
-            os.close(tell)
+            os.close(write_end)
         self._kill_at_s = 0.0
         self.error = ""
 
@@ -64,18 +64,18 @@ class Child:
     def __exit__(self, *_: object) -> None:
         self._process.kill()
         self._process.wait()
-        os.close(self._told)
+        os.close(self._messages)
         self._errors.close()
 
     def messages(self) -> Iterator[dict[str, Any]]:
         """What it says, until it ends; an empty message each tenth of a second in which it says nothing."""
         unread, poll = b"", select.poll()
-        poll.register(self._told, select.POLLIN)
+        poll.register(self._messages, select.POLLIN)
         while True:
             if not poll.poll(100):
                 yield {}
                 continue
-            data = os.read(self._told, 1 << 16)
+            data = os.read(self._messages, 1 << 16)
             if not data:
                 break
             *lines, unread = (unread + data).split(b"\n")
@@ -83,8 +83,8 @@ class Child:
         status = self._process.wait()
         if status and not self._kill_at_s:
             self._errors.seek(0)
-            said = self._errors.read().decode(errors="replace").split("\n")
-            last = next((line for line in reversed(said) if line.strip()), "it said nothing")
+            lines = self._errors.read().decode(errors="replace").split("\n")
+            last = next((line for line in reversed(lines) if line.strip()), "no message")
             self.error = self.error or f"the process that renders ended with status {status}: {last.strip()}"
 
     def stop(self) -> None:

@@ -169,7 +169,7 @@ class Session:
         self._setup_s, self._denoising_s = self.host.render_s, 0.0
         self._before = (0.0, 0.0)  # seconds of rendering and of checks that a checkpoint brought
         self.quote = ""
-        self.driver.watchers.append(quote.telling(lambda line: setattr(self, "quote", line)))
+        self.driver.watchers.append(quote.once_quoted(lambda line: setattr(self, "quote", line)))
         self.keeper: Optional[checkpoint.Keeper] = None
 
     def __enter__(self) -> Session:

@@ -142,7 +142,7 @@ class LULL_OT_render(bpy.types.Operator):
         except REFUSED as error:
             self.report({"ERROR"}, str(error))
             return False
-        self._session, self._told, self._show_at_s = session, False, 0.0
+        self._session, self._quoted, self._show_at_s = session, False, 0.0
         session.begin()
         for note in session.notes:
             self.report({"WARNING"}, note)
@@ -159,8 +159,8 @@ class LULL_OT_render(bpy.types.Operator):
                 result = Result("done")
             _running = result is None
             return result
-        if session.quote and not self._told:
-            self._told = True
+        if session.quote and not self._quoted:
+            self._quoted = True
             self.report({"INFO"}, session.quote)
         now_s = time.monotonic()
         if result is None and now_s >= self._show_at_s:

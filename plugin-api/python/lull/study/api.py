@@ -136,12 +136,12 @@ def _post_person(site: Site, body: dict[str, Any]) -> Response:
 
 
 def _slot_members(study: Study, slot: Slot) -> dict[str, int]:
-    told = {"view": slot.view, "catch": slot.catch}
+    fields = {"view": slot.view, "catch": slot.catch}
     if study.task == VALIDATION:
-        told["condition"] = slot.condition
+        fields["condition"] = slot.condition
     else:
-        told["block"] = slot.block
-    return {**told, "screen": slot.screen, "start": slot.start} if study.task == ADJUSTMENT else {**told, "side": slot.side}
+        fields["block"] = slot.block
+    return {**fields, "screen": slot.screen, "start": slot.start} if study.task == ADJUSTMENT else {**fields, "side": slot.side}
 
 
 def _get_person(site: Site, person: Person) -> Response:

@@ -57,7 +57,7 @@ def word(*words: str) -> Callable[[str], str]:
     return take
 
 
-def said(text: str) -> str:
+def text_shown(text: str) -> str:
     """What stands on the command line as text: bytes that are none are mended."""
     return text.encode(sys.getfilesystemencoding(), "surrogateescape").decode("utf-8", "replace")
 

@@ -16,7 +16,7 @@ from typing import Any, Iterator
 from .definition import (ADJUSTMENT, KINDS, MAX_FPS, MAX_LINE, MAX_TRIALS, MIN_MS, TWO_INTERVAL, VALIDATION, Block, Study,
                          View, fit_intervals, is_plain_line, write_study)
 from .files import Refused, make_folder, read_file, write_line
-from .options import Option, integer, real, said, word
+from .options import Option, integer, real, text_shown, word
 from .people import MIN_TRIALS
 from .plan import plan_count, plan_minutes
 
@@ -35,8 +35,8 @@ OPTIONS = (
            "a recorded sequence, or a folder of pictures; more may follow. BLOCKS: only these, e.g. 0,3,8-11", many=True),
     Option("kinds", "LIST",
            "2ifc: of pictures rendered with --denoise, what is shown: some of noisy,denoised,blend, a view of each", _kinds),
-    Option("asked-by", "NAME", "who asks, as the page says it (required)", said),
-    Option("contact", "ADDRESS", "whom to write to or to call, as the page says it (required)", said),
+    Option("asked-by", "NAME", "who asks, as the page says it (required)", text_shown),
+    Option("contact", "ADDRESS", "whom to write to or to call, as the page says it (required)", text_shown),
     Option("trials", "N", "2ifc: trials per block, catch trials included, at least 10 (30)", integer(MIN_TRIALS, 1000)),
     Option("repeats", "N", "adjustment: settings per block (2); validation: judgements per picture (1)", integer(1, 100)),
     Option("catch", "SHARE", "2ifc, validation: share of catch trials (0.1)", real(0, 0.5)),
@@ -88,8 +88,8 @@ def _find_ggn() -> str:
 def _make_stimuli(folder: str, study: Study, o: dict[str, Any]) -> dict[str, Any]:
     """The pictures, and what study.json says of them."""
     names = [name for name in ("kinds", "block", "spacing", "spp_min", "spp_max") if name in o]
-    told = [f"--task={study.task}", *(f"--{name.replace('_', '-')}={o[name]}" for name in names)]
-    ran = subprocess.run([_find_ggn(), "stimuli", "-o", os.path.join(folder, "stimuli"), *told, "--", *o["views"]],
+    arguments = [f"--task={study.task}", *(f"--{name.replace('_', '-')}={o[name]}" for name in names)]
+    ran = subprocess.run([_find_ggn(), "stimuli", "-o", os.path.join(folder, "stimuli"), *arguments, "--", *o["views"]],
                          stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     lines = ran.stderr.decode("utf-8", "surrogateescape").splitlines()
     if ran.returncode == 1:

@@ -49,17 +49,17 @@ class Address(NamedTuple):
 
 def parse_address(text: str) -> Address:
     """Numbers only, no names: nothing is looked up."""
-    told, ipv6 = f"--listen {text[:64]}: ", text.startswith("[")
+    prefix, ipv6 = f"--listen {text[:64]}: ", text.startswith("[")
     host, _, rest = text[1:].partition("]") if ipv6 else text.partition(":")
     port: str | None = rest if not ipv6 and ":" in text else rest[1:] if rest.startswith(":") else None
     if ipv6 and ("]" not in text or (rest and port is None)):
-        raise Refused(told + "expected ADDRESS, ADDRESS:PORT or [ADDRESS6]:PORT")
+        raise Refused(prefix + "expected ADDRESS, ADDRESS:PORT or [ADDRESS6]:PORT")
     try:
         address = ipaddress.IPv6Address(host) if ipv6 else ipaddress.IPv4Address(host)
     except ValueError:
-        raise Refused(told + "not an address in numbers, like 127.0.0.1 or [::1]") from None
+        raise Refused(prefix + "not an address in numbers, like 127.0.0.1 or [::1]") from None
     if port is not None and not (re.fullmatch("[0-9]{1,5}", port) and int(port) <= 65535):
-        raise Refused(told + "a port is 0 … 65535")
+        raise Refused(prefix + "a port is 0 … 65535")
     return Address(host, PORT if port is None else int(port), ipv6, address.is_loopback)
 
 
@@ -141,12 +141,12 @@ class _Connection(web.RequestHandler):
 
     def connection_made(self, transport: Any) -> None:
         super().connection_made(transport)
-        self.heard, self.unsent = asyncio.get_running_loop().time(), 0
+        self.last_received, self.unsent = asyncio.get_running_loop().time(), 0
         if self.is_too_many:
             transport.abort()
 
     def data_received(self, data: bytes) -> None:
-        self.heard = asyncio.get_running_loop().time()
+        self.last_received = asyncio.get_running_loop().time()
         super().data_received(data)
 
     def sweep(self, now: float) -> None:
@@ -154,8 +154,8 @@ class _Connection(web.RequestHandler):
             return
         unsent, self.unsent = self.unsent, self.transport.get_write_buffer_size()
         if unsent != self.unsent:
-            self.heard = now
-        elif now - self.heard > IDLE_S:
+            self.last_received = now
+        elif now - self.last_received > IDLE_S:
             self.transport.abort()
 
 

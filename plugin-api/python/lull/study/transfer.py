@@ -21,21 +21,21 @@ from .store import MAX_TIMES, Conflict, Person, Store, Trial
 def _meaning(study: Study, slot: Slot, trial: Trial) -> dict[str, Any]:
     """What a reader of the file wants to know of a trial without making the plan again; the import does not look at it."""
     view = study.views[slot.view]
-    told: dict[str, Any] = {"view": view.name, "catch": slot.catch}
+    fields: dict[str, Any] = {"view": view.name, "catch": slot.catch}
     if study.task == VALIDATION:
-        return {**told, "condition": study.conditions[slot.condition] if slot.condition >= 0 else None,
+        return {**fields, "condition": study.conditions[slot.condition] if slot.condition >= 0 else None,
                 "judged_is": "AB"[slot.side]}
     block = view.blocks[slot.block]
-    told["block"] = block.id
+    fields["block"] = block.id
     if study.task == TWO_INTERVAL:
-        return {**told, "noise_in": slot.side + 1, "correct": trial.answer == slot.side + 1}
-    return {**told, "started_at": block.levels[slot.start]}
+        return {**fields, "noise_in": slot.side + 1, "correct": trial.answer == slot.side + 1}
+    return {**fields, "started_at": block.levels[slot.start]}
 
 
 def _trial_members(study: Study, plan: list[Slot], trial: Trial) -> dict[str, Any]:
     names = "slot", "revision", "level", "answer", "rating", "ms", "layout", *(("frame_ms",) if trial.frame_ms else ()), "at"
-    told = {name: getattr(trial, name) for name in names}
-    return {**told, **(_meaning(study, plan[trial.slot], trial) if trial.slot < len(plan) else {})}
+    fields = {name: getattr(trial, name) for name in names}
+    return {**fields, **(_meaning(study, plan[trial.slot], trial) if trial.slot < len(plan) else {})}
 
 
 def export_trials(study: Study, store: Store, path: str) -> int:
@@ -83,8 +83,8 @@ def _import_person(study: Study, store: Store, path: str, o: Any) -> None:
         raise Refused(f"{path}: person {person.id} is in the study already; nothing was imported")
     row = store.add_person(person, print_json(o["profile"], pretty=False))
     plan = make_plan(study, person.seed)
-    for told in trials:
-        trial = _read_trial(study, plan, told)
+    for fields in trials:
+        trial = _read_trial(study, plan, fields)
         if not trial:
             raise Refused(f"{path}: person {person.id} has a trial that this study cannot have")
         try:
