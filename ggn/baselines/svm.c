@@ -103,6 +103,7 @@ int ggn_svm_train(struct ggn_svm *svm, const double *x, const unsigned char *lab
         rc = base_fail(err, BASE_EINVAL, "SVM: all %zu labels are the same", n);
         goto out;
     }
+    /* The rarer label weighs more, so that "always noisy" is no good answer where few windows are clean. */
     int labels[2] = {1, 0};
     double weights[2] = {0.5 * (double)n / (double)positive, 0.5 * (double)n / (double)(n - positive)};
     struct svm_problem problem = {.l = (int)n, .y = y, .x = rows};

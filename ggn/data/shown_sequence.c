@@ -95,6 +95,7 @@ int ggn_shown_sequence(const struct ggn_shown_request *q, const struct ggn_shown
                      .blocks = view->blocks,
                      .rc = calloc(m.n_blocks, sizeof *w.rc),
                      .errs = calloc(m.n_blocks, sizeof *w.errs)};
+    /* Blocks are read on all threads, so each has its own error; the first by number counts. */
     if (!view->blocks || !chosen || !w.rc || !w.errs) {
         rc = base_fail_nomem(err, w.folder);
     } else {

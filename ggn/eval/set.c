@@ -48,6 +48,7 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *er
                                    .cap = c->spp[c->n_levels - 1],
                                    .first = s->n,
                                    .end = s->n + cases};
+        /* A threshold that no recorded level reached is only known to lie beyond the last one. */
         if (b.label.threshold >= b.cap) {
             b.label.threshold = b.cap;
             b.label.censored = 1;

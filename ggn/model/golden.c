@@ -169,6 +169,7 @@ static int record_window0(struct state *s, struct ggn_golden *out, struct base_e
     record_stages(s->d, out);
     for (int i = 0; i < 3; i++)
         out->ssim[i] = ggn_ssim_mean(ssim, s->noisy_plane + 3 * image[i], s->reference_plane, NULL, 3, SIDE, 0);
+    /* The denoiser's rows are padded for vector loads, and both pictures of one SSIM have rows of one length. */
     real *padded = calloc((size_t)3 * SIDE * (size_t)r->row, sizeof *padded);
     if (padded) {
         const real *reference[3], *denoised0[3];

@@ -299,6 +299,7 @@ int ggn_flip(const uint8_t *reference, const uint8_t *test, int width, int heigh
         perceive(&c, &csf, lab[k], scratch[0], scratch[1], width, height);
     }
     feature_difference(light, &features, scratch, width, height, feature);
+    /* An edge or point that appears or vanishes is seen where its colour alone is not: hence the power below 1. */
     double e_max = largest_difference(&c), sum = 0.0, max = 0.0;
     for (size_t i = 0; i < n; i++) {
         double a[3] = {(double)lab[0][0][i], (double)lab[0][1][i], (double)lab[0][2][i]};

@@ -31,6 +31,7 @@ int32_t gp_history_create(struct gp_history *history, int window, const struct l
         2 * n * sizeof(struct gp_head) + n * (sizeof(struct lull_rect) + sizeof(size_t) + sizeof(struct gp_slot)) + 256;
     if (bytes > PTRDIFF_MAX - heads)
         return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: the blocks are too large for memory");
+    /* One piece of memory, so that no check allocates and a frame that is too large fails at its beginning. */
     unsigned char *memory = aligned_alloc(64, (size_t)((bytes + heads + 63) & ~(uint64_t)63));
     if (!memory)
         return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: no memory for the history of %u blocks", frame->block_count);

@@ -232,6 +232,7 @@ int pt_build_curve(struct pt_builder *b, const struct pt_state *s, struct pt_par
             spline_to_bezier(P + 3 * i, degree, c);
         else
             memcpy(c, P + 3 * i * step, corners * 3 * sizeof *c);
+        /* A segment begins with the ring that ends the one before. */
         for (int k = i > 0; k <= CURVE_CUTS && ok; k++) {
             double t = (double)k / CURVE_CUTS, v = ((double)i + t) / (double)segments, q[3], d[3] = {0, 0, 0};
             bezier(c, degree, t, q, d);

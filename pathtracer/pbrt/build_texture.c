@@ -100,9 +100,11 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
     }
     pt_builder_path(b, name, path, sizeof path);
     snprintf(key, sizeof key, "%g %s", code, path);
+    /* Many textures of a scene name one file: it is read once for each encoding. */
     if ((id = pt_names_get(&b->image_names, key)) >= 0)
         return id;
     int rc;
+    /* A real file is opened by the image library itself, without a copy of its bytes. */
     if (b->source->files) {
         rc = b->source->note(b->source->data, path, &err);
         if (!rc)
@@ -366,6 +368,7 @@ int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char 
         return pt_diag_fail(&b->diag, p->loc, "texture \"%s\" of type \"%s\" (expected float or spectrum)", name,
                             class_name);
     struct context c = {b, s, p, is_float};
+    /* What is not rendered has a stand-in, with a warning, so that scenes of other renderers load. */
     struct pt_texture t = {.kind = -1, .scale = 1, .su = 1, .sv = 1, .channel = 0};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
         if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)

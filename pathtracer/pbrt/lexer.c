@@ -105,6 +105,7 @@ static struct pt_token read_token(struct pt_lexer *lexer)
         if (f->at == f->end) {
             if (lexer->depth == 1)
                 return t;
+            /* The end of an imported file is a token, since its graphics state ends there. */
             int scoped = f->scoped;
             free(f->bytes);
             lexer->depth--;

@@ -43,6 +43,7 @@ int pt_scene_load_source(const char *path, const struct pt_source *source, const
     memcpy(b->directory, path, length);
     if (!rc)
         rc = pt_pbrt_read(b, path);
+    /* Textures are read while the file is parsed, but their time has a row of its own. */
     scene->stats.parse_s = base_clock_wall_s() - start_s - scene->stats.texture_s;
     start_s = base_clock_wall_s();
     if (!rc)

@@ -157,6 +157,7 @@ static int subdivide(struct mesh *m)
     for (size_t i = 0; ok && i < m->vertices; i++)
         even_vertex(m, &t, i, r.p + 3 * i);
     size_t at = m->vertices;
+    /* Of the two halves of an edge the later one finds the vertex that the earlier one made. */
     for (size_t h = 0; ok && h < halves; h++) {
         int32_t twin = t.twin[h];
         if (twin >= 0 && twin < (int32_t)h) {
@@ -255,6 +256,7 @@ int pt_build_loop_subdiv(struct pt_builder *b, const struct pt_state *s, struct 
         return b->diag.rc;
     if (!P || !indices || corners == 0 || corners % 3 != 0)
         return pt_diag_fail(&b->diag, p->loc, "a loopsubdiv needs \"point3 P\" and three \"integer indices\" per triangle");
+    /* Before any memory is taken: each level has four times the triangles. */
     if (corners / 3 > max_triangles >> (2 * levels))
         return pt_diag_fail(&b->diag, pt_params_loc(p, "levels"), "%zu triangles subdivided %d times are too many",
                             corners / 3, levels);

@@ -460,6 +460,7 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
     enum kept kept = NOT_KEPT;
     *outcome = PT_RENDER_DONE;
     while (lull_host_active(r->blocks) > 0) {
+        /* Limits are looked at between slices, not waves: a wave of a large frame can take minutes. */
         int given_up = slice(r, &more, &why);
         if (!given_up && !more) {
             if (pilot_is_over(r)) {

@@ -64,6 +64,7 @@ static int parse_record(const char *path, struct seq_block *b, uint32_t index, u
     if (b->size - *at < SEQ_RECORD_HEADER)
         return base_fail(err, BASE_EINVAL, "%s: truncated: %u of %u images", path, index, count);
     uint32_t kind = base_get_u32(p), payload = base_get_u32(p + 20);
+    /* Sums come first: what follows may only be trusted to be what was written. */
     if (seq_crc(p, 28) != base_get_u32(p + 28))
         return base_fail(err, BASE_EINVAL, "%s: header of image %u is damaged (CRC)", path, index);
     if (b->size - *at - SEQ_RECORD_HEADER < payload)
