@@ -29,6 +29,7 @@ from tap import raises
 BUILD = os.environ.get("BUILD", "build")
 LIB, PLUGINS, RENDER = f"{BUILD}/lib/lull", f"{BUILD}/tests/abi/plugins", f"{BUILD}/bin/lull-render"
 os.environ["LULL_PLUGIN_PATH"] = LIB
+LUMINANCE = np.array([.2126729, .7151522, .0721750])
 SIGMAS = [[.01, .2], [.5, 1.]]
 WHOLE = {"wave": 1 << 30, "whole_waves": False}  # a call from check to check, checks where the criterion says
 TMP = tempfile.TemporaryDirectory()
@@ -168,13 +169,78 @@ def test_moment2():
     def host(rects, first, count, half):
         for r in rects:
             samples = np.array([noise.sample(r, s) for s in range(first, first + count)])
-            yield {"color": samples.mean(0), "moment2": (samples @ abi_luminance).__pow__(2).mean(0)}
-    abi_luminance = np.array([.2126729, .7151522, .0721750])
+            yield {"color": samples.mean(0), "moment2": (samples @ LUMINANCE).__pow__(2).mean(0)}
     _, f, _ = run("variance", parameters={"threshold": .01}, host=host, supplies=["moment2"])
     spp = [b.spp for b in f.blocks]
     assert spp[0] < spp[1] < spp[2] <= spp[3], spp
     raises(lull.LullError, "reads moment2, which this host does not supply: choose another criterion", run, "variance")
     raises(lull.LullError, "with a display mapping", run, "variance", supplies=["moment2"], display=lambda x: x.clip(0, 1))
+
+
+def wave_variance(f):
+    """What a frame's plane moment2 says of the variance of its mean."""
+    n, y = f.spp()[0, 0], f.mean() @ LUMINANCE
+    return (f.planes_now()["moment2"].array - y * y) / (n - 1)
+
+
+def test_moments_of_waves():
+    """a host without second moments has those of its waves: of unequal ones, weighted ones, put ones and dropped samples"""
+    rng, counts = np.random.default_rng(3), (16, 16, 4, 28)
+    means = [rng.uniform(.1, .9, (16, 16, 3)) for _ in counts]
+    y, n = np.array([m @ LUMINANCE for m in means]), np.array(counts, float)[:, None, None]
+    mean = (n * y).sum(0) / n.sum()
+    wanted = (n * (y - mean) ** 2).sum(0) / ((len(counts) - 1) * n.sum())  # the variance of a weighted mean, without bias
+    f, put, weighted = (lull.Frame(lull.load("observer"), 16, 16, block=16, wave=16, whole_waves=False, weighted=w) for w in (False, False, True))
+    total, spp = 0, 0
+    for k, (m, count) in enumerate(zip(means, counts)):
+        f.add(f.blocks[0], m, count, k % 2 == 0)
+        weighted.add(weighted.blocks[0], {"color": 1.5 * m, "weight": np.full((16, 16), 1.5)}, count, k % 2 == 0)
+        total, spp = total + count * m, spp + count
+        put.put(put.blocks[0], total / spp, spp, means[0], 16)
+        assert k or np.abs(wave_variance(f)).max() < 1e-15  # one wave says nothing
+    for other in (f, put, weighted):
+        assert np.allclose(wave_variance(other), wanted, rtol=1e-9, atol=0), np.abs(wave_variance(other) / wanted - 1).max()
+    bad = means[0].copy()
+    bad[3, 5] = np.nan
+    f.add(f.blocks[0], bad, 16, True)
+    assert f.waves[3, 5] == 4 and (np.delete(f.waves.ravel(), 3 * 16 + 5) == 5).all() and np.isfinite(f.planes_now()["moment2"].array).all()
+    assert {"waves", "sum-moment2"} <= set(f.arrays())
+    raises(ValueError, "no plane moment2", lambda: (g := lull.Frame(lull.load("observer"), 16, 16, supplies=["moment2"])).add(g.blocks[0], means[0], 16, True))
+    assert lull.Frame(lull.load("halfbuf"), 16, 16).waves is None  # nobody asks
+
+
+def test_moments_of_skewed_waves():
+    """of independent samples the waves know the noise: also where it is skewed, and as a display shows it"""
+    rng, count, waves = np.random.default_rng(4), 16, 12
+    for display in (None, lambda rgb: .5 * rgb):
+        f = lull.Frame(lull.load("observer"), 200, 200, block=200, wave=count, display=display)
+        for k in range(waves):
+            sample = rng.lognormal(0, 1, (count, 200, 200)).mean(0)
+            f.add(f.blocks[0], np.repeat(sample[..., None], 3, -1), count, k % 2 == 0)
+        v = f.planes_now()["moment2"].array
+        shown = f.mean() if display is None else display(f.mean())
+        found = ((v - (shown @ LUMINANCE) ** 2) / (count * waves - 1)).mean()
+        true = (np.exp(2) - np.exp(1)) / (count * waves) * (1 if display is None else .25)  # of a log-normal, by its formula
+        assert abs(found / true - 1) < .05, (found, true)
+
+
+def test_halves_that_agree_by_luck():
+    """two halves that agree by luck stop no block whose waves differ"""
+    rng = np.random.default_rng(5)
+    noise = rng.normal(0, .2, (200, 200, 1))
+
+    def host(rects, first, count, half):
+        for r in rects:  # both waves of a pair have the same noise, and the next pair takes it back
+            own = rng.normal(0, .001, (200, 200, 1))
+            yield np.broadcast_to(.5 + own + (noise if first // 32 % 2 else -noise), (200, 200, 3)).copy()
+    frames = {}
+    for waves in (True, False):
+        f = lull.Frame(lull.load("observer"), 200, 200, block=200, spp_min=64, spp_max=128, wave=16)
+        if not waves:  # what it would do without them
+            f._moments = lambda display: (f.mean() @ LUMINANCE) ** 2
+        lull.Driver(f, host).run()
+        frames[waves] = f.blocks[0].reason
+    assert frames == {True: "spp-max", False: "criterion"}, frames
 
 
 def test_sums():

@@ -16,6 +16,7 @@ from .host import Block, HostFrame
 from .library import LullError
 
 COUNTS = {"spp", "weight"}  # planes that the library makes
+LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])  # Y of linear sRGB (IEC 61966-2-1), which criteria take pixels for
 Sample = Union[np.ndarray, Mapping[str, np.ndarray]]
 
 
@@ -25,14 +26,16 @@ class Frame(HostFrame):
     criterion: borrowed while the frame lives. wave: samples that stay together in one half; checks are moved up to whole
     pairs of waves, where the halves are equal (criteria take that for granted), unless whole_waves is False. supplies:
     planes that the host will add besides "color" and its halves (of moment2, albedo, normal, depth); kept only if the
-    criterion reads them. layers: names of further pictures [h, w] that the host will add under these names (alpha, a pass);
+    criterion reads them. A criterion that reads "moment2" of a host without it gets what the scatter of the waves says
+    (`waves`). layers: names of further pictures [h, w] that the host will add under these names (alpha, a pass);
     never judged. weighted: with every sample comes "weight" [h, w], that of the reconstruction filter, and the other planes
     are multiplied by it: the mean is the sum of weight · value over the sum of weights, as in one long render. display: maps
     linear radiance [..., 3] to linear display values in [0, 1], for hosts whose view is not transfer(exposure · value); the
     criterion then judges these. denoised: what lull.denoise reads is kept, too: the halves, and of albedo and normal what
     the host supplies. settings: as HostFrame takes them (limits, mask, transfer …).
     sums: `color`, `half` [h, w, 3], `moment2` [h, w], … and the layers; `dropped`, `dropped_half` [h, w] uint32: samples
-    left out for a value that is not finite. y grows downwards.
+    left out for a value that is not finite. waves [h, w] uint32: how many are in sums["moment2"], each as the squared
+    luminance of its mean times its samples; None where the host supplies the plane, or nobody reads it. y grows downwards.
     """
 
     def __init__(self, criterion: Criterion, width: int, height: int, *, wave: int = 16, whole_waves: bool = True,
@@ -48,6 +51,7 @@ class Frame(HostFrame):
                      for name in (*self.planes, *self.layers) if name not in COUNTS}
         self.weights = {name: np.zeros(shape) for name in ("all", "half")} if weighted else {}
         self.dropped, self.dropped_half = np.zeros(shape, np.uint32), np.zeros(shape, np.uint32)
+        self.waves = np.zeros(shape, np.uint32) if "moment2" in set(kept) - set(supplies) else None
 
     # --- samples -------------------------------------------------------------------------------------------------------
 
@@ -68,6 +72,7 @@ class Frame(HostFrame):
             self.totals.dropped += count * int(bad.sum())
             parts = {name: np.where(bad[..., None] if part.ndim == 3 else bad, 0.0, part) for name, part in parts.items()}
         weight = parts.pop("weight", None)
+        self._add_wave(at, parts["color"], count, weight, ~bad)
         for name, part in parts.items():
             self.sums[name][at] += count * (part if name == "color" else np.nan_to_num(part, posinf=0.0, neginf=0.0))
         if weight is not None:
@@ -84,19 +89,34 @@ class Frame(HostFrame):
         and, if the criterion reads half buffers, the mean of the half_spp of them that are in half A, [h, w, 3]."""
         if self.weights:
             raise ValueError("a weighted frame takes its samples by add")
-        parts = {name: (part, spp) for name, part in self._parts(block, mean).items()}
+        parts, at = {name: (part, spp) for name, part in self._parts(block, mean).items()}, self._slices(block.rect)
         if "half" in self.sums:
             if half is None:
                 raise ValueError("the criterion reads half buffers: half is missing")
             parts["half"] = (_as_mean("half", half, block.rect), half_spp)
+        if spp > block.spp:
+            new = (spp * parts["color"][0] - self.sums["color"][at]) / (spp - block.spp)
+            self._add_wave(at, new, spp - block.spp, None, np.isfinite(new).all(-1))
         for name, (part, count) in parts.items():
-            self.sums[name][self._slices(block.rect)] = count * part
+            self.sums[name][at] = count * part
         block.spp, block.half_spp = spp, half_spp
+
+    def _add_wave(self, at: tuple[slice, slice], color: np.ndarray, count: int, weight: Optional[np.ndarray],
+                  good: np.ndarray) -> None:
+        """One more mean of `count` samples, times `weight`, where it is good."""
+        if self.waves is None:
+            return
+        good = good if weight is None else good & (weight > 0)
+        square = (np.where(good[..., None], color, 0.0) @ LUMINANCE) ** 2
+        share = np.divide(square, 1.0 if weight is None else weight, out=np.zeros_like(square), where=good)
+        self.sums["moment2"][at] += count * share
+        self.waves[at] += good
 
     def _parts(self, block: Block, sample: Sample) -> dict[str, np.ndarray]:
         """The planes of a host's sample, checked, in double precision."""
         given = sample if isinstance(sample, Mapping) else {"color": sample}
-        wanted = [name for name in self.sums if name != "half"] + ["weight"] * bool(self.weights)
+        made = {"half"} | ({"moment2"} if self.waves is not None else set())
+        wanted = [name for name in self.sums if name not in made] + ["weight"] * bool(self.weights)
         if missing := [name for name in wanted if name not in given]:
             raise ValueError(f"the render function gave no plane {missing[0]}")
         return {name: _as_mean(name, given[name], block.rect) for name in wanted}
@@ -141,12 +161,30 @@ class Frame(HostFrame):
     def planes_now(self, as_shown: bool = True) -> dict[str, Plane]:
         """What the criterion is shown: the sums; means where they have weights, or as they are displayed."""
         names, display = [name for name in self.sums if name in CHANNELS], self.display if as_shown else None
+        made = {} if self.waves is None else {"moment2": Plane(self._moments(display))}
+        names = [name for name in names if name not in made]
         if self.weights or display:
             shown = {name: display for name in ("color", "half") if display}
             means = {name: shown.get(name, np.asarray)(self.mean(name)) for name in names}
-            return {name: Plane(np.ascontiguousarray(mean, np.float64)) for name, mean in means.items()}
+            return {name: Plane(np.ascontiguousarray(mean, np.float64)) for name, mean in means.items()} | made
         planes = {name: Plane(self.sums[name], "half_spp" if name == "half" else "spp") for name in names}
-        return {**planes, "dropped": Plane(self.dropped), "dropped_half": Plane(self.dropped_half)}
+        return {**planes, **made, "dropped": Plane(self.dropped), "dropped_half": Plane(self.dropped_half)}
+
+    def _moments(self, display: Optional[Callable[[np.ndarray], np.ndarray]]) -> np.ndarray:
+        """The mean squared luminance [h, w] that independent samples would have, if their mean is as uncertain as the waves
+        say: sum of w (x_w - x)^2 over ((k - 1) sum of w), of k waves with means x_w; none are said by fewer than two. Under
+        a display mapping the uncertainty is what it shows of both sides of the mean."""
+        assert self.waves is not None
+        mean, n = self.mean(), np.maximum(self.spp(), 1.0)
+        total = self.weights["all"] if self.weights else n
+        y = mean @ LUMINANCE
+        scatter = np.divide(self.sums["moment2"], total, out=np.zeros_like(y), where=total > 0) - y * y
+        variance = np.maximum(scatter, 0.0) / np.maximum(self.waves.astype(float) - 1.0, 1.0) * (self.waves > 1)
+        if not display:
+            return y * y + (n - 1.0) * variance
+        share = np.minimum(np.sqrt(variance) / np.where(y > 0, y, np.inf), 1.0)[..., None]
+        lower, upper = (display(mean * (1.0 + side * share)) @ LUMINANCE for side in (-1.0, 1.0))
+        return (display(mean) @ LUMINANCE) ** 2 + (n - 1.0) * (0.5 * (upper - lower)) ** 2
 
     # --- state ---------------------------------------------------------------------------------------------------------
 
@@ -166,6 +204,7 @@ class Frame(HostFrame):
     def arrays(self) -> dict[str, np.ndarray]:
         """All that was accumulated, by name; to be written into when a checkpoint is read."""
         return {"dropped": self.dropped, "dropped_half": self.dropped_half,
+                **({} if self.waves is None else {"waves": self.waves}),
                 **{f"sum-{name}": s for name, s in self.sums.items()},
                 **{f"weight-{name}": w for name, w in self.weights.items()}}
 
@@ -205,6 +244,7 @@ def _choose_planes(criterion: Criterion, supplies: Sequence[str], has_display: b
         why = "is not there with a display mapping" if {*missing} <= {*supplies} else "this host does not supply"
         raise LullError(abi.E_PLANE, f"criterion {criterion.info.id} reads {', '.join(missing)}, which {why}: choose "
                         f"another criterion (observer, halfbuf), or write a host with Frame(supplies={missing})")
+    offered |= {"moment2"}  # of the waves
     read = used | {"color"} | ({"half", "albedo", "normal"} if denoised else set())
     return tuple(name for name in CHANNELS if name in offered & read)
 
