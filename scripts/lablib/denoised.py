@@ -19,7 +19,8 @@ SCENES = ["scenes/%s.pbrt" % name for name in "demo rock-garden kitchen cornell-
                                                               "cornell-bunny-v4/cornell_bunny_conductor.pbrt")]
 SIZE, BLOCK, SEED, REFERENCES, PRICE_SPP = 256, 128, 1, (101, 102), 32
 LEVELS = (32, 40, 64, 80, 128, 160, 256, 320, 512, 640)
-FIRST, AGAIN, LEAST_STEP, GROWTH = 64, 1.25, 2 ** 0.5, 2  # samples of the first look, and their ratios from look to look
+FIRST, STEP, GROWTH = 64, 1.25, 2  # samples of the first look, and their ratio from look to look, at least and at most
+FALL = 0.4  # errors fall as samples^-FALL
 KINDS = ("noisy", "denoised", "blend")
 VISIBLE = 1.05  # beyond this an error counts as visible: the references' own noise scatters the truth by some per cent
 HEAD = ("scene", "blocks", "samples until nothing is seen: noisy / denoised / blend", "blend / noisy", "stopped, of these visibly off",
@@ -105,13 +106,14 @@ def between(looks, spp, what):
 def stop(looks, limit, what):
     """Samples at which a block stops by looks[what], and how many looks that takes, as ggn/plugin/denoised/denoised.c goes on; None:
     not within the looks that there are."""
-    spp, low, count = FIRST, False, 0
+    spp, last, count = FIRST, None, 0
     while spp <= looks[-1]["spp"]:
-        error, was_low, count = between(looks, spp, what), low, count + 1
-        low = error <= limit
-        if low and was_low:
+        error, count = between(looks, spp, what), count + 1
+        trend = (error + last["trend"] * (last["spp"] / spp) ** FALL) / 2 if last else error
+        if error <= limit and last and min(last["error"], trend) <= limit:
             return spp, count
-        spp = int(math.ceil(spp * (AGAIN if low else min(max((error / limit) ** 2, LEAST_STEP), GROWTH))))
+        last = {"spp": spp, "error": error, "trend": trend}
+        spp = int(math.ceil(spp * (STEP if error <= limit else min(max((error / limit) ** (1 / FALL), STEP), GROWTH))))
     return None
 
 

@@ -184,10 +184,42 @@ static void two_looks_stop(void **unused)
     assert_true(answer(&s, 0, 64).action == LULL_CONTINUE); /* the same question is no second look */
     d = answer(&s, 0, 80);
     assert_true(d.action == LULL_STOP && d.error < 0.7);
-    make(0.5, 0.03, 0.004); /* another block: found good once, then bad, then good */
+    make(0.5, 0.03, 0.004); /* another block: found bad, then good twice */
     assert_true(answer(&s, 1, 64).action == LULL_CONTINUE);
     make(0.5, 0, 0.004);
     assert_true(answer(&s, 1, 80).action == LULL_CONTINUE && answer(&s, 1, 100).action == LULL_STOP);
+    end(&s);
+}
+
+/* At so many samples of a block whose stripes, which the denoiser takes away, are this strong. */
+static struct lull_decision answer_with(struct session *s, double stripe, uint32_t block, uint64_t spp)
+{
+    make(0.5, stripe, 0.002);
+    return answer(s, block, spp);
+}
+
+/* Errors that come down to the limit need no second look; one that falls far below it at once does: it may be luck. */
+static void a_trend_stops(void **unused)
+{
+    (void)unused;
+    struct session s;
+    const double limit = 0.943; /* the default of `visible` */
+    double stripe = 0.01, error = 0;
+    for (int i = 0; i < 20 && !(error > limit && error < 1.1 * limit); i++) {
+        stripe *= error > 0 ? 1.05 * limit / error : 1;
+        start(&s, "constant", "denoised");
+        error = answer_with(&s, stripe, 0, 64).error;
+        end(&s);
+    }
+    start(&s, "constant", "denoised");
+    struct lull_decision d = answer_with(&s, stripe, 0, 64);
+    assert_true(d.error > limit && d.error < 1.1 * limit && d.action == LULL_CONTINUE && d.next_spp == 80);
+    d = answer_with(&s, 0.8 * stripe, 0, 80);
+    assert_true(d.error < limit && d.action == LULL_STOP);
+    d = answer_with(&s, 4 * stripe, 1, 64);
+    assert_true(d.error > 2 * limit && d.action == LULL_CONTINUE);
+    d = answer_with(&s, 0.8 * stripe, 1, 128);
+    assert_true(d.error < limit && d.action == LULL_CONTINUE && d.next_spp == 160);
     end(&s);
 }
 
@@ -503,6 +535,7 @@ int main(void)
         return 1;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_looks_stop),
+        cmocka_unit_test(a_trend_stops),
         cmocka_unit_test(mirrored_beyond_the_frame),
         cmocka_unit_test(stripes_below_the_noise),
         cmocka_unit_test(a_small_place),

@@ -3,10 +3,11 @@
  * denoises both halves of a block's samples, together with those of its neighbours that are due (plugin/denoised/cover.h),
  * and estimates how visible the error of the kept picture is (plugin/denoised/block_view.h): from the difference of the
  * denoised halves, and from that of each from the other, noisy one. `error` is the larger of the two over the level at which
- * people stop seeing it; a block stops when two checks in a row find it low enough for `visible`.
+ * people stop seeing it. A block stops when a check finds it low enough for `visible`, and so did the one before, or the trend
+ * is low as well: one low error can be luck.
  *
- * The history of a block is its last check: asked again at the same samples it answers the same, though its neighbours,
- * which the denoiser reads too, may have changed.
+ * The history of a block is its last check, with the trend: asked again at the same samples it answers the same, though its
+ * neighbours, which the denoiser reads too, may have changed.
  */
 #include "observer/observer.h"
 #include "plugin/criteria.h"
@@ -16,7 +17,8 @@
 #include "plugin/moving.h"
 #include "plugin/translate.h"
 
-static const double LEAST_STEP = 1.4142135623730951, CONFIRM_STEP = 1.25; /* of samples, from check to check */
+static const double STEP = 1.25; /* of samples from check to check, at least */
+static const double FALL = 0.4;  /* the error falls as samples^-FALL: slower than noise, since part of it is bias */
 
 enum { P_VISIBLE, P_ERROR, P_FIRST_SPP, P_GROWTH, P_PICTURE, P_QUALITY, P_LIBRARY, P_FPS, P_PPD, P_COUNT };
 enum {
@@ -43,8 +45,9 @@ struct past {     /* what is remembered of a block; saved as it is, without padd
     uint64_t spp; /* of the last check; 0: none */
     uint64_t next_spp;
     double p_noisy, predicted_spp, error, halves, crossed; /* the last two in units of `error` */
+    double trend; /* of the error at spp: half this check's, half what the trend before lets expect; NaN: none */
     int32_t action;
-    uint32_t flags, low, zero; /* low: the check found an error that is low enough */
+    uint32_t flags;
 };
 
 struct sight { /* of a block that is asked about */
@@ -93,19 +96,23 @@ static double error_of(struct lull_instance *in, struct gd_block_view *seen, con
     return fmax(now->halves, now->crossed);
 }
 
-/* Samples double from check to check, because checks are dear; a low error is checked again soon. */
+/* The next check is at as many samples as the error tells, but at least STEP and at most `growth` times what there is: it is
+ * not known better. now: the last check; gets the trend of this one. */
 static void decide(const struct lull_instance *in, const struct lull_block *b, const struct lull_kit_tally *tally,
                    double error, struct past *now, struct lull_decision *d)
 {
     const double spp = (double)b->spp, growth = in->kit.value[P_GROWTH];
-    const int low_before = now->low != 0;
+    const double expected = now->spp ? now->trend * pow((double)now->spp / spp, FALL) : (double)NAN;
+    const int low_before = now->error <= in->stop_error && now->spp > 0;
     lull_kit_verdict(&in->kit, b, tally, error, in->stop_error, 0, growth, d);
-    now->low = !isnan(d->error) && d->action == LULL_STOP;
-    if (now->low && !low_before) {
-        lull_kit_continue(&in->kit, b, CONFIRM_STEP * spp, d);
+    now->trend = isnan(d->error) || isnan(expected) ? d->error : 0.5 * (d->error + expected);
+    const int confirmed = low_before || (!isnan(expected) && now->trend <= in->stop_error);
+    if (d->action == LULL_STOP && !isnan(d->error) && !confirmed) {
+        lull_kit_continue(&in->kit, b, STEP * spp, d);
         d->predicted_spp = (double)d->next_spp;
     } else if (d->action == LULL_CONTINUE && !isnan(d->predicted_spp)) {
-        lull_kit_continue(&in->kit, b, fmin(fmax(d->predicted_spp, LEAST_STEP * spp), growth * spp), d);
+        d->predicted_spp = spp * pow(d->error / in->stop_error, 1.0 / FALL);
+        lull_kit_continue(&in->kit, b, fmin(fmax(d->predicted_spp, STEP * spp), growth * spp), d);
     }
     if (!isnan(d->error))
         d->p_noisy = ggn_observer_p_noisy(&in->observer, d->error);
@@ -143,8 +150,8 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
                          "denoised: HALF holds none or all of a block's samples, so that errors cannot be told; no block is "
                          "stopped by it");
         decide(in, b, &tally, error, now, d);
-        *now = (struct past){b->spp,       d->next_spp, d->p_noisy, d->predicted_spp, d->error, now->halves,
-                             now->crossed, d->action,   d->flags,   now->low,         0};
+        *now = (struct past){b->spp,      d->next_spp,  d->p_noisy, d->predicted_spp, d->error,
+                             now->halves, now->crossed, now->trend, d->action,        d->flags};
     }
     d->action = now->action;
     d->flags = now->flags;
@@ -437,7 +444,7 @@ struct state_header {
 
 static struct state_header header_of(const struct lull_instance *in)
 {
-    return (struct state_header){{'d', 'e', 'n', 'o', 'i', 's', 'e', '1'}, in->kit.block_count};
+    return (struct state_header){{'d', 'e', 'n', 'o', 'i', 's', 'e', '2'}, in->kit.block_count};
 }
 
 static int32_t state_save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
@@ -454,12 +461,12 @@ static int32_t state_save(const struct lull_instance *in, const struct lull_writ
 
 static int plausible(const struct past *p)
 {
-    const double numbers[] = {p->predicted_spp, p->error, p->halves, p->crossed};
-    for (size_t i = 0; i < 4; i++)
+    const double numbers[] = {p->predicted_spp, p->error, p->halves, p->crossed, p->trend};
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
         if (!isnan(numbers[i]) && !(numbers[i] >= 0))
             return 0;
     return (isnan(p->p_noisy) || (p->p_noisy >= 0 && p->p_noisy <= 1)) &&
-           (p->action == LULL_STOP || p->action == LULL_CONTINUE) && p->low <= 1 && !p->zero &&
+           (p->action == LULL_STOP || p->action == LULL_CONTINUE) &&
            !(p->flags & ~(LULL_DECISION_TOO_EARLY | LULL_DECISION_BAD_INPUT)) && (!p->next_spp || p->next_spp > p->spp);
 }
 
