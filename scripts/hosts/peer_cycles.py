@@ -67,7 +67,7 @@ def respond(request):
 
 for line in sys.stdin:
     try:
-        reply = {"s": answer(json.loads(line))}
+        reply = {"s": respond(json.loads(line))}
     except Exception as why:  # whatever Blender raises goes into the response
         reply = {"error": f"{type(why).__name__}: {why}"}
     print("\nPEER " + json.dumps(reply), flush=True)

@@ -58,7 +58,6 @@ def test_same_verdicts_as_lull_render():
     Path("there.png").write_text("old")
     os.symlink("there.png", "here.png")
     long = "n" * 260
-    here = os.getcwd()
     for options in ([("--output", "a.jpg")], [("--output", ".exr")], [("--output", "exr")], [("--output", "A.EXR")],
                     [("--preview", "a.exr")], [("--report", "a.txt")], [("--stop-map", "a.jpg")], [("--stop-map", "a.CSV")],
                     [("--output", "folder.exr")], [("--output", "nowhere/a.exr")], [("--output", "room.pbrt/a.exr")],

@@ -3,8 +3,8 @@
  * denoises both halves of a block's samples, together with those of its neighbours that are due (plugin/denoised/cover.h),
  * and estimates how visible the error of the kept picture is (plugin/denoised/block_view.h): from the difference of the
  * denoised halves, and from that of each from the other, noisy one. `error` is the larger of the two over the level at which
- * people stop seeing it. A block stops when a check finds it low enough for `visible`, and so did the one before, or the trend
- * is low as well: one low error can be luck.
+ * people stop seeing it. A block stops when a check finds it low enough for `visible`, and so did the one before, or the
+ * trend is low as well: one low error can be luck.
  *
  * The history of a block is its last check, with the trend: asked again at the same samples it answers the same, though its
  * neighbours, which the denoiser reads too, may have changed.

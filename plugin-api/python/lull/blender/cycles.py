@@ -15,7 +15,7 @@ import contextlib
 import os
 import sys
 import time
-from typing import Iterator, Optional, Sequence
+from typing import Iterator, Sequence
 
 import bpy
 import numpy as np

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import os
 from typing import Any, NamedTuple, Optional, Sequence
 
 from ..study.files import Refused, loads, read_file

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import statistics
 from dataclasses import dataclass, field
-from typing import Iterator, NamedTuple, Optional, TextIO
+from typing import Iterator, NamedTuple, TextIO
 
 from .definition import ADJUSTMENT, TWO_INTERVAL, Block, Study, View
 from .plan import CATCH_IDENTICAL, Slot, dropped_frames, make_plan
