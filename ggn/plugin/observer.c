@@ -10,7 +10,7 @@
  *
  * A block smaller than 200x200 pixels is little evidence that rare light was met. It stops only where the 200x200 pixels
  * about it show at most three times the limit. One smaller than 100x100 also waits until a sample as bright as its brightest
- * no longer matters to its mean (plugin/unmet.h).
+ * no longer matters to its mean (plugin/undersampled.h).
  *
  * `error` is the visible noise over the level at which people stop seeing it, `p_noisy` the share of viewers who still do; a
  * block stops when that is at most `visible`, or `error` at most the parameter of that name. With `fps` the noise is that of
@@ -24,7 +24,7 @@
 #include "plugin/moving.h"
 #include "plugin/pair.h"
 #include "plugin/translate.h"
-#include "plugin/unmet.h"
+#include "plugin/undersampled.h"
 #include "sequence/simulate.h"
 
 enum { P_VISIBLE, P_ERROR, P_FIRST_SPP, P_GROWTH, P_FPS, P_PPD, P_COUNT };
@@ -237,7 +237,7 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
     /* What surrounds a block, and what it may not have met, is read where it matters: before a stop, and where the answer is
      * all that is wanted. */
     if (!in->means.count && (error <= in->stop_error || (b->flags & LULL_BLOCK_FINAL && !isnan(error))))
-        error = fmax(fmax(error, error_around(in, view, b, w)), gp_unmet_error(&in->kit, view, b));
+        error = fmax(fmax(error, error_around(in, view, b, w)), gp_undersampled_error(&in->kit, view, b));
     lull_kit_verdict(&in->kit, b, &tally, error, in->stop_error, 0, in->kit.value[P_GROWTH], d);
     if (d->action == LULL_CONTINUE && !isnan(d->predicted_spp)) /* the last steps are short: checks cost little here */
         lull_kit_continue(&in->kit, b, ggn_observer_next((double)b->spp, d->predicted_spp, in->kit.value[P_GROWTH]), d);

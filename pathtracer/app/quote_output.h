@@ -14,7 +14,7 @@ struct pt_quote_info {
     int interrupted;     /* the pilot was */
 };
 
-/* The table for people and what stands out. The quote is finished; paths of the dearest blocks are replayed. */
+/* The table for people and what stands out. The quote is finished; paths of the most expensive blocks are replayed. */
 void pt_quote_text(FILE *out, const struct pt_quote *quote, const struct pt_render *render,
                    const struct pt_quote_info *info);
 /* The same and every block. */

@@ -125,9 +125,9 @@ static void print_price(const struct plan *p)
     uint32_t most = 0;
     for (size_t i = 0; i < t->frame_count * t->block_count; i++)
         most = t->spp[i] > most ? t->spp[i] : most;
-    printf("%zu frames of %zu blocks, by %zu pilots: %.0f spp on average, %u for the dearest block\n", t->frame_count,
+    printf("%zu frames of %zu blocks, by %zu pilots: %.0f spp on average, %u for the most expensive block\n", t->frame_count,
            t->block_count, p->pilot_count, p->samples / (blocks * frames), most);
-    printf("%s of thread time, %s on %d threads that are free; %.1f x for the dearest block's samples everywhere\n",
+    printf("%s of thread time, %s on %d threads that are free; %.1f x for the most expensive block's samples everywhere\n",
            pt_quote_duration(p->thread_s, thread), pt_quote_duration(p->thread_s / p->threads, wall), p->threads,
            most * blocks * frames / p->samples);
 }

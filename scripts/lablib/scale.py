@@ -112,7 +112,7 @@ class Machine:
         return end
 
     def wave_s(self, work):
-        """Wall seconds for a wave: [(thread seconds, rows)] of its blocks, dearest first."""
+        """Wall seconds for a wave: [(thread seconds, rows)] of its blocks, the most expensive first."""
         total = sum(w for w, _ in work)
         rows = sum(r for _, r in work)
         span_s = min(SLICE_S + SLICE_PER_WORKER_S * (self.cores - self.threads), LONGEST_SLICE_S)

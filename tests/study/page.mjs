@@ -67,7 +67,7 @@ for (const [name, options] of [
     check((await card(page)).includes('Block 16'), `${name}: and to the next row`, await card(page));
     const dear = [...r.blocks].sort((p, q) => q.thread_s - p.thread_s)[0];
     const first = page.locator('table button').first();
-    check((await first.innerText()) === String(dear.id), `${name}: the dearest block comes first`);
+    check((await first.innerText()) === String(dear.id), `${name}: the most expensive block comes first`);
     await first.focus();
     await page.keyboard.press('Enter');
     check((await card(page)).includes(`Block ${dear.id}\n`), `${name}: which can be gone to`, await card(page));

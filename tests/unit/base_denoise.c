@@ -278,7 +278,7 @@ static void cross(double truth, const float *weight, double sums[2])
 
 /* A denoiser whose error is somewhat smaller than the noise, in patches of one sign: weights chosen by a pixel's own samples
  * find too little of it, those of its neighbourhood find it. Crossed squares of 16 pictures scatter by 0.02 of the sum. */
-static void blind_weights_are_no_flattery(void **unused)
+static void cross_validated_weights_are_no_flattery(void **unused)
 {
     (void)unused;
     enum { PICTURES = 16 };
@@ -293,15 +293,15 @@ static void blind_weights_are_no_flattery(void **unused)
             fa[i] = fb[i] = (float)(truth + sigma * sin(i % W * 0.4) * sin(i / W * 0.4));
         }
         measure(0.5);
-        lull_blend_weights_blind(&estimate, W, H, around, blind);
+        lull_blend_weights_cross_validated(&estimate, W, H, around, blind);
         lull_blend_weights(&estimate, W, H, scratch, alpha, apart);
         cross(truth, alpha, own);
         cross(truth, blind, others);
     }
-    print_message("crossed over true: %.2f by own weights, %.2f by blind ones\n", own[0] / own[1], others[0] / others[1]);
+    print_message("crossed over true: %.2f by own weights, %.2f cross-validated\n", own[0] / own[1], others[0] / others[1]);
     assert_within(others[0] / others[1], 1, 0.08);
     assert_true(own[0] < 0.9 * own[1]);
-    lull_blend_weights_blind(&(struct lull_estimate){one, one, one, one, one}, 1, 1, rest, blind);
+    lull_blend_weights_cross_validated(&(struct lull_estimate){one, one, one, one, one}, 1, 1, rest, blind);
     assert_true(blind[0] == 0);
 }
 
@@ -355,7 +355,7 @@ int main(void)
         cmocka_unit_test(a_smeared_line_is_kept),
         cmocka_unit_test(mixture),
         cmocka_unit_test(extremes),
-        cmocka_unit_test(blind_weights_are_no_flattery),
+        cmocka_unit_test(cross_validated_weights_are_no_flattery),
         cmocka_unit_test(specks_are_left_out),
         cmocka_unit_test(specks_of_the_denoised),
     };

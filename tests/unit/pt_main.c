@@ -661,7 +661,7 @@ static void explanations(void **state)
     approve_cases("tests/golden/lull-render/explanations.txt", explain_it);
 }
 
-/* The picture of a quote is that of its blocks' times, in minutes when the dearest takes one. */
+/* The picture of a quote is that of its blocks' times, in minutes when the most expensive one takes one. */
 static void quotes_as_pictures(void **state)
 {
     (void)state;
@@ -675,7 +675,7 @@ static void quotes_as_pictures(void **state)
         struct pic_image image;
         for (int i = 0; i < 7; i++) {
             double value = answers[1][i].thread_s;
-            answers[1][i].thread_s = k ? value * 60 / 9 : value; /* the dearest: 9 s, or just a minute */
+            answers[1][i].thread_s = k ? value * 60 / 9 : value; /* the most expensive: 9 s, or just a minute */
             values[i] = answers[1][i].thread_s / (k ? 60 : 1);
         }
         assert_int_equal(pt_quote_map(path, &quote, &render, &err), 0);

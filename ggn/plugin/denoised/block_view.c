@@ -97,7 +97,7 @@ static void blend_halves(struct gd_block_view *seen, double share)
                                         seen->noisy_light[1],
                                         share};
     lull_denoised_estimate(part, 0, part->pixels, &in);
-    lull_blend_weights_blind(&part->error, part->width, part->height, seen->around, seen->weight);
+    lull_blend_weights_cross_validated(&part->error, part->width, part->height, seen->around, seen->weight);
     lull_denoised_weigh(part);
     lull_denoised_blend(part, seen->weight, seen->crossed);
     lull_denoised_blend(part, part->weight, seen->kept);

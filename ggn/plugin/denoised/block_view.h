@@ -5,7 +5,7 @@
  *
  * The picture that is kept is the mean of two, P(A) and P(B), each of one half: a blend of the noisy half and the denoised
  * one without its specks (denoise/blend.h), or the denoised one alone. What is crossed with the other half is a blend, too,
- * but by the weights of the neighbourhood (lull_blend_weights_blind).
+ * but by the weights of the neighbourhood (lull_blend_weights_cross_validated).
  *
  * One struct gd_block_view per worker; nothing is allocated after gd_block_view_create.
  */

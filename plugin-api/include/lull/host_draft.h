@@ -72,7 +72,7 @@ struct lull_host_quote_row {
     double spp_mean_low, spp_mean_high;
     double thread_s, thread_low_s, thread_high_s; /* of sampling, the whole picture from its start */
     double wall_s, wall_low_s, wall_high_s;       /* with the checks, on free processors */
-    double against_uniform;                       /* samples over those of the dearest block everywhere */
+    double against_uniform;                       /* samples over those of the most expensive block everywhere */
     uint32_t unknown, unmet, capped; /* blocks without a prediction; without their light yet; that reach spp_max */
     int32_t asked;                   /* this is the render that is going on */
 };

@@ -1,6 +1,6 @@
 /* Light that samples may not have met: what no witness of noise can tell of a small block. */
-#ifndef GGN_PLUGIN_UNMET_H
-#define GGN_PLUGIN_UNMET_H
+#ifndef GGN_PLUGIN_UNDERSAMPLED_H
+#define GGN_PLUGIN_UNDERSAMPLED_H
 
 #include <lull/criterion_kit.h>
 
@@ -9,6 +9,6 @@
  * and D a sixth of one L* at the mean of what the P pixels of the block show. A sample like B once more or less moves
  * that mean by B / (P n). The error is sqrt(2.4 B / (P D n)): at the default limit a block waits until three such samples
  * move the mean by less than D. docs/results.md has what that saves and costs. Pure, any thread. */
-double gp_unmet_error(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *block);
+double gp_undersampled_error(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *block);
 
 #endif

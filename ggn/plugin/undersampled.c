@@ -1,4 +1,4 @@
-#include "plugin/unmet.h"
+#include "plugin/undersampled.h"
 
 #include "model/visibility.h"
 #include "plugin/translate.h"
@@ -43,7 +43,7 @@ static struct sums sum(const struct lull_kit *kit, const struct lull_view *view,
     return sums;
 }
 
-double gp_unmet_error(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b)
+double gp_undersampled_error(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b)
 {
     const double pixels = lull_kit_pixels(b);
     if (pixels >= ENOUGH || !lull_kit_plane(view, LULL_PLANE_MOMENT2))
