@@ -156,21 +156,23 @@ static double crossed_error(const struct judging *j)
 /* --- both errors ------------------------------------------------------------------------------------------------------- */
 
 /* The halves' difference is noise; what else the crossed error has is bias. Both add in squares. */
-static void set_moving(struct ggn_kept_errors *e, double gain)
+static void set_viewed(struct ggn_kept_errors *e, double gain, double still)
 {
-    const double bias_squared = fmax(0.0, e->crossed * e->crossed - e->halves * e->halves);
+    const double bias_squared = fmax(0.0, e->crossed * e->crossed - e->halves * e->halves) * still * still;
     e->halves *= gain;
     e->crossed = sqrt(bias_squared + e->halves * e->halves);
 }
 
-struct ggn_kept_errors ggn_kept_judge(const struct ggn_kept *kept, const struct ggn_temporal *temporal, double *scratch)
+struct ggn_kept_errors ggn_kept_judge(const struct ggn_kept *kept, const struct ggn_viewing *viewing, double *scratch)
 {
     const struct judging j = begin(kept, scratch);
     struct ggn_kept_errors e;
     cross(&j);
     e.halves = ggn_visible_noise(kept->apart, kept->width, kept->height, j.texture, j.rows, j.apart);
     e.crossed = crossed_error(&j);
-    if (temporal)
-        set_moving(&e, ggn_temporal_gain(temporal, j.apart, kept->width, kept->height));
+    if (viewing) {
+        double still, gain = ggn_viewing_gain(viewing, j.apart, kept->width, kept->height, &still);
+        set_viewed(&e, gain, still);
+    }
     return e;
 }

@@ -19,7 +19,7 @@
 
 #include <stddef.h>
 
-#include "observer/temporal.h"
+#include "observer/viewing.h"
 
 struct ggn_kept { /* of a block, as a display shows it; [height][width] each */
     int width, height;
@@ -37,7 +37,8 @@ struct ggn_kept_errors { /* visible noise r, or bias as strong */
 
 /* Doubles of scratch memory for blocks of this size. */
 size_t ggn_kept_scratch(int width, int height);
-/* temporal: of a moving picture, in which noise is new in each frame and bias is taken to stand still; or NULL. */
-struct ggn_kept_errors ggn_kept_judge(const struct ggn_kept *kept, const struct ggn_temporal *temporal, double *scratch);
+/* viewing: of a moving picture, in which noise is new in each frame and bias stands still, or of one that is seen from
+ * another distance; or NULL. */
+struct ggn_kept_errors ggn_kept_judge(const struct ggn_kept *kept, const struct ggn_viewing *viewing, double *scratch);
 
 #endif

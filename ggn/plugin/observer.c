@@ -14,14 +14,14 @@
  *
  * `error` is the visible noise over the level at which people stop seeing it, `p_noisy` the share of viewers who still do; a
  * block stops when that is at most `visible`, or `error` at most the parameter of that name. With `fps` the noise is that of
- * one frame of many. No model.
+ * one frame of many, with `ppd` that of a display with so many pixels per degree. No model.
  */
 #include "observer/observer.h"
 #include "model/visibility.h"
 #include "plugin/criteria.h"
 #include "plugin/limit.h"
 #include "plugin/means.h"
-#include "plugin/moving.h"
+#include "plugin/viewing.h"
 #include "plugin/pair.h"
 #include "plugin/translate.h"
 #include "plugin/undersampled.h"
@@ -59,7 +59,7 @@ struct largest { /* of the blocks of a frame */
 struct lull_instance {
     struct lull_kit kit;
     struct ggn_observer observer;
-    struct ggn_temporal temporal;
+    struct ggn_viewing viewing;
     double stop_error;
     atomic_flag warned;     /* of planes that say nothing about noise: once per frame */
     struct gp_means means;  /* of a frame without HALF */
@@ -106,15 +106,15 @@ static double noise_of_difference(const struct lull_instance *in, int width, int
                                   double *gain)
 {
     const size_t pixels = (size_t)width * (size_t)height;
-    const int moving = gp_is_moving(&in->kit, P_FPS);
+    const int viewed = gp_is_viewed(&in->kit, P_FPS, P_PPD);
 
     see_both(w, pixels);
     ggn_visible_texture(w->lightness[0], w->lightness[1], width, height, w->scratch, w->texture);
     for (size_t i = 0; i < pixels; i++)
         w->lightness[0][i] = (float)split * (w->lightness[0][i] - w->lightness[1][i]);
     double noise =
-        ggn_visible_noise(w->lightness[0], width, height, w->texture, w->scratch, moving ? w->lightness[1] : NULL);
-    *gain = moving ? ggn_temporal_gain(&in->temporal, w->lightness[1], width, height) : 1;
+        ggn_visible_noise(w->lightness[0], width, height, w->texture, w->scratch, viewed ? w->lightness[1] : NULL);
+    *gain = viewed ? ggn_viewing_gain(&in->viewing, w->lightness[1], width, height, NULL) : 1;
     return noise;
 }
 
@@ -329,7 +329,7 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     atomic_flag_clear(&in->warned);
     in->observer = ggn_observer_default;
     in->stop_error = gp_stop_error(&in->kit, &in->observer, P_VISIBLE, P_ERROR);
-    gp_temporal_init(&in->temporal, &in->kit, P_FPS, P_PPD);
+    gp_viewing_init(&in->viewing, &in->kit, P_FPS, P_PPD);
     in->kit.need.halo = WINDOW / 2;
     *instance = in;
     return LULL_OK;

@@ -88,7 +88,8 @@ static float sure_gain(float gain, float square, float doubt)
 
 static float share(float gain, float moved) { return gain > 0.0f ? fminf(gain / moved, 1.0f) : 0.0f; }
 
-void lull_blend_weights_cross_validated(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha)
+void lull_blend_weights_cross_validated(const struct lull_estimate *estimate, int width, int height, float *scratch,
+                                        float *alpha)
 {
     const size_t n = (size_t)width * (size_t)height;
     float *gain = scratch + n;

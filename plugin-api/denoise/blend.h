@@ -36,7 +36,8 @@ void lull_blend_weights(const struct lull_estimate *estimate, int width, int hei
  * they are pooled; scratch: [2][height][width]. Weights that a pixel's own samples have chosen make its error look small, by
  * a third of the mean square in the scenes of docs/results/denoised.md: what crosses a blend with the other half crosses one
  * of these, whose own error is larger by a few per cent. */
-void lull_blend_weights_cross_validated(const struct lull_estimate *estimate, int width, int height, float *scratch, float *alpha);
+void lull_blend_weights_cross_validated(const struct lull_estimate *estimate, int width, int height, float *scratch,
+                                        float *alpha);
 
 /* Takes the specks from denoised halves [n][3]. */
 void lull_blend_despeckle(const float *apart, size_t n, float *fa, float *fb);

@@ -118,8 +118,8 @@ def serve(ppd, peak):
         print(json.dumps(response), flush=True)
 
 
-def transient():
-    """The table of ggn/observer/temporal.c, for a middle grey of 37 cd/m2."""
+def sensitivities():
+    """The tables of ggn/observer/viewing.c, for a middle grey of 37 cd/m2: log2 of the sustained channel's, and of transient over it."""
     import numpy
     import pycvvdp
     name = os.path.join(os.path.dirname(pycvvdp.__file__), "vvdp_data", "csf_lut_weber_fixed_size.json")
@@ -131,12 +131,13 @@ def transient():
         at_grey = [numpy.interp(numpy.log10(37), log_grey, of_rho) for of_rho in numpy.transpose(table[name])]
         return numpy.interp(numpy.arange(-3, 7), log_rho, at_grey)
 
-    more = (log_sensitivity("o5_c1") - log_sensitivity("o0_c1")) * numpy.log2(10)
-    print(", ".join("%.4f" % octaves for octaves in more))
+    slow, fast = (log_sensitivity(name) * numpy.log2(10) for name in ("o0_c1", "o5_c1"))
+    for row in (slow, fast - slow):
+        print(", ".join("%.4f" % octaves for octaves in row))
 
 
 if __name__ == "__main__":
-    if sys.argv[1] == "--transient":
-        transient()
+    if sys.argv[1] == "--sensitivities":
+        sensitivities()
     else:
         serve(float(sys.argv[1]), float(sys.argv[2]))

@@ -67,10 +67,12 @@ share() { awk -v a="$1" -v b="$2" -v low="$3" -v high="$4" 'BEGIN { exit !(a / b
 quoted() { "$P" "$scene" $big --quote --json "$@" | python3 -c 'import json, sys; print([r["spp_mean"]["expected"] for r in json.load(sys.stdin)["rows"] if r["as_asked"]][0])'; }
 big="-q --size 96x96 --block 48 --reproducible"
 "$P" "$scene" $big -o still.exr --stop-map still.csv
-"$P" "$scene" $big -o zero.exr --stop-map zero.csv -p fps=0 -p ppd=30
+"$P" "$scene" $big -o zero.exr --stop-map zero.csv -p fps=0 -p ppd=67
 "$P" "$scene" $big -o moving.exr --stop-map moving.csv -p fps=24
 t "0 frames per second: a still" sh -c 'cut -d";" -f2- still.csv >a; cut -d";" -f2- zero.csv | cmp a - && oiiotool --fail 0 --warn 0 still.exr zero.exr --diff'
 t "24 frames per second: fewer samples" share "$(mean moving.csv)" "$(mean still.csv)" 0.25 0.75
+"$P" "$scene" $big -o far.exr --stop-map far.csv -p ppd=134
+t "twice as many pixels per degree: fewer samples" share "$(mean far.csv)" "$(mean still.csv)" 0.02 0.75
 t "  …the quote expects that, too" share "$(quoted -p fps=24)" "$(quoted)" 0.35 0.55
 "$P" "$scene" --frames 1-2 $big --plan-shot M.csv -p fps=24 >/dev/null
 "$P" "$scene" --frames 1-2 $big --plan-shot S.csv >/dev/null

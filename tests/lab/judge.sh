@@ -36,6 +36,8 @@ t "a clip of that noise is as bad as it or worse" grep -q '^still True$' said
 t "refused: other lengths" grep -q '^refused ColorVideoVDP: 2 pictures against 1' said
 t "refused: no such file" grep -q '^refused ColorVideoVDP: .*none.png' said
 t "refused: another size" grep -q '^refused ColorVideoVDP: .*small.png has another size' said
-t "the table of the model observer for moving pictures is what its functions say" grep -qF "{$("${P%/bin/*}/judge/bin/python" "$here/../../scripts/lablib/cvvdp.py" --transient)}" "$here/../../ggn/observer/temporal.c"
+"${P%/bin/*}/judge/bin/python" "$here/../../scripts/lablib/cvvdp.py" --sensitivities >tables
+t "the tables by which the model observer weighs what is viewed are what its functions say" sh -c "tr -s ' \n' '  ' <'$here/../../ggn/observer/viewing.c' >code && \
+    sed -n 1p tables | xargs -I{} grep -qF '{{}}' code && sed -n 2p tables | xargs -I{} grep -qF '{{}}' code"
 echo "1..$n"
 exit $bad

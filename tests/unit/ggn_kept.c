@@ -34,11 +34,11 @@ static struct ggn_kept flat(int width, int height)
 }
 
 /* The memory ends where ggn_kept_scratch says: of another use of it the address sanitizer tells. */
-static struct ggn_kept_errors judge(const struct ggn_kept *kept, const struct ggn_temporal *temporal)
+static struct ggn_kept_errors judge(const struct ggn_kept *kept, const struct ggn_viewing *viewing)
 {
     double *scratch = malloc(ggn_kept_scratch(kept->width, kept->height) * sizeof *scratch);
     assert_non_null(scratch);
-    const struct ggn_kept_errors e = ggn_kept_judge(kept, temporal, scratch);
+    const struct ggn_kept_errors e = ggn_kept_judge(kept, viewing, scratch);
     free(scratch);
     return e;
 }
@@ -133,21 +133,37 @@ static void a_small_place_counts_by_its_sixth_power(void **unused)
 static void what_moves(void **unused)
 {
     (void)unused;
-    struct ggn_temporal t;
+    struct ggn_viewing t;
     const struct ggn_kept k = flat(64, 64);
-    ggn_temporal_init(&t, 24, 67);
+    ggn_viewing_init(&t, 24, 67);
     for (int i = 0; i < k.width * k.height; i++)
         crossed[0][i] = crossed[1][i] = 0.21f;
     assert_near(judge(&k, &t).crossed, SEEN * 120 * 0.01);
     static float same[64 * 64];
     for (int i = 0; i < 64 * 64; i++)
         apart[i] = same[i] = 0.5f;
-    const double gain = ggn_temporal_gain(&t, same, 64, 64);
+    const double gain = ggn_viewing_gain(&t, same, 64, 64, NULL);
     assert_true(gain > 1.5); /* so coarse that it is seen to come and go */
     const struct ggn_kept_errors still = judge(&k, NULL), moving = judge(&k, &t);
     assert_near(moving.halves, gain * still.halves);
     assert_near(moving.crossed * moving.crossed,
                 still.crossed * still.crossed + (gain * gain - 1) * still.halves * still.halves);
+}
+
+/* From farther away fine errors fade, the bias as well as the noise. */
+static void what_is_far(void **unused)
+{
+    (void)unused;
+    struct ggn_viewing t;
+    const struct ggn_kept k = flat(64, 64);
+    ggn_viewing_init(&t, 0, 134);
+    for (int i = 0; i < 64 * 64; i++) {
+        crossed[0][i] = crossed[1][i] = 0.21f;
+        apart[i] = (i / 64 + i) % 2 ? 0.05f : -0.05f;
+    }
+    const struct ggn_kept_errors near = judge(&k, NULL), far = judge(&k, &t);
+    assert_true(near.crossed > 2 * near.halves && far.halves < 0.2 * near.halves);
+    assert_near(far.crossed * near.halves, far.halves * near.crossed);
 }
 
 /* Texture hides: of both halves' L* the common part. */
@@ -174,6 +190,7 @@ int main(void)
         cmocka_unit_test(halves_are_the_least_of_the_crossed_error),
         cmocka_unit_test(a_small_place_counts_by_its_sixth_power),
         cmocka_unit_test(what_moves),
+        cmocka_unit_test(what_is_far),
         cmocka_unit_test(texture_hides),
     };
     return cmocka_run_group_tests_name("kept", tests, NULL, NULL);

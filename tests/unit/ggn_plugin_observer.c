@@ -165,10 +165,11 @@ static void fireflies(void **state)
         }
 }
 
-/* fps: the same noise, less visible by what its bands say; 0 is a still, bit for bit. */
-static void moving_pictures(void **state)
+/* fps, ppd: the same noise, less or more visible by what its bands say; 0 and 67 are a still as usual. */
+static void pictures_as_they_are_viewed(void **state)
 {
-    static const char *const fps[] = {NULL, "0", "24", "60", "24"}, *const ppd[] = {NULL, NULL, NULL, NULL, "20"};
+    static const char *const fps[] = {NULL, "0", "24", "60", "24", NULL, NULL, NULL};
+    static const char *const ppd[] = {NULL, NULL, NULL, NULL, "20", "67", "134", "40"};
     enum { COUNT = sizeof fps / sizeof fps[0] };
     const struct lull_criterion *c = &ggn_plugin_observer;
     struct lull_decision d[COUNT][GP_HOST_BLOCKS];
@@ -177,7 +178,7 @@ static void moving_pictures(void **state)
     for (int halves = 0; halves < 2; halves++) {
         const struct lull_frame frame = gp_host_frame(halves ? 0xff : LULL_PLANE_BIT(LULL_PLANE_COLOR), &gp_host_usual, 0);
         for (int k = 0; k < COUNT; k++) {
-            const struct lull_pair pairs[] = {{"fps", fps[k]}, {"ppd", ppd[k]}};
+            const struct lull_pair pairs[] = {{fps[k] ? "fps" : "ppd", fps[k] ? fps[k] : ppd[k]}, {"ppd", ppd[k]}};
             struct lull_instance *in = NULL;
             assert_int_equal(c->create(NULL, pairs, (uint32_t)(!!fps[k] + !!ppd[k]), sizeof *pairs, &in, NULL), LULL_OK);
             assert_int_equal(c->begin_frame(in, &frame, NULL), LULL_OK);
@@ -193,6 +194,7 @@ static void moving_pictures(void **state)
             assert_true(d[2][id].error > 0.55 * still && d[2][id].error < 0.8 * still);
             assert_true(d[3][id].error < 0.8 * d[2][id].error);
             assert_true(d[4][id].error > d[2][id].error); /* the same pixels are coarser to the eye */
+            assert_true(d[5][id].error == still && d[6][id].error < 0.65 * still && d[7][id].error > still);
             assert_true(d[2][id].p_noisy <= d[0][id].p_noisy && d[2][id].predicted_spp <= d[0][id].predicted_spp);
         }
     }
@@ -204,7 +206,7 @@ int main(void)
         cmocka_unit_test(answers_of_the_observer),
         cmocka_unit_test(answers_from_means),
         cmocka_unit_test(fireflies),
-        cmocka_unit_test(moving_pictures),
+        cmocka_unit_test(pictures_as_they_are_viewed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

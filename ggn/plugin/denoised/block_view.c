@@ -138,7 +138,7 @@ static void show_apart(struct gd_block_view *seen, const struct lull_kit *kit, d
 
 struct ggn_kept_errors gd_block_view_errors(struct gd_block_view *seen, const struct gd_look *look,
                                             const struct lull_kit *kit, const struct lull_block *b, int blend,
-                                            const struct ggn_temporal *temporal)
+                                            const struct ggn_viewing *viewing)
 {
     const double n = (double)b->spp, h = (double)b->half_spp;
     lull_denoised_cut(&seen->part, &look->pair, gd_look_place(look, b));
@@ -159,5 +159,5 @@ struct ggn_kept_errors gd_block_view_errors(struct gd_block_view *seen, const st
                                   .noisy = {seen->noisy_light[0], seen->noisy_light[1]},
                                   .crossed = {seen->crossed_light[0], seen->crossed_light[1]},
                                   .apart = seen->apart};
-    return ggn_kept_judge(&kept, temporal, seen->judging);
+    return ggn_kept_judge(&kept, viewing, seen->judging);
 }

@@ -37,10 +37,10 @@ struct gd_block_view {
 int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form, struct base_err *err);
 void gd_block_view_release(struct gd_block_view *seen);
 
-/* Estimates the error of a block that the look has denoised. blend: the picture kept is the blend. temporal: as for
+/* Estimates the error of a block that the look has denoised. blend: the picture kept is the blend. viewing: as for
  * ggn_kept_judge. */
 struct ggn_kept_errors gd_block_view_errors(struct gd_block_view *seen, const struct gd_look *look,
                                             const struct lull_kit *kit, const struct lull_block *block, int blend,
-                                            const struct ggn_temporal *temporal);
+                                            const struct ggn_viewing *viewing);
 
 #endif

@@ -14,7 +14,7 @@
 #include "plugin/denoised/block_view.h"
 #include "plugin/denoised/cover.h"
 #include "plugin/limit.h"
-#include "plugin/moving.h"
+#include "plugin/viewing.h"
 #include "plugin/translate.h"
 
 static const double STEP = 1.25; /* of samples from check to check, at least */
@@ -58,7 +58,7 @@ struct sight { /* of a block that is asked about */
 struct lull_instance {
     struct lull_kit kit;
     struct ggn_observer observer;
-    struct ggn_temporal temporal;
+    struct ggn_viewing viewing;
     double stop_error;
     char *library;       /* owns; NULL: the usual places */
     atomic_flag warned;  /* of halves that are none: once per frame */
@@ -90,7 +90,7 @@ static double error_of(struct lull_instance *in, struct gd_block_view *seen, con
                                     "hold a fixed half of the samples",
                                     tally);
     const struct ggn_kept_errors e = gd_block_view_errors(seen, &in->look, &in->kit, b, in->kit.value[P_PICTURE] == 0,
-                                                          gp_is_moving(&in->kit, P_FPS) ? &in->temporal : NULL);
+                                                          gp_is_viewed(&in->kit, P_FPS, P_PPD) ? &in->viewing : NULL);
     now->halves = ggn_observer_error(&in->observer, e.halves, pixels);
     now->crossed = ggn_observer_error(&in->observer, e.crossed, pixels);
     return fmax(now->halves, now->crossed);
@@ -426,7 +426,7 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     atomic_flag_clear(&in->warned);
     in->observer = ggn_observer_default;
     in->stop_error = gp_stop_error(&in->kit, &in->observer, P_VISIBLE, P_ERROR);
-    gp_temporal_init(&in->temporal, &in->kit, P_FPS, P_PPD);
+    gp_viewing_init(&in->viewing, &in->kit, P_FPS, P_PPD);
     in->kit.need.halo = GD_REACH;
     in->kit.need.checks_hint = 5;
     in->kit.need.bytes_per_block = 2 * sizeof(struct past) + sizeof(struct lull_rect) + sizeof(struct sight) +

@@ -1,4 +1,4 @@
-/* Noise that is new in each frame: the model against ColorVideoVDP's own numbers, and what it makes of fine and coarse noise. */
+/* Noise from another distance, and noise that is new in each frame: the model against ColorVideoVDP's own numbers, and what it makes of fine and coarse noise. */
 #include "support/ggn_cmocka.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 #include "nn/hash.h"
 #include "support/ggn_near.h"
 
-#include "observer/temporal.h"
+#include "observer/viewing.h"
 
 enum { SIDE = 200 };
 
@@ -21,49 +21,66 @@ static const double gains_60[] = {0.992408, 0.575856, 0.452095, 0.419599, 0.4353
 static void of_spatial_bands(void **state)
 {
     const double tolerance = 2e-5; /* filters in single precision there */
-    struct ggn_temporal t;
+    struct ggn_viewing t;
     (void)state;
-    ggn_temporal_init(&t, 24, 64 / sqrt(0.125));
+    ggn_viewing_init(&t, 24, 64 / sqrt(0.125));
     for (int k = 0; k < 10; k++)
-        assert_near(t.gain[k], gains_24[k], tolerance);
-    assert_true(t.gain[10] == t.gain[9] && t.gain[11] == t.gain[9]);
-    ggn_temporal_init(&t, 60, 64 / sqrt(0.125));
+        assert_near(t.gain[k] / t.still[k], gains_24[k], tolerance);
+    assert_near(t.gain[10] / t.still[10], t.gain[9] / t.still[9], tolerance);
+    ggn_viewing_init(&t, 60, 64 / sqrt(0.125));
     for (int k = 0; k < 10; k++)
-        assert_near(t.gain[k], gains_60[k], tolerance);
-    ggn_temporal_init(&t, 24, 32 / sqrt(0.125)); /* from twice as near */
+        assert_near(t.gain[k] / t.still[k], gains_60[k], tolerance);
+    ggn_viewing_init(&t, 24, 32 / sqrt(0.125)); /* from twice as near */
     for (int k = 0; k < 9; k++)
-        assert_near(t.gain[k], gains_24[k + 1], tolerance);
+        assert_near(t.gain[k] / t.still[k], gains_24[k + 1], tolerance);
 }
 
 static void of_a_still(void **state)
 {
-    struct ggn_temporal t;
+    struct ggn_viewing t;
     float noise[6] = {1, -2, 3, 0, 5, 1};
     (void)state;
-    ggn_temporal_init(&t, 0, 67);
-    for (int k = 0; k < GGN_TEMPORAL_BANDS; k++)
-        assert_true(t.gain[k] == 1.0);
-    assert_true(ggn_temporal_gain(&t, noise, 3, 2) == 1.0);
+    ggn_viewing_init(&t, 0, 67);
+    for (int k = 0; k < GGN_VIEWING_BANDS; k++)
+        assert_true(t.gain[k] == 1.0 && t.still[k] == 1.0);
+    assert_true(ggn_viewing_gain(&t, noise, 3, 2, NULL) == 1.0);
+}
+
+/* log2 of the sustained channel's sensitivity at 64, 32, ..., 1/4 cycles per degree, from the same table. */
+static const double sensitivities[] = {-0.0010, 3.0284, 5.4363, 7.1619, 8.0456, 8.0139, 7.1694, 6.1033, 5.1115};
+
+static void from_another_distance(void **state)
+{
+    struct ggn_viewing near, far;
+    (void)state;
+    ggn_viewing_init(&far, 0, 64 / sqrt(0.125));
+    ggn_viewing_init(&near, 0, 32 / sqrt(0.125));
+    for (int k = 0; k + 1 < 9; k++) {
+        assert_near(far.still[k] / near.still[k], exp2(sensitivities[k] - sensitivities[k + 1]), 2e-5);
+        assert_true(far.gain[k] == far.still[k]);
+    }
+    for (int k = 0; k < 3; k++) /* up to 6 cycles per degree the finer is seen less */
+        assert_true(far.still[k] < far.still[k + 1]);
 }
 
 /* Means of squares of `coarse` px of independent noise. */
-static double gain_of(const struct ggn_temporal *t, int width, int height, int coarse)
+static double gain_of(const struct ggn_viewing *t, int width, int height, int coarse)
 {
     float *noise = malloc((size_t)width * (size_t)height * sizeof *noise);
     assert_non_null(noise);
     for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++)
             noise[y * width + x] = (float)ggn_hash_unit((uint32_t)(y / coarse), (uint32_t)(x / coarse)) - 0.5f;
-    double gain = ggn_temporal_gain(t, noise, width, height);
+    double gain = ggn_viewing_gain(t, noise, width, height, NULL);
     free(noise);
     return gain;
 }
 
 static void fine_and_coarse_noise(void **state)
 {
-    struct ggn_temporal t;
+    struct ggn_viewing t;
     (void)state;
-    ggn_temporal_init(&t, 24, 67);
+    ggn_viewing_init(&t, 24, 67);
     /* white: three quarters of its power are in the first band, three quarters of the rest in the next */
     double white = sqrt((12 * t.gain[0] * t.gain[0] + 3 * t.gain[1] * t.gain[1] + t.gain[2] * t.gain[2]) / 16);
     assert_near(gain_of(&t, SIDE, SIDE, 1), white, 0.01);
@@ -76,22 +93,20 @@ static void fine_and_coarse_noise(void **state)
 
 static void of_few_pixels(void **state)
 {
-    struct ggn_temporal t;
+    struct ggn_viewing t;
     float one = 0.5f, none[2] = {0, 0}, row[3] = {1, 2, 3};
     (void)state;
-    ggn_temporal_init(&t, 24, 67);
-    assert_near(ggn_temporal_gain(&t, &one, 1, 1), t.gain[0], 1e-12);
-    assert_near(ggn_temporal_gain(&t, none, 2, 1), t.gain[0], 1e-12);
-    assert_near(ggn_temporal_gain(&t, row, 1, 3), t.gain[0], 1e-12);
+    ggn_viewing_init(&t, 24, 67);
+    assert_near(ggn_viewing_gain(&t, &one, 1, 1, NULL), t.gain[0], 1e-12);
+    assert_near(ggn_viewing_gain(&t, none, 2, 1, NULL), t.gain[0], 1e-12);
+    assert_near(ggn_viewing_gain(&t, row, 1, 3, NULL), t.gain[0], 1e-12);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(of_spatial_bands),
-        cmocka_unit_test(of_a_still),
-        cmocka_unit_test(fine_and_coarse_noise),
-        cmocka_unit_test(of_few_pixels),
+        cmocka_unit_test(of_spatial_bands),      cmocka_unit_test(of_a_still),    cmocka_unit_test(from_another_distance),
+        cmocka_unit_test(fine_and_coarse_noise), cmocka_unit_test(of_few_pixels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
