@@ -205,6 +205,12 @@ def test_moments_of_waves():
     f.add(f.blocks[0], bad, 16, True)
     assert f.waves[3, 5] == 4 and (np.delete(f.waves.ravel(), 3 * 16 + 5) == 5).all() and np.isfinite(f.planes_now()["moment2"].array).all()
     assert {"waves", "sum-moment2"} <= set(f.arrays())
+    for spp in (100, 16):  # begun anew, with fewer samples
+        put.put(put.blocks[0], means[0] if spp == 16 else means[1], spp, means[0], 16)
+    assert (put.waves == 1).all() and np.abs(wave_variance(put)).max() < 1e-15
+    both = lull.Frame(lull.load("observer"), 16, 16, supplies=["moment2"], display=lambda x: x)
+    both.add(both.blocks[0], {"color": means[0], "moment2": np.full((16, 16), 9.)}, 16, True)
+    assert (both.waves == 1).all()  # with a display mapping those of the host are of other values
     raises(ValueError, "no plane moment2", lambda: (g := lull.Frame(lull.load("observer"), 16, 16, supplies=["moment2"])).add(g.blocks[0], means[0], 16, True))
     assert lull.Frame(lull.load("halfbuf"), 16, 16).waves is None  # nobody asks
 

@@ -26,8 +26,8 @@ class Frame(HostFrame):
     criterion: borrowed while the frame lives. wave: samples that stay together in one half; checks are moved up to whole
     pairs of waves, where the halves are equal (criteria take that for granted), unless whole_waves is False. supplies:
     planes that the host will add besides "color" and its halves (of moment2, albedo, normal, depth); kept only if the
-    criterion reads them. A criterion that reads "moment2" of a host without it gets what the scatter of the waves says
-    (`waves`). layers: names of further pictures [h, w] that the host will add under these names (alpha, a pass);
+    criterion reads them. A criterion that reads "moment2" gets what the scatter of the waves says (`waves`) of a host that
+    has none, or a display mapping. layers: names of further pictures [h, w] that the host will add under these names (alpha, a pass);
     never judged. weighted: with every sample comes "weight" [h, w], that of the reconstruction filter, and the other planes
     are multiplied by it: the mean is the sum of weight · value over the sum of weights, as in one long render. display: maps
     linear radiance [..., 3] to linear display values in [0, 1], for hosts whose view is not transfer(exposure · value); the
@@ -51,7 +51,8 @@ class Frame(HostFrame):
                      for name in (*self.planes, *self.layers) if name not in COUNTS}
         self.weights = {name: np.zeros(shape) for name in ("all", "half")} if weighted else {}
         self.dropped, self.dropped_half = np.zeros(shape, np.uint32), np.zeros(shape, np.uint32)
-        self.waves = np.zeros(shape, np.uint32) if "moment2" in set(kept) - set(supplies) else None
+        of_host = "moment2" in supplies and not display
+        self.waves = np.zeros(shape, np.uint32) if "moment2" in kept and not of_host else None
 
     # --- samples -------------------------------------------------------------------------------------------------------
 
@@ -94,9 +95,12 @@ class Frame(HostFrame):
             if half is None:
                 raise ValueError("the criterion reads half buffers: half is missing")
             parts["half"] = (_as_mean("half", half, block.rect), half_spp)
-        if spp > block.spp:
-            new = (spp * parts["color"][0] - self.sums["color"][at]) / (spp - block.spp)
-            self._add_wave(at, new, spp - block.spp, None, np.isfinite(new).all(-1))
+        if self.waves is not None and spp != block.spp:
+            before = block.spp if spp > block.spp else 0
+            if before == 0:  # begun anew
+                self.sums["moment2"][at], self.waves[at] = 0.0, 0
+            new = (spp * parts["color"][0] - (self.sums["color"][at] if before else 0.0)) / max(spp - before, 1)
+            self._add_wave(at, new, spp - before, None, np.isfinite(new).all(-1))
         for name, (part, count) in parts.items():
             self.sums[name][at] = count * part
         block.spp, block.half_spp = spp, half_spp

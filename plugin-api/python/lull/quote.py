@@ -16,8 +16,8 @@ SHARES = {0.5: "draft", 0.05: "strict"}
 
 
 class Row(NamedTuple):
-    """One setting. spp: of the least block, of the picture and of the most expensive block; time_s: of the whole render from its
-    start, wall seconds on free processors. at_most: the criterion did not predict every block, those count with the most
+    """One setting. spp: of the least block, of the picture and of the most expensive block; time_s: of the whole render from
+    its start, wall seconds on free processors. at_most: the criterion did not predict every block, those count with the most
     samples."""
     parameter: str
     value: float
