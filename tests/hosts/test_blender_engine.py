@@ -111,7 +111,7 @@ def test_errors():
         for wanted, parameters, runs in (("threshold", "threshold=x", program), ("expected KEY=VALUE", "threshold", program),
                                          ("no such program", "", lambda: ["/no such program"]),
                                          ("status 3: ouch", "", lambda: ["/bin/sh", "-c", "echo ouch >&2; exit 3 #"]),
-                                         ("status -9: it said nothing", "", lambda: ["/bin/sh", "-c", "kill -9 $$ #"])):
+                                         ("status -9: no message", "", lambda: ["/bin/sh", "-c", "kill -9 $$ #"])):
             scene.lull.parameters, engine._program = parameters, runs
             raises(RuntimeError, wanted, render, scene, "wrong.exr")
             assert not os.path.exists(tmp("wrong.exr"))
@@ -145,8 +145,8 @@ def test_stop():
         assert rest[-2] == {"picture": True} and "blocks converged" in rest[-1]["info"] and not process.error, rest[-3:]
         assert os.path.getsize(os.path.join(folder, child.PICTURE)) > 1000
     with rendering() as (folder, process, _):
-        os.close(process._told)  # as when Blender is killed
-        process._told = os.open(os.devnull, os.O_RDONLY)
+        os.close(process._messages)  # as when Blender is killed
+        process._messages = os.open(os.devnull, os.O_RDONLY)
         process._process.wait(20)
         assert not os.path.exists(folder)
         os.mkdir(folder)
