@@ -2,7 +2,7 @@
 
 Each scene is rendered by `lull-render` and by `lull-render --denoise` with their defaults, and twice more with other seeds as references.
 The visible error of each stopped block is that of `ggn visible --second`, which takes the references' own noise out. Seconds are of the
-processor, children included. Interrupted, the same command goes on. Needs oiiotool."""
+processor, children included. Interrupted, the same command goes on."""
 import json
 import os
 import resource
