@@ -19,7 +19,6 @@ SCENES = "cornell-box soft-shadow glossy corridor bathroom chess indirect-hall g
 LADDER = (0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.0025)
 DENOISED_LADDER = (0.1, 0.03, 0.01)
 UNIFORM, MOST, AGREE, VISIBLE = (64, 256), 4096, 0.05, 1.05
-COARSER = (2, 3)  # times what is just seen, by which Cycles as host stops, too
 REFERENCES = (101, 102)
 CELLS = 4  # a side of the picture, in which references of both renderers are compared
 BPY = os.path.join(tool.BUILD, "hosts", "bpy", "bin", "python3")
@@ -172,9 +171,6 @@ class Scene:
             if not self.cycles_way(seed, "cycles %g denoised" % t, spp=MOST, threshold=t, denoise=True):
                 return  # this Blender has no denoiser
         self.cycles_way(seed, "host denoised", spp=MOST, host=["--block", str(self.o.block), "--denoise"])
-        for error in COARSER:
-            self.cycles_way(seed, "host error=%g denoised" % error, spp=MOST,
-                            host=["--block", str(self.o.block), "--denoise", "--error", str(error)])
         for n in UNIFORM:
             self.cycles_way(seed, "cycles n=%d denoised" % n, spp=n, denoise=True)
 
@@ -305,7 +301,7 @@ def raw(results):
 
 def denoised(results):
     r = results["denoised"]
-    ways = ["ours denoised", "host denoised", *("host error=%g denoised" % error for error in COARSER), *DENOISED, *UNIFORMS[" denoised"],
+    ways = ["ours denoised", "host denoised", *DENOISED, *UNIFORMS[" denoised"],
             *("ours n=%d denoised" % n for n in UNIFORM)]
     return "%s\n%s\n%s" % (head(r), share_table(r["scenes"], ways), compared(r["scenes"], DENOISED, " denoised"))
 
