@@ -1,6 +1,6 @@
 #!/bin/sh
 # Pages lead somewhere: every relative link of every page, with its section; every file that docs/tour.md names, and in it the functions
-# that the step names; the index of docs/ is whole; the manual's pages are short.
+# that the step names; the index of docs/ is whole; the manual's pages are short; tables have rows.
 . "$(dirname "$0")/ggn_setup"
 command -v git >"$tmp/out" && git rev-parse -q --git-dir >"$tmp/out" 2>&1 || { echo "ok 1 # SKIP no repository"; echo "1..1"; exit 0; }
 cat >"$tmp/pages.py" <<'END'
@@ -33,7 +33,11 @@ def length():
     for f in FILES:
         if re.fullmatch(r"docs/[^/]+\.md", f) and len(open(f, encoding="utf-8").readlines()) > 120:
             yield f"{f}: more than 120 lines: what was measured belongs to docs/results/"
-bad = list({"links": links, "tour": steps, "index": index, "length": length}[sys.argv[1]]())
+def tables():
+    for f in (f for f in FILES if f.endswith(".md") and "/templates/" not in f):
+        rows = open(f, encoding="utf-8").read().split("\n")
+        yield from (f"{f}:{i + 1}: a table without rows" for i, row in enumerate(rows[:-1]) if re.fullmatch(r"\|(-+\|)+", row) and rows[i + 1][:1] != "|")
+bad = list({"tables": tables, "links": links, "tour": steps, "index": index, "length": length}[sys.argv[1]]())
 print("\n".join(bad))
 sys.exit(bool(bad))
 END
@@ -45,5 +49,7 @@ python3 "$tmp/pages.py" index >"$tmp/out" 2>"$tmp/err"
 check "docs/README.md and docs/results.md list every page of docs/" $?
 python3 "$tmp/pages.py" length >"$tmp/out" 2>"$tmp/err"
 check "no page of the manual is longer than 120 lines" $?
+python3 "$tmp/pages.py" tables >"$tmp/out" 2>"$tmp/err"
+check "no table of a page is without rows" $?
 echo "1..$n"
 exit $bad
