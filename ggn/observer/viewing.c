@@ -10,9 +10,7 @@ static const double sustained[OCTAVES] = {4.1136, 5.1115, 6.1033, 7.1694, 8.0139
 static const double transient[OCTAVES] = {2.3522,  1.8897,  1.2757,  0.4554,  -0.3103,
                                           -0.6921, -0.7827, -0.6038, -0.1087, 0.8052};
 
-static const double USUAL_PPD = 67.0; /* what the observer takes for granted */
-
-/* Responses of the two viewing filters at `hz` (there, sigma_tf and beta_tf). */
+/* Responses of the two temporal filters at `hz` (there, sigma_tf and beta_tf). */
 static double sustained_response(double hz) { return exp(-pow(hz, 1.3314) / 5.79336); }
 
 static double transient_response(double hz)
@@ -48,7 +46,8 @@ void ggn_viewing_init(struct ggn_viewing *v, double fps, double pixels_per_degre
     const double slow = squared_taps(sustained_response, fps), fast = squared_taps(transient_response, fps);
     for (int k = 0; k < GGN_VIEWING_BANDS; k++) {
         const double cycles = sqrt(0.125) * exp2(-k), more = exp2(log_at(transient, pixels_per_degree * cycles));
-        v->still[k] = rounded(exp2(log_at(sustained, pixels_per_degree * cycles) - log_at(sustained, USUAL_PPD * cycles)));
+        v->still[k] =
+            rounded(exp2(log_at(sustained, pixels_per_degree * cycles) - log_at(sustained, GGN_VIEWING_PPD * cycles)));
         v->gain[k] = v->still[k] * rounded(sqrt(slow + fast * more * more));
     }
 }

@@ -22,7 +22,7 @@
 #ifndef GGN_OBSERVER_VIEWING_H
 #define GGN_OBSERVER_VIEWING_H
 
-enum { GGN_VIEWING_BANDS = 12 };
+enum { GGN_VIEWING_BANDS = 12, GGN_VIEWING_PPD = 67 }; /* pixels per degree that the observer takes for granted */
 
 /* [k] of the difference between neighbouring squares of 2^k px: sqrt(1/8) / 2^k cycles per pixel. */
 struct ggn_viewing {

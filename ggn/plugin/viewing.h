@@ -24,7 +24,7 @@ static inline int gp_is_viewed(const struct lull_kit *kit, int fps, int ppd)
 static inline void gp_viewing_init(struct ggn_viewing *viewing, const struct lull_kit *kit, int fps, int ppd)
 {
     ggn_viewing_init(viewing, kit->value[fps] > 0.0 ? kit->value[fps] : 0.0,
-                     isnan(kit->value[ppd]) ? 67.0 : kit->value[ppd]);
+                     isnan(kit->value[ppd]) ? GGN_VIEWING_PPD : kit->value[ppd]);
 }
 
 #endif

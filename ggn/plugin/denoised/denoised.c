@@ -102,11 +102,10 @@ static void decide(const struct lull_instance *in, const struct lull_block *b, c
                    double error, struct past *now, struct lull_decision *d)
 {
     const double spp = (double)b->spp, growth = in->kit.value[P_GROWTH];
-    const double expected = now->spp ? now->trend * pow((double)now->spp / spp, FALL) : (double)NAN;
-    const int low_before = now->error <= in->stop_error && now->spp > 0;
+    const int before = now->spp > 0 && !isnan(now->error);
     lull_kit_verdict(&in->kit, b, tally, error, in->stop_error, 0, growth, d);
-    now->trend = isnan(d->error) || isnan(expected) ? d->error : 0.5 * (d->error + expected);
-    const int confirmed = low_before || (!isnan(expected) && now->trend <= in->stop_error);
+    now->trend = before ? 0.5 * (d->error + now->trend * pow((double)now->spp / spp, FALL)) : d->error;
+    const int confirmed = before && fmin(now->error, now->trend) <= in->stop_error;
     if (d->action == LULL_STOP && !isnan(d->error) && !confirmed) {
         lull_kit_continue(&in->kit, b, STEP * spp, d);
         d->predicted_spp = (double)d->next_spp;
