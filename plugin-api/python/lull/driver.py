@@ -50,8 +50,8 @@ class Driver:
     threads: of the host, for the report and the time left. identity: what the samples depend on (scene, frame, camera, the
     renderer's version …), by name: a checkpoint is only resumed where all of it and of Frame.identity() is the same.
     after_call: called after each call of the render function (progress, a partial picture). watchers: a list of what is
-    called after each step with the driver and its result (lull.checkpoint.Keeper, lull.quote.once_quoted). suspend: called before active
-    blocks are closed for time, interrupt or failure, the moment for lull.checkpoint.save. display_server: "HOST" or
+    called after each step with the driver and its result (lull.checkpoint.Keeper, lull.quote.once_quoted). suspend: called
+    before active blocks are closed for time, interrupt or failure, the moment for lull.checkpoint.save. display_server: "HOST" or
     "HOST:PORT" of an image viewer that shows the picture while it is made (lull.display).
     """
 

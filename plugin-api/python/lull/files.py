@@ -14,6 +14,8 @@ import numpy as np
 from . import abi
 from .library import LullError, call, library
 
+LUMINANCE = (0.2126729, 0.7151522, 0.0721750)  # Y of linear sRGB (IEC 61966-2-1), which criteria take pixels for
+
 
 class Output(NamedTuple):
     """A file to be written. option: what asked for it, for messages; endings: those its name may have, () = any."""

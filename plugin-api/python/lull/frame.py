@@ -11,12 +11,11 @@ import numpy.typing as npt
 
 from . import abi, limits
 from .criterion import CHANNELS, Criterion, Plane, Rect, plane_names
-from .files import srgb_decoded
+from .files import LUMINANCE, srgb_decoded
 from .host import Block, HostFrame
 from .library import LullError
 
 COUNTS = {"spp", "weight"}  # planes that the library makes
-LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])  # Y of linear sRGB (IEC 61966-2-1), which criteria take pixels for
 Sample = Union[np.ndarray, Mapping[str, np.ndarray]]
 
 
@@ -27,8 +26,8 @@ class Frame(HostFrame):
     pairs of waves, where the halves are equal (criteria take that for granted), unless whole_waves is False. supplies:
     planes that the host will add besides "color" and its halves (of moment2, albedo, normal, depth); kept only if the
     criterion reads them. A criterion that reads "moment2" gets what the scatter of the waves says (`waves`) of a host that
-    has none, or a display mapping. layers: names of further pictures [h, w] that the host will add under these names (alpha, a pass);
-    never judged. weighted: with every sample comes "weight" [h, w], that of the reconstruction filter, and the other planes
+    has none, or a display mapping. layers: names of further pictures [h, w] that the host will add under these names (alpha,
+    a pass); never judged. weighted: with every sample comes "weight" [h, w], that of the reconstruction filter, and the other planes
     are multiplied by it: the mean is the sum of weight · value over the sum of weights, as in one long render. display: maps
     linear radiance [..., 3] to linear display values in [0, 1], for hosts whose view is not transfer(exposure · value); the
     criterion then judges these. denoised: what lull.denoise reads is kept, too: the halves, and of albedo and normal what

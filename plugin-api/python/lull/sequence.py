@@ -19,7 +19,7 @@ from typing import Any, Sequence
 
 import numpy as np
 
-from .files import replaced, srgb
+from .files import LUMINANCE, replaced, srgb
 
 MAGIC, FILE_HEADER, RECORD_HEADER, PLANE_HEADER = b"LULLSEQ1", 64, 32, 16
 LEVEL, REFERENCE = 1, 2
@@ -127,7 +127,7 @@ def _fine(codes: np.ndarray, light: np.ndarray) -> np.ndarray:
 
 
 def _luminance(rgb: np.ndarray) -> np.ndarray:
-    return 0.2126729 * rgb[0] + 0.7151522 * rgb[1] + 0.0721750 * rgb[2]
+    return LUMINANCE[0] * rgb[0] + LUMINANCE[1] * rgb[1] + LUMINANCE[2] * rgb[2]
 
 
 def _half_log(values: np.ndarray) -> np.ndarray:
