@@ -140,8 +140,8 @@ def main(o):
         result |= {"test": {k: r for k, r in rows["test"].items() if not k.endswith(".csv")}, **half_of_the_viewers(o, work)}
     if os.path.isdir(o.rendered) and os.listdir(o.rendered):
         result |= rendered_views(o)
-    source = tool.measured(level=tool.load(o.observer)["level"], visible=tool.default("observer", "visible"))
-    result = {name: {"measured": source, "rows": rows} for name, rows in result.items()}
+    measured = tool.measured(level=tool.load(o.observer)["level"], visible=tool.default("observer", "visible"))
+    result = {name: {"measured": measured, "rows": rows} for name, rows in result.items()}
     tool.save(result, o.out, "agreement.json")
     for name, kept in result.items():
         print(f"Against {TITLES[name]}:\n")

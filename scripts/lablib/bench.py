@@ -426,7 +426,7 @@ def main(o):
     for name in chosen:
         if name not in parts:
             raise tool.Refused("--only %s: expected some of %s" % (name, ",".join(parts)))
-    row, found, failed = tool.measured(load=os.getloadavg()[0]), {}, 0
+    measured, found, failed = tool.measured(load=os.getloadavg()[0]), {}, 0
     build(chosen)
     for name in chosen:
         ROWS.clear()
@@ -435,7 +435,7 @@ def main(o):
         except (tool.Refused, subprocess.CalledProcessError, OSError, ValueError, TypeError) as e:
             missing(name, str(e))  # the rest of the table is worth having
             failed = 1
-        found[name] = {"measured": row, "rows": list(ROWS)}
+        found[name] = {"measured": measured, "rows": list(ROWS)}
     print(page(found))
     if o.write:
         before = tool.results(o.write, "bench")

@@ -9,10 +9,10 @@ import resource
 import statistics
 
 from lablib import tables, tool
+from lablib.denoised import REFERENCES, VISIBLE, name_of
 
 SCENES = ["scenes/%s.pbrt" % name for name in "cornell-box demo chess rock-garden glossy soft-shadow".split()] + [
     os.path.join("..", "shared", "scenes", name) for name in ("coffee-v3/scene.pbrt", "veach-mis-v4/veach-mis.pbrt")]
-REFERENCES, VISIBLE = (101, 102), 1.05
 WAYS = {"raw": ["-c", "observer"], "denoised": ["--denoise"]}
 HEAD = ("scene", "samples: raw / denoised", "denoised / raw", "processor s: raw / denoised", "denoised / raw",
         "of it looks", "raw: stopped, visibly off, worst", "denoised: stopped, visibly off, worst")
@@ -27,10 +27,6 @@ def options(parser):
     parser.add_argument("--work", type=tool.path, default=os.path.join(tool.BUILD, "full-size"), metavar="DIR",
                         help="references, pictures, figures; what is there is not made again (build/full-size)")
     tool.writes(parser)
-
-
-def name_of(scene):
-    return "%s-%s" % (os.path.basename(os.path.dirname(scene)), os.path.basename(scene)[:-5])
 
 
 def render(o, scene, out, *how):

@@ -6,6 +6,7 @@ numpy (python3-numpy), Pillow (python3-pil) and oiiotool."""
 import math
 import os
 import statistics
+import textwrap
 
 from lablib import tables, tool
 
@@ -83,7 +84,8 @@ def row(spp, blocks):
 
 def page(results):
     table = tables.table(HEAD, [row(spp, [b for scene in results["scenes"].values() for b in scene[str(spp)]]) for spp in SPP])
-    return "%s: %s.\n\n%s" % (tables.provenance(results["measured"]), ", ".join(results["scenes"]), table)
+    head = textwrap.fill("%s: %s." % (tables.provenance(results["measured"]), ", ".join(results["scenes"])), 140)
+    return "%s\n\n%s" % (head, table)
 
 
 def main(o):
