@@ -120,6 +120,19 @@ static void estimate_other(struct picture *p, const struct lull_kit_span *s, siz
 
 static void estimate_noisy(struct picture *p, const struct lull_kit_span *s, size_t at) { estimate(p, s, at, p->part.half); }
 
+/* Whether no block shows an error, as the criterion told at its last samples. Clean auxiliaries, which take more than twice
+ * as long as the rest, improve nothing then that is seen; looks do not have them either. */
+static int is_flawless(const struct picture *p)
+{
+    const struct lull_host_blocks *blocks = &p->frame->blocks;
+    uint32_t good = 0;
+    for (uint32_t i = 0; i < blocks->count; i++) {
+        const struct lull_host_block *b = &blocks->list[i];
+        good += b->asked && b->asked_spp == b->spp && b->error <= 1.0;
+    }
+    return good == blocks->count;
+}
+
 /* The mean of the denoised halves, and how much of the noisy picture each pixel takes. */
 static int32_t denoise_halves(struct picture *p, float *denoised, struct lull_error *err)
 {
@@ -127,7 +140,7 @@ static int32_t denoise_halves(struct picture *p, float *denoised, struct lull_er
     struct base_err why = {0};
     each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF), read_halves);
     if (lull_denoised_run(&p->pair, p->how->cancelled, p->how->context, &why) ||
-        lull_denoised_again(&p->pair, p->how->cancelled, p->how->context, &why))
+        (!is_flawless(p) && lull_denoised_again(&p->pair, p->how->cancelled, p->how->context, &why)))
         return lull_host_translate(&why, err);
     if (p->pair.other[0]) {
         each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), estimate_other);

@@ -206,6 +206,42 @@ static void auxiliary_planes(void **state)
     end(frame);
 }
 
+/* The denoised picture of a denoiser that says what its albedo is, which is noisy about the truth: how noisy. */
+static double error_by_albedo(void)
+{
+    assert_int_equal(make("auxiliary", 0, NULL), LULL_OK);
+    return error_of(clean, flat);
+}
+
+/* Clean auxiliaries count while some block shows an error, or may: no answer, an old one, one that is no number. */
+static void clean_auxiliaries_where_errors_show(void **state)
+{
+    (void)state;
+    static double albedo[N][3];
+    uint64_t random = 9;
+    render(0.05, flat);
+    struct lull_host_block *b = blocks_of(frame)->list;
+    const uint32_t last = blocks_of(frame)->count - 1;
+    for (int i = 0; i < N; i++)
+        for (int c = 0; c < 3; c++)
+            albedo[i][c] = SPP * (flat(0) + 0.05 * splitmix_gauss(&random));
+    planes[LULL_PLANE_ALBEDO] = plane_of(albedo, LULL_NORM_SPP);
+    const double cleaned = error_by_albedo();
+    for (uint32_t i = 0; i <= last; i++)
+        b[i].asked = 1, b[i].asked_spp = SPP, b[i].error = 1;
+    const double as_it_is = error_by_albedo();
+    assert_true(fabs(as_it_is - 0.05) < 0.002 && cleaned < 0.5 * as_it_is);
+    b[last].error = 1.01;
+    assert_true(error_by_albedo() == cleaned);
+    b[last].error = (double)NAN;
+    assert_true(error_by_albedo() == cleaned);
+    b[last].error = 1, b[last].asked_spp = SPP - 1;
+    assert_true(error_by_albedo() == cleaned);
+    b[last].asked_spp = SPP, b[0].asked = 0;
+    assert_true(error_by_albedo() == cleaned);
+    end(frame);
+}
+
 /* A block without samples is black; one whose halves cannot be told apart is the denoised picture. */
 static void blocks_without_halves(void **state)
 {
@@ -253,6 +289,7 @@ int main(void)
                                        cmocka_unit_test(every_pixel_is_the_blend),
                                        cmocka_unit_test(full_is_the_denoised_picture),
                                        cmocka_unit_test(auxiliary_planes),
+                                       cmocka_unit_test(clean_auxiliaries_where_errors_show),
                                        cmocka_unit_test(blocks_without_halves),
                                        cmocka_unit_test(failures_are_one_line)};
     if (api_folder(path, sizeof path, "../../lib/liblull-host.so.1") != 0 ||
