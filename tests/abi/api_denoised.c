@@ -223,6 +223,30 @@ static void a_trend_stops(void **unused)
     end(&s);
 }
 
+/* What it says that the first look is at. */
+static uint64_t first_look(const char *error, const char *first_spp)
+{
+    struct lull_pair pairs[] = {{"library", stub}, {"error", error}, {"first-spp", first_spp}};
+    struct lull_requirements needs = {.struct_size = sizeof needs};
+    struct lull_instance *in = NULL;
+    assert_int_equal(criterion()->create(&host, pairs, first_spp ? 3 : 2, sizeof pairs[0], &in, NULL), LULL_OK);
+    assert_int_equal(criterion()->requirements(in, &needs, NULL), LULL_OK);
+    criterion()->destroy(in);
+    return needs.first_spp;
+}
+
+static void drafts_are_looked_at_earlier(void **unused)
+{
+    (void)unused;
+    setenv("OIDN_STUB", "constant", 1);
+    assert_int_equal(first_look("0.5", NULL), 64);
+    assert_int_equal(first_look("2", NULL), 64);
+    assert_int_equal(first_look("3", NULL), 42);
+    assert_int_equal(first_look("4", NULL), 32);
+    assert_int_equal(first_look("50", NULL), 16);
+    assert_int_equal(first_look("4", "50"), 50);
+}
+
 /* The frame's edge is no edge to the denoiser: a block that ends there has the error that it has in a larger frame, whose
  * pixels are its own mirrored on. */
 static void mirrored_beyond_the_frame(void **unused)
@@ -536,6 +560,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_looks_stop),
         cmocka_unit_test(a_trend_stops),
+        cmocka_unit_test(drafts_are_looked_at_earlier),
         cmocka_unit_test(mirrored_beyond_the_frame),
         cmocka_unit_test(stripes_below_the_noise),
         cmocka_unit_test(a_small_place),
