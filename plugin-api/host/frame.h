@@ -92,6 +92,7 @@ struct lull_host_quote_asked {
     struct lull_host_quote_block *blocks;  /* owns; the answer */
     double *errors;                        /* owns; [blocks] that it was given at response->spp; of rows by error alone */
     double limit;                          /* the error at which a row by error stops; 0: another row */
+    uint64_t first_spp;                    /* samples at the first check of such a row */
     int other;                             /* not the frame's criterion: its checks take their own time */
     double asked_s;                        /* wall seconds that it was asked */
     uint64_t asked;                        /* blocks */

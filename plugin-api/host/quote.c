@@ -64,18 +64,10 @@ static int32_t add_row(struct lull_host_quote *q, int32_t asked, struct lull_err
     return a->response && a->first && a->blocks ? LULL_OK : no_memory(err);
 }
 
-int32_t lull_host_quote_add(struct lull_host_quote *q, const struct lull_pair *changed, int32_t asked,
-                            struct lull_error *err)
+/* The frame's criterion once more, with a parameter changed; NULL: with none. */
+static int32_t create_changed(const struct lull_host_criterion *own, const struct lull_pair *changed,
+                              struct lull_host_criterion **made, struct lull_error *err)
 {
-    int32_t code = lull_host_given(err, "quote", q, NULL);
-    if (code == LULL_OK)
-        code = lull_host_check_pairs(changed, changed != NULL, err);
-    if (code != LULL_OK)
-        return code;
-    const struct lull_host_criterion *own = q->frame->criterion;
-    code = add_row(q, asked, err);
-    if (code != LULL_OK || !own)
-        return code;
     struct lull_host_services services = own->offered;
     struct lull_pair *pairs = calloc((size_t)own->pair_count + 1, sizeof *pairs);
     if (!pairs)
@@ -85,10 +77,38 @@ int32_t lull_host_quote_add(struct lull_host_quote *q, const struct lull_pair *c
     memcpy(pairs, own->pairs, own->pair_count * sizeof *pairs);
     if (changed)
         pairs[own->pair_count] = *changed; /* a later pair wins */
-    struct lull_host_criterion **made = &q->asked[q->count - 1].criterion;
-    code = lull_host_create(&services, own->table, pairs, own->pair_count + (changed != NULL), made, err);
+    int32_t code = lull_host_create(&services, own->table, pairs, own->pair_count + (changed != NULL), made, err);
     free(pairs);
+    return code;
+}
+
+int32_t lull_host_quote_add(struct lull_host_quote *q, const struct lull_pair *changed, int32_t asked,
+                            struct lull_error *err)
+{
+    int32_t code = lull_host_given(err, "quote", q, NULL);
+    if (code == LULL_OK)
+        code = lull_host_check_pairs(changed, changed != NULL, err);
+    if (code == LULL_OK)
+        code = add_row(q, asked, err);
+    if (code != LULL_OK || !q->frame->criterion)
+        return code;
+    struct lull_host_criterion **made = &q->asked[q->count - 1].criterion;
+    code = create_changed(q->frame->criterion, changed, made, err);
     return code == LULL_OK ? lull_host_join(q->frame, *made, err) : code;
+}
+
+/* Samples at the first check of the frame's criterion if it stopped at this error: drafts may be checked earlier. */
+static uint64_t first_check(const struct lull_host_criterion *own, double limit)
+{
+    struct lull_host_criterion *made = NULL;
+    char text[32];
+    snprintf(text, sizeof text, "%.17g", limit);
+    const struct lull_pair error = {"error", text};
+    if (!own || create_changed(own, &error, &made, NULL) != LULL_OK)
+        return own ? own->needs.first_spp : 1;
+    const uint64_t first = made->needs.first_spp;
+    lull_host_close(made);
+    return first;
 }
 
 int32_t lull_host_quote_add_error(struct lull_host_quote *q, double limit, struct lull_error *err)
@@ -102,6 +122,7 @@ int32_t lull_host_quote_add_error(struct lull_host_quote *q, double limit, struc
         return code;
     struct lull_host_quote_asked *a = &q->asked[q->count - 1];
     a->limit = limit;
+    a->first_spp = first_check(q->frame->criterion, limit);
     a->errors = calloc(q->frame->blocks.count, sizeof *a->errors);
     return a->errors ? LULL_OK : no_memory(err);
 }
@@ -155,7 +176,8 @@ static void note_error(struct lull_host_quote_asked *a, uint32_t index, const st
         fall = fmin(fmax(log2(before / error) / log2(spp / (double)response->spp), LEAST_FALL), FALL_OF_NOISE);
     double stop = error > 0.0 ? spp * pow(error / limit, 1.0 / fall) : isnan(error) ? (double)NAN : 0.0;
     const int stopped = error <= limit && b->spp >= spp_min;
-    const double least = has_before ? (double)response->spp : b->checks > 1 ? 0.0 : spp; /* checks before the quote began */
+    const double first = fmin((double)a->first_spp, spp); /* 0: there were checks before the quote began */
+    const double least = has_before ? (double)response->spp : b->checks > 1 ? 0.0 : first;
     if (stopped)
         stop = fmax(fmin(fmax(stop, least), spp), (double)spp_min);
     *response = (struct lull_host_response){.spp = b->spp, .predicted = stop, .stopped = stopped};
