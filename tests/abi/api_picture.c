@@ -213,7 +213,8 @@ static double error_by_albedo(void)
     return error_of(clean, flat);
 }
 
-/* Clean auxiliaries count while some block shows an error, or may: no answer, an old one, one that is no number. */
+/* Clean auxiliaries count while some block is not as good as was asked, or may not be: an error that nobody has stopped, no
+ * answer, an old one, one that is no number. */
 static void clean_auxiliaries_where_errors_show(void **state)
 {
     (void)state;
@@ -233,6 +234,8 @@ static void clean_auxiliaries_where_errors_show(void **state)
     assert_true(fabs(as_it_is - 0.05) < 0.002 && cleaned < 0.5 * as_it_is);
     b[last].error = 1.01;
     assert_true(error_by_albedo() == cleaned);
+    b[last].reason = LULL_REASON_CRITERION;
+    assert_true(error_by_albedo() == as_it_is);
     b[last].error = (double)NAN;
     assert_true(error_by_albedo() == cleaned);
     b[last].error = 1, b[last].asked_spp = SPP - 1;
