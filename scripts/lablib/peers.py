@@ -50,12 +50,12 @@ class Cycles:
         self.process = None
 
     def export(self, scene, size, blend, pbrt):
-        tool.run(*self.command, EXPORT, "--", scene, blend, "%dx%d" % (size, size), pbrt)
+        tool.run(*self.command, EXPORT, "--", scene, blend, size, pbrt)
         if not os.path.exists(pbrt):
             raise tool.Refused("%s cannot be exported: %s" % (scene, EXPORT))
 
-    def seconds(self, **request):
-        """Processor seconds of one render."""
+    def render(self, **request):
+        """One render: {"s": processor seconds, "wall_s": those of the clock}."""
         if not self.process:
             env = {**os.environ, "LULL_PLUGIN_PATH": os.path.join(tool.BUILD, "lib", "lull")}
             self.process = subprocess.Popen([*self.command, WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
@@ -67,7 +67,7 @@ class Cycles:
                 reply = json.loads(line[5:])
                 if "error" in reply:
                     raise tool.Refused("%s: %s" % (request["file"], reply["error"].strip()))
-                return reply["s"]
+                return reply
         self.process = None
         raise tool.Refused("%s: Blender died" % request["file"])
 
@@ -100,7 +100,7 @@ class Scene:
         self.blend, self.pbrt, self.kept = self.stem + ".blend", self.stem + ".pbrt", self.stem + ".json"
         self.found = tool.load(self.kept) if os.path.exists(self.kept) else {"ways": {}}
         if not os.path.exists(self.pbrt):
-            cycles.export(file, o.size, self.blend, self.pbrt)
+            cycles.export(file, "%dx%d" % (o.size, o.size), self.blend, self.pbrt)
 
     def keep(self):
         tool.save(self.found, self.kept)
@@ -113,7 +113,7 @@ class Scene:
                 if renderer == "ours":
                     ours_seconds(self.pbrt, self.o, seed, made, "--spp", self.o.reference_spp)
                 else:
-                    self.cycles.seconds(file=self.blend, out=made, seed=seed, spp=self.o.reference_spp)
+                    self.cycles.render(file=self.blend, out=made, seed=seed, spp=self.o.reference_spp)
                 os.replace(made, path)
         return paths
 
@@ -150,7 +150,7 @@ class Scene:
         return self.way(seed, name, "ours", lambda out: ours_seconds(self.pbrt, self.o, seed, out, *words))
 
     def cycles_way(self, seed, name, **request):
-        return self.way(seed, name, "cycles", lambda out: self.cycles.seconds(file=self.blend, out=out, seed=seed, **request))
+        return self.way(seed, name, "cycles", lambda out: self.cycles.render(file=self.blend, out=out, seed=seed, **request)["s"])
 
     def measure_raw(self, seed):
         ours = self.ours(seed, "ours")
