@@ -98,7 +98,8 @@ def ways_table(scenes):
         errors = [e for w in of for e in w["errors"]]
         rows.append([NAMES[name], "%.0f" % sum(w["s"] for w in of), peers.spread(base), peers.spread([max(w["errors"]) for w in of]),
                      "%.2f" % statistics.mean(errors), tables.percent(sum(e > peers.VISIBLE for e in errors) / len(errors))])
-    return tables.table(("way", "processor s, all", "against %s, median (range)" % TIMED, "worst block, median (range)", "mean block", "visibly off"), rows)
+    heads = ("way", "processor s, all", "against %s, median (range)" % TIMED, "worst block, median (range)", "mean block", "visibly off")
+    return tables.table(heads, rows)
 
 
 def scenes_table(scenes):

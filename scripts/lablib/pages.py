@@ -8,8 +8,8 @@ import os
 import re
 import sys
 
-from lablib import (agreement, ablation, bench, cost_page, denoised, full_size, kept, paper, peers, profile, published, quote_accuracy, references,
-                    scale, shots, tool, truth)
+from lablib import (agreement, ablation, artists, bench, cost_page, denoised, full_size, kept, paper, peers, profile, published, quote_accuracy,
+                    references, scale, shots, tool, truth)
 
 TEMPLATES = os.path.join(tool.ROOT, "scripts", "lablib", "templates")
 OTHERS = ("ggn/README.md", "ggn/models/README.md", "ggn/observer/README.md")  # pages outside docs/ that show figures
@@ -44,7 +44,7 @@ def made(docs):
     jobs = {name: Job(module, tool.results(docs, name)) for name, module in (
         ("agreement", agreement), ("ablation", ablation), ("bench", bench), ("cost", cost_page), ("quote", quote_accuracy),
         ("references", references), ("profile", profile), ("scale", scale), ("denoised", denoised), ("kept", kept), ("full_size", full_size),
-        ("paper", paper), ("peers", peers), ("shots", shots), ("published", published), ("truth", truth))}
+        ("paper", paper), ("peers", peers), ("artists", artists), ("shots", shots), ("published", published), ("truth", truth))}
 
     def of_figures(name, make):
         try:
