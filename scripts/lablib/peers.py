@@ -296,7 +296,9 @@ def head(results):
 
 def raw(results):
     r = results["raw"]
-    return "%s\n%s" % (head(r), compared(r["scenes"], RAW, ""))
+    measured = [f["ways"] for _, f in counting(r["scenes"])]
+    ways = ["ours", "host", *(way for way in RAW if all("1 " + way in w for w in measured)), *UNIFORMS[""]]
+    return "%s\n%s\n%s" % (head(r), compared(r["scenes"], RAW, ""), share_table(r["scenes"], ways))
 
 
 def denoised(results):
