@@ -6,6 +6,7 @@
 
 #include "base/bytes.h"
 #include "base/files.h"
+#include "base/half.h"
 
 /* The start of the line after a line "DATA", or NULL. */
 static const char *find_data(const char *p, const char *end)
@@ -27,8 +28,7 @@ static int read_rows(const char *path, const char *p, uint32_t width, uint32_t h
     for (uint32_t y = 0; y < height; y++, p++)
         for (uint32_t x = 0; x < width; x++) {
             for (uint32_t c = 0; c < 3; c++) {
-                uint32_t bits = base_get_u32((const uint8_t *)(p + 4 * (channels == 3 ? c : 0)));
-                memcpy(out, &bits, sizeof *out);
+                *out = base_f32_of_bits(base_get_u32((const uint8_t *)(p + 4 * (channels == 3 ? c : 0))));
                 if (!isfinite(*out++))
                     return base_fail(err, BASE_EINVAL, "%s: pixel %u,%u is not finite", path, x, y);
             }

@@ -17,23 +17,6 @@ static const uint64_t MAX_FILE = (uint64_t)4 << 30;
 const char *const ggn_type_names[GGN_TYPES + 1] = {"f32", "f16", "bf16", NULL};
 static const unsigned type_size[GGN_TYPES] = {4, 2, 2};
 
-/* --- numbers ----------------------------------------------------------------------------------------------------------- */
-
-static void put_float(unsigned char *p, float x)
-{
-    uint32_t u;
-    memcpy(&u, &x, sizeof u);
-    base_put_u32(p, u);
-}
-
-static float get_float(const unsigned char *p)
-{
-    uint32_t u = base_get_u32(p);
-    float x;
-    memcpy(&x, &u, sizeof x);
-    return x;
-}
-
 /* FNV-1a, 64 bit (Fowler, Noll, Vo), with the checksum's own bytes as zero. */
 static uint64_t checksum(const unsigned char *p, size_t size)
 {
@@ -77,7 +60,7 @@ static void encode(unsigned char *p, const struct ggn_entry *e)
 {
     for (size_t i = 0; i < e->count; i++) {
         if (e->type == GGN_F32) {
-            put_float(p + 4 * i, e->write[i]);
+            base_put_u32(p + 4 * i, base_f32_bits(e->write[i]));
         } else {
             uint16_t v = e->type == GGN_F16 ? base_f32_to_f16(e->write[i]) : base_f32_to_bf16(e->write[i]);
             p[2 * i] = (unsigned char)v;
@@ -275,7 +258,7 @@ int ggn_container_get(const struct ggn_container *c, const char *name, int rank,
     const unsigned char *p = (const unsigned char *)c->data + e->offset;
     for (size_t i = 0; i < e->count; i++) {
         uint16_t half = (uint16_t)(p[i * type_size[e->type]] | p[i * type_size[e->type] + 1] << 8);
-        out[i] = e->type == GGN_F32   ? get_float(p + 4 * i)
+        out[i] = e->type == GGN_F32   ? base_f32_of_bits(base_get_u32(p + 4 * i))
                  : e->type == GGN_F16 ? base_f16_to_f32(half)
                                       : base_bf16_to_f32(half);
         if (!isfinite(out[i]))

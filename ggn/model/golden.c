@@ -7,7 +7,6 @@
 #include "model/trainer.h"
 #include "nn/loss.h"
 #include "nn/ssim.h"
-#include "nn/ssim.h"
 #include "nn/real.h"
 
 enum { SIDE = 200, AREA = SIDE * SIDE, IMAGES = 6, PLANES = 3 * IMAGES, W_COUNT = GGN_GOLDEN_WINDOWS };

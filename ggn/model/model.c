@@ -38,7 +38,7 @@ void ggn_model_destroy(struct ggn_model *m)
     free(m);
 }
 
-/* Calls fn for every tensor of a network, running statistics included. */
+/* What is done with each tensor: read from a file, or added to one. */
 struct visit {
     const struct ggn_container *from;
     struct ggn_container *to;

@@ -66,16 +66,24 @@ int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uin
     return GGN_LOOK_NONE;
 }
 
-/* Goes on at the next level. */
-static void schedule(const struct ggn_stop_rule *rule, struct ggn_stopper *s)
-{
-    ask_at(s, to_spp(ceil(ggn_policy_next(&rule->policy, (double)s->asked_spp))));
-}
-
 int ggn_stopper_pass(struct ggn_stopper *s, int passes, int below)
 {
     s->passes = below ? s->passes + 1 : 0;
     return s->passes >= (uint32_t)passes;
+}
+
+/* Judges the newest check by its logit. Whether the block stops. */
+static int stops(const struct ggn_stop_rule *rule, struct ggn_stopper *s, double logit)
+{
+    const struct ggn_policy *p = &rule->policy;
+    struct ggn_verdict *v = &s->verdict;
+
+    v->p = ggn_policy_p(p, logit);
+    if (!ggn_stopper_pass(s, p->passes, v->p < p->threshold))
+        return 0;
+    v->stop = 1;
+    v->predicted_spp = (double)s->asked_spp;
+    return 1;
 }
 
 static const double LEAST_STEP = 1.04; /* between looks, as a share of the samples */
@@ -109,12 +117,8 @@ static void decide_by_law(const struct ggn_stop_rule *rule, struct ggn_stopper *
         return;
     }
     v->noise = exp2(logit - s->correction);
-    v->p = ggn_policy_p(p, logit);
-    if (ggn_stopper_pass(s, p->passes, v->p < p->threshold)) {
-        v->stop = 1;
-        v->predicted_spp = spp;
+    if (stops(rule, s, logit))
         return;
-    }
     double stops_at = (log(p->threshold / (1 - p->threshold)) - p->shift) / p->scale;
     double predicted = spp * fmax(exp2(fmin(2 * (logit - stops_at), 20)), LEAST_STEP); /* noise falls as 1/sqrt(spp) */
     next = predicted < joins ? predicted : fmin(fmax(predicted, joins), next);
@@ -125,26 +129,20 @@ static void decide_by_law(const struct ggn_stop_rule *rule, struct ggn_stopper *
 void ggn_stopper_decide(const struct ggn_stop_rule *rule, struct ggn_stopper *s, const struct ggn_evidence *e)
 {
     const struct ggn_policy *p = &rule->policy;
+    struct ggn_verdict *v = &s->verdict;
+    const double spp = (double)s->asked_spp;
+
     if (rule->reach > 0) {
         decide_by_law(rule, s, e);
         return;
     }
-    struct ggn_verdict *v = &s->verdict;
-    double spp = (double)s->asked_spp;
-
-    if (s->used < (uint32_t)rule->window) {
-        v->too_early = 1;
-        schedule(rule, s);
+    v->too_early = s->used < (uint32_t)rule->window;
+    if (!v->too_early && stops(rule, s, e->logit(e->data)))
         return;
-    }
-    v->p = ggn_policy_p(p, e->logit(e->data));
-    if (ggn_stopper_pass(s, p->passes, v->p < p->threshold)) {
-        v->stop = 1;
-        v->predicted_spp = spp;
-        return;
-    }
-    schedule(rule, s);
-    v->predicted_spp = fmax(ggn_policy_predict(p, v->p, p->threshold, spp), (double)v->next_spp);
+    /* goes on at the next level */
+    ask_at(s, to_spp(ceil(ggn_policy_next(p, spp))));
+    if (!v->too_early)
+        v->predicted_spp = fmax(ggn_policy_predict(p, v->p, p->threshold, spp), (double)v->next_spp);
 }
 
 static int unknown_or_positive(double value) { return isnan(value) || (value >= 0 && isfinite(value)); }
