@@ -35,7 +35,7 @@ struct bench {
     struct options o;
     struct base_threads *threads;
     struct ggn_trainer *trainer;
-    struct ggn_exec *r, *m, *d;          /* inference */
+    struct ggn_exec *all[GGN_NETS];      /* inference, on all threads */
     struct ggn_exec *(*alone)[GGN_NETS]; /* [threads] the same for each thread: criteria decide about blocks side by side */
     float *planes;                       /* random pictures */
     const float *noisy[64 * 3 * GGN_WINDOW_MAX], *reference[64 * 3], *noise_map[64];
@@ -73,24 +73,18 @@ static int sizes(const struct bench *b, struct ggn_hyper *hyper, struct base_err
     return rc;
 }
 
-static void fill_input(const struct bench *b, struct ggn_exec *e, int width)
+/* The three networks, whose input is the first picture. */
+static int create_networks(const struct bench *b, struct ggn_exec *e[GGN_NETS], struct base_threads *threads,
+                           struct base_err *err)
 {
-    for (int c = 0; c < e->graph->value[0].c; c++)
-        ggn_plane_copy(&e->graph->value[0], ggn_exec_plane(e, 0, 0, c), b->noisy[c], width);
-}
-
-static int create_alone(struct bench *b, int width, struct base_err *err)
-{
-    b->alone = calloc((size_t)b->o.threads, sizeof *b->alone);
-    if (!b->alone)
-        return base_fail_nomem(err, "bench");
-    for (int i = 0; i < b->o.threads; i++)
-        for (int net = 0; net < GGN_NETS; net++) {
-            b->alone[i][net] = ggn_exec_create(&b->trainer->graph[net], NULL, 1, 0, NULL, err);
-            if (!b->alone[i][net])
-                return err->code;
-            fill_input(b, b->alone[i][net], width);
-        }
+    for (int net = 0; net < GGN_NETS; net++) {
+        const struct ggn_graph *g = &b->trainer->graph[net];
+        e[net] = ggn_exec_create(g, NULL, 1, 0, threads, err);
+        if (!e[net])
+            return err->code;
+        for (int c = 0; c < g->value[0].c; c++)
+            ggn_plane_copy(&g->value[0], ggn_exec_plane(e[net], 0, 0, c), b->noisy[c], b->trainer->hyper.width);
+    }
     return 0;
 }
 
@@ -108,11 +102,9 @@ static int setup(struct bench *b, struct base_err *err)
     b->trainer = b->threads ? ggn_trainer_create(&hyper, &options, b->threads, err) : NULL;
     if (!b->trainer)
         return BASE_ENOMEM;
-    b->r = ggn_exec_create(&b->trainer->graph[GGN_NET_R], NULL, 1, 0, b->threads, err);
-    b->m = ggn_exec_create(&b->trainer->graph[GGN_NET_M], NULL, 1, 0, b->threads, err);
-    b->d = ggn_exec_create(&b->trainer->graph[GGN_NET_D], NULL, 1, 0, b->threads, err);
     b->planes = malloc((size_t)b->o.batch * (size_t)(planes * area) * sizeof *b->planes);
-    if (!b->r || !b->m || !b->d || !b->planes)
+    b->alone = calloc((size_t)b->o.threads, sizeof *b->alone);
+    if (!b->planes || !b->alone)
         return base_fail_nomem(err, "bench");
     for (int i = 0; i < b->o.batch; i++) {
         for (int c = 0; c < planes; c++) {
@@ -123,20 +115,19 @@ static int setup(struct bench *b, struct base_err *err)
         }
         b->noise_map[i] = b->reference[3 * i];
     }
-    struct ggn_exec *const all[] = {b->r, b->m, b->d};
-    for (int net = 0; net < GGN_NETS; net++)
-        fill_input(b, all[net], hyper.width);
-    return create_alone(b, hyper.width, err);
+    rc = create_networks(b, b->all, b->threads, err);
+    for (int i = 0; i < b->o.threads && !rc; i++)
+        rc = create_networks(b, b->alone[i], NULL, err);
+    return rc;
 }
 
 static void release(struct bench *b)
 {
-    ggn_exec_destroy(b->r);
-    ggn_exec_destroy(b->m);
-    ggn_exec_destroy(b->d);
-    for (int i = 0; b->alone && i < b->o.threads; i++)
-        for (int net = 0; net < GGN_NETS; net++)
+    for (int net = 0; net < GGN_NETS; net++) {
+        ggn_exec_destroy(b->all[net]);
+        for (int i = 0; b->alone && i < b->o.threads; i++)
             ggn_exec_destroy(b->alone[i][net]);
+    }
     free(b->alone);
     ggn_trainer_destroy(b->trainer);
     base_threads_destroy(b->threads);
@@ -146,10 +137,10 @@ static void release(struct bench *b)
 /* On one thread the processor's time, which other jobs on the machine change little. */
 static double now_s(const struct bench *b) { return b->o.threads == 1 ? base_clock_thread_s() : base_clock_wall_s(); }
 
-static double forward_ms(struct bench *b, struct ggn_exec *e, int net)
+static double forward_ms(struct bench *b, int net)
 {
     double start = now_s(b);
-    ggn_exec_forward(e, b->trainer->weights[net], 1, GGN_EVAL);
+    ggn_exec_forward(b->all[net], b->trainer->weights[net], 1, GGN_EVAL);
     return 1e3 * (now_s(b) - start);
 }
 
@@ -245,11 +236,11 @@ static int measure(struct bench *b, double figure[N_FIGURES], struct base_err *e
     }
     for (int i = -1; i < b->o.rounds; i++) { /* round −1 warms up */
         int k = i < 0 ? 0 : i;
-        sample[DENOISER][k] = forward_ms(b, b->r, GGN_NET_R);
-        sample[GENERATOR][k] = forward_ms(b, b->m, GGN_NET_M);
-        sample[DISCRIMINATOR][k] = forward_ms(b, b->d, GGN_NET_D);
-        sample[DECISION][k] = forward_ms(b, b->r, GGN_NET_R) + forward_ms(b, b->m, GGN_NET_M) +
-                              forward_ms(b, b->m, GGN_NET_M) + forward_ms(b, b->d, GGN_NET_D);
+        sample[DENOISER][k] = forward_ms(b, GGN_NET_R);
+        sample[GENERATOR][k] = forward_ms(b, GGN_NET_M);
+        sample[DISCRIMINATOR][k] = forward_ms(b, GGN_NET_D);
+        sample[DECISION][k] =
+            forward_ms(b, GGN_NET_R) + forward_ms(b, GGN_NET_M) + forward_ms(b, GGN_NET_M) + forward_ms(b, GGN_NET_D);
         sample[BLOCKS_TOGETHER][k] = blocks_ms(b, 1);
         sample[BLOCKS_ALONE][k] = blocks_ms(b, 0);
         sample[SGEMM][k] = sgemm_gflops(b, gemm);
@@ -268,8 +259,9 @@ static int measure(struct bench *b, double figure[N_FIGURES], struct base_err *e
 }
 
 /* Of each layer the shortest of the rounds: what other jobs on the machine do only makes it longer. */
-static void time_layers(const struct bench *b, struct ggn_exec *e, int net, double shortest_s[GGN_MAX_LAYERS])
+static void time_layers(const struct bench *b, int net, double shortest_s[GGN_MAX_LAYERS])
 {
+    struct ggn_exec *e = b->all[net];
     double s[GGN_MAX_LAYERS];
 
     for (int k = 0; k < b->o.rounds; k++) {
@@ -282,12 +274,12 @@ static void time_layers(const struct bench *b, struct ggn_exec *e, int net, doub
     }
 }
 
-static void print_layers(const struct bench *b, struct ggn_exec *e, int net)
+static void print_layers(const struct bench *b, int net)
 {
-    const struct ggn_graph *g = e->graph;
+    const struct ggn_graph *g = b->all[net]->graph;
     double s[GGN_MAX_LAYERS], total = 0;
 
-    time_layers(b, e, net, s);
+    time_layers(b, net, s);
     printf("%s: %.3f GFLOP\n%-7s %-11s %14s %9s %9s %9s\n", g->name, 2e-9 * ggn_graph_mac(g), "stage", "layer", "output",
            "GFLOP", "ms", "GFLOP/s");
     for (int i = 0; i < g->n_layers; i++) {
@@ -312,7 +304,8 @@ static void print_figures(const struct bench *b, const double figure[N_FIGURES])
             printf("%-26s %9.3f\n", figure_name[f], figure[f]);
         return;
     }
-    printf("{\"threads\": %d, \"isa\": \"%s\", \"batch\": %d", b->o.threads, base_isa_name(b->r->kernels->isa), b->o.batch);
+    printf("{\"threads\": %d, \"isa\": \"%s\", \"batch\": %d", b->o.threads, base_isa_name(b->all[0]->kernels->isa),
+           b->o.batch);
     for (int f = 0; f < N_FIGURES; f++)
         printf(", \"%s\": %.3f", figure_name[f], figure[f]);
     printf("}\n");
@@ -329,10 +322,9 @@ int ggn_cmd_bench(int argc, char **argv)
     if (!rc)
         rc = setup(&b, &err);
     if (!rc && !b.o.json) {
-        printf("instruction set %s, %d threads\n\n", base_isa_name(b.r->kernels->isa), b.o.threads);
-        print_layers(&b, b.r, GGN_NET_R);
-        print_layers(&b, b.m, GGN_NET_M);
-        print_layers(&b, b.d, GGN_NET_D);
+        printf("instruction set %s, %d threads\n\n", base_isa_name(b.all[0]->kernels->isa), b.o.threads);
+        for (int net = 0; net < GGN_NETS; net++)
+            print_layers(&b, net);
     }
     if (!rc)
         rc = measure(&b, figure, &err);

@@ -1,6 +1,5 @@
-/* `ggn evaluate`, `ggn cost`, `ggn compare`: statistics of what `ggn replay` prints, and of thresholds. */
-#include "cli/judge.h"
-
+/* `ggn evaluate`, `ggn cost`, `ggn compare`: statistics of what `ggn replay` prints, and of thresholds. They are judged in
+ * Python, lull/judge, started as the program that lies in lib/lull/modules beside the programs' bin. */
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +10,8 @@
 
 static const char place[] = "../lib/lull/modules/ggn-judge";
 
-int ggn_cmd_judge(int argc, char **argv)
+/* Goes on as that program, with the command's own arguments. Returns only if it cannot be started. */
+static int judge(int argc, char **argv)
 {
     char ggn[PATH_MAX], program[PATH_MAX + sizeof place];
     struct base_err err = {0};
@@ -34,6 +34,6 @@ int ggn_cmd_judge(int argc, char **argv)
     return ggn_cmd_fail(argv[0], &err);
 }
 
-int ggn_cmd_evaluate(int argc, char **argv) { return ggn_cmd_judge(argc, argv); }
-int ggn_cmd_cost(int argc, char **argv) { return ggn_cmd_judge(argc, argv); }
-int ggn_cmd_compare(int argc, char **argv) { return ggn_cmd_judge(argc, argv); }
+int ggn_cmd_evaluate(int argc, char **argv) { return judge(argc, argv); }
+int ggn_cmd_cost(int argc, char **argv) { return judge(argc, argv); }
+int ggn_cmd_compare(int argc, char **argv) { return judge(argc, argv); }
