@@ -31,12 +31,7 @@ GGN_OPS(GGN_LAYER_DECLARE)
 /* Runs fn(task, i, worker) for i < n. */
 static inline void ggn_task_run(const struct ggn_task *t, long n, void (*fn)(void *task, long i, int worker))
 {
-    if (t->e->threads) {
-        base_threads_for(t->e->threads, n, fn, (void *)(size_t)t);
-        return;
-    }
-    for (long i = 0; i < n; i++)
-        fn((void *)(size_t)t, i, 0);
+    base_threads_for(t->e->threads, n, fn, (void *)(size_t)t);
 }
 
 /* Element (0,0) of plane c of a value of image n, among the activations or their gradients. */

@@ -7,10 +7,11 @@
 #include "nn/kernels.h"
 #include "nn/real.h"
 
-enum { N_TAPS = 2 * GGN_SSIM_RADIUS + 1, N_MAPS = 9, BORDER = 16 };
+enum { N_TAPS = 2 * GGN_SSIM_RADIUS + 1, BORDER = 16 };
 
 static const double C1 = 1e-4, C2 = 9e-4, SIGMA = 1.5;
 
+enum { X, Y, XX, YY, XY, TMP, N_MAPS };
 enum { BATCH = 64 }; /* planes whose sums are kept at a time */
 
 struct ggn_ssim {
@@ -80,8 +81,6 @@ void ggn_ssim_destroy(struct ggn_ssim *s)
         free(s->maps);
     free(s);
 }
-
-enum { X, Y, XX, YY, XY, TMP, MAP_A, MAP_B, MAP_C };
 
 /* Element (0,0) of map m of a worker. */
 static real *map_of(const struct ggn_ssim *s, int worker, int m)
@@ -194,11 +193,7 @@ double ggn_ssim_mean(struct ggn_ssim *s, const real *const *x, const real *const
         s->x = x + first;
         s->y = y + first;
         s->dx = dx ? dx + first : NULL;
-        if (s->threads)
-            base_threads_for(s->threads, count, ssim_plane, s);
-        else
-            for (int i = 0; i < count; i++)
-                ssim_plane(s, i, 0);
+        base_threads_for(s->threads, count, ssim_plane, s);
         for (int i = 0; i < count; i++)
             total += s->plane_sum[i];
     }

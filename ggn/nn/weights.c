@@ -125,9 +125,7 @@ static void pack_forms(struct ggn_weights *w, const struct ggn_layer *l)
     const struct ggn_value *v = &w->graph->value[l->out];
     const int c_in = ggn_layer_c_in(w->graph, l);
 
-    if (l->kernel != 3)
-        return;
-    if (!w->wino || !ggn_wino_suits(c_in, v->c, v->h, v->w, k->lanes))
+    if (l->kernel != 3 || !w->wino || !ggn_wino_suits(c_in, v->c, v->h, v->w, k->lanes))
         return;
     k->wino_pack(w->wino + 4 * l->pack, w->pack + l->pack, c_in, v->c, k->tile_oc);
     if (w->wino_back)
@@ -157,11 +155,7 @@ static void pack_layer(void *data, long i, int worker)
 
 void ggn_weights_pack(struct ggn_weights *w, struct base_threads *threads)
 {
-    if (threads)
-        base_threads_for(threads, w->graph->n_layers, pack_layer, w);
-    else
-        for (int i = 0; i < w->graph->n_layers; i++)
-            pack_layer(w, i, 0);
+    base_threads_for(threads, w->graph->n_layers, pack_layer, w);
 }
 
 void ggn_weights_copy(struct ggn_weights *w, const real *learned)

@@ -177,7 +177,7 @@ static void finish(struct base_threads *t)
 
 void base_threads_for(struct base_threads *t, long n, void (*fn)(void *, long, int), void *data)
 {
-    if (n <= 1 || t->started == 0) {
+    if (n <= 1 || !t || t->started == 0) {
         for (long i = 0; i < n; i++)
             fn(data, i, 0);
         return;
@@ -209,10 +209,6 @@ void base_threads_tasks(struct base_threads *threads, uint64_t count, void (*fn)
     struct tasks t = {.fn = fn, .arg = arg};
     for (uint64_t n; t.first < count; t.first += n) {
         n = count - t.first < LONG_MAX / 2 ? count - t.first : LONG_MAX / 2;
-        if (threads)
-            base_threads_for(threads, (long)n, run_task, &t);
-        else
-            for (uint64_t i = 0; i < n; i++)
-                run_task(&t, (long)i, 0);
+        base_threads_for(threads, (long)n, run_task, &t);
     }
 }

@@ -21,12 +21,12 @@ struct base_threads *base_threads_create(int count, struct base_err *err);
 void base_threads_destroy(struct base_threads *threads);
 int base_threads_count(const struct base_threads *threads);
 
-/* Calls fn(data, i, worker) once for each i in [0, n), worker in [0, count); returns when all are done. Calls that follow
- * within microseconds cost a fraction of one: workers look for the next before they sleep, unless they outnumber the
- * processors. */
+/* Calls fn(data, i, worker) once for each i in [0, n), worker in [0, count); returns when all are done. threads NULL: all of
+ * it here, as worker 0. Calls that follow within microseconds cost a fraction of one: workers look for the next before they
+ * sleep, unless they outnumber the processors. */
 void base_threads_for(struct base_threads *threads, long n, void (*fn)(void *data, long i, int worker), void *data);
 
-/* The same for any number of tasks, in the form that criteria know; threads NULL: here, as worker 0. */
+/* The same for any number of tasks, in the form that criteria know. */
 void base_threads_tasks(struct base_threads *threads, uint64_t count, void (*fn)(void *arg, uint64_t task, uint32_t worker),
                         void *arg);
 
