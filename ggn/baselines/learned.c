@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "baselines/lstm.h"
+#include "data/each.h"
 #include "data/replay.h"
 #include "train/fit_policy.h"
 
@@ -23,7 +24,7 @@ struct extraction {
     const struct ggn_feature_set *features;
 };
 
-static int extract_block(void *data, int index, int worker, struct base_err *err)
+static int extract_block(void *data, long index, int worker, struct base_err *err)
 {
     const struct extraction *j = data;
     const struct ggn_level_series *c = &j->set->images.series[j->set->blocks[index].series];
@@ -53,7 +54,8 @@ int ggn_feature_set_make(struct ggn_feature_set *t, const struct ggn_baseline *b
     if (t->first)
         t->first[s->n_blocks] = rows;
     t->x = malloc(rows * t->size * sizeof *t->x);
-    int rc = !t->first || !t->x ? base_fail_nomem(err, "baseline") : ggn_eval_each_block(s, threads, extract_block, &j, err);
+    int rc = !t->first || !t->x ? base_fail_nomem(err, "baseline")
+                                : ggn_each(threads, s->n_blocks, extract_block, &j, "evaluation", err);
     if (rc)
         ggn_feature_set_release(t);
     return rc;
@@ -203,7 +205,7 @@ static double window_logit(void *data, const int *levels)
     return ggn_baseline_logit(o->reader, features, o->j->set->images.width, o->j->set->images.height);
 }
 
-static int judge_block(void *data, int index, int worker, struct base_err *err)
+static int judge_block(void *data, long index, int worker, struct base_err *err)
 {
     const struct replaying *j = data;
     const struct ggn_eval_block *b = &j->set->blocks[index];
@@ -232,7 +234,7 @@ int ggn_method_baseline(struct ggn_method *m, const struct ggn_eval_set *s, cons
         return rc;
     m->cut = b->policy.threshold;
     m->passes = b->policy.passes;
-    rc = ggn_eval_each_block(s, threads, judge_block, &j, err);
+    rc = ggn_each(threads, s->n_blocks, judge_block, &j, "evaluation", err);
     if (rc)
         ggn_method_release(m);
     return rc;

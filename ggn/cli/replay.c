@@ -296,7 +296,7 @@ static int replay_model(const struct replay *r, int index, cJSON *to, int *faile
         return rc;
     adjust(r->o, &policy);
     warn_of_setting(r, index, &policy);
-    rc = ggn_eval_trained(&m, &r->set, r->model[index], &policy, name, (enum ggn_precision)r->o->precision, r->o->observer,
+    rc = ggn_eval_trained(&m, &r->set, r->model[index], &policy, name, (enum ggn_precision)r->o->precision, r->observers,
                           r->threads, err);
     if (rc)
         return rc;

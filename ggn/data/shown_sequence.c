@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "base/threads.h"
+#include "data/each.h"
 #include "data/shown_files.h"
 #include "data/shown_source.h"
 #include "data/stimuli.h"
@@ -16,8 +16,6 @@ struct work {
     const uint32_t *chosen; /* [n_blocks]; indices in the manifest */
     int view;
     struct ggn_shown_block *blocks; /* [n_blocks] */
-    int *rc;
-    struct base_err *errs;
 };
 
 static int make_levels(const struct work *w, struct ggn_shown_block *b, struct ggn_stimuli *s, uint8_t *rgb,
@@ -41,28 +39,24 @@ static int make_levels(const struct work *w, struct ggn_shown_block *b, struct g
     return !rc ? ggn_shown_enough_levels(w->folder, b, err) : rc;
 }
 
-static void work_block(void *data, long i, int worker)
+static int work_block(void *data, long i, int worker, struct base_err *err)
 {
-    struct work *w = data;
-    const struct seq_manifest_block *m = &w->manifest->blocks[w->chosen[i]];
-    struct ggn_shown_block *b = &w->blocks[i];
+    const struct work *w = data;
     struct seq_block block;
     struct ggn_stimuli stimuli;
-    struct base_err *err = &w->errs[i];
     (void)worker;
-    *b = (struct ggn_shown_block){.id = m->id, .x0 = m->x0, .y0 = m->y0, .x1 = m->x1, .y1 = m->y1};
-    w->rc[i] = seq_manifest_read_block(w->folder, w->manifest, w->chosen[i], &block, err);
-    if (w->rc[i] != 0)
-        return;
+    int rc = seq_manifest_read_block(w->folder, w->manifest, w->chosen[i], &block, err);
+    if (rc)
+        return rc;
     uint8_t *rgb = malloc(3 * (size_t)block.width * block.height);
-    w->rc[i] =
-        rgb ? ggn_stimuli_init(&stimuli, &block, w->manifest->reference_independent, err) : base_fail_nomem(err, w->folder);
-    if (w->rc[i] == 0) {
-        w->rc[i] = make_levels(w, b, &stimuli, rgb, err);
+    rc = rgb ? ggn_stimuli_init(&stimuli, &block, w->manifest->reference_independent, err) : base_fail_nomem(err, w->folder);
+    if (!rc) {
+        rc = make_levels(w, &w->blocks[i], &stimuli, rgb, err);
         ggn_stimuli_release(&stimuli);
     }
     free(rgb);
     seq_block_release(&block);
+    return rc;
 }
 
 static int by_id(const void *a, const void *b)
@@ -87,31 +81,24 @@ int ggn_shown_sequence(const struct ggn_shown_request *q, const struct ggn_shown
     view->width = m.width;
     view->height = m.height;
     view->blocks = calloc(m.n_blocks, sizeof *view->blocks);
-    struct work w = {.request = q,
-                     .folder = source->folder,
-                     .manifest = &m,
-                     .chosen = chosen,
-                     .view = index,
-                     .blocks = view->blocks,
-                     .rc = calloc(m.n_blocks, sizeof *w.rc),
-                     .errs = calloc(m.n_blocks, sizeof *w.errs)};
-    /* Blocks are read on all threads, so each has its own error; the first by number counts. */
-    if (!view->blocks || !chosen || !w.rc || !w.errs) {
+    struct work w = {q, source->folder, &m, chosen, index, view->blocks};
+    if (!view->blocks || !chosen)
         rc = base_fail_nomem(err, w.folder);
-    } else {
-        for (uint32_t i = 0; i < m.n_blocks; i++)
-            if (ggn_shown_source_has(source, m.blocks[i].id))
-                chosen[view->n_blocks++] = i;
-        base_threads_for(threads, view->n_blocks, work_block, &w);
-        rc = ggn_shown_source_check(source, view, err);
-        qsort(view->blocks, (size_t)view->n_blocks, sizeof *view->blocks, by_id);
+    for (uint32_t i = 0; i < m.n_blocks && !rc; i++) {
+        const struct seq_manifest_block *b = &m.blocks[i];
+        if (!ggn_shown_source_has(source, b->id))
+            continue;
+        chosen[view->n_blocks] = i;
+        view->blocks[view->n_blocks++] =
+            (struct ggn_shown_block){.id = b->id, .x0 = b->x0, .y0 = b->y0, .x1 = b->x1, .y1 = b->y1};
     }
-    for (int i = 0; i < view->n_blocks && !rc; i++)
-        if (w.rc[i] != 0)
-            rc = base_fail(err, w.rc[i], "%.400s", w.errs[i].text);
+    if (!rc)
+        rc = ggn_shown_source_check(source, view, err);
+    if (!rc)
+        rc = ggn_each(threads, view->n_blocks, work_block, &w, w.folder, err);
+    if (!rc)
+        qsort(view->blocks, (size_t)view->n_blocks, sizeof *view->blocks, by_id);
     free(chosen);
-    free(w.rc);
-    free(w.errs);
     seq_manifest_release(&m);
     return rc;
 }

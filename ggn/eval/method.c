@@ -102,19 +102,24 @@ int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn
     return 0;
 }
 
+/* Whether the split has a block of the scene whose first view this is. */
+static int has_scene(const struct ggn_eval_set *s, enum ggn_split split, int first)
+{
+    for (int b = 0; b < s->n_blocks; b++)
+        if (s->blocks[b].split == split && s->blocks[b].scene == first)
+            return 1;
+    return 0;
+}
+
 int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split,
                        struct ggn_method_figures *out, struct base_err *err)
 {
     double *score = malloc((s->n > 0 ? s->n : 1) * sizeof *score);
     unsigned char *label = malloc(s->n > 0 ? s->n : 1);
-    int rc = !score || !label ? base_fail_nomem(err, m->name) : 0, last = -1;
+    int rc = !score || !label ? base_fail_nomem(err, m->name) : 0;
     *out = (struct ggn_method_figures){.blocks = ggn_eval_count(s, split)};
-    for (int scene = 0; scene < s->n_scenes; scene++)
-        for (int b = 0; b < s->n_blocks; b++)
-            if (s->blocks[b].split == split && s->blocks[b].scene == scene && last != scene) {
-                last = scene;
-                out->scenes++;
-            }
+    for (int v = 0; v < s->images.data.n; v++)
+        out->scenes += has_scene(s, split, v);
     if (!rc) {
         out->windows = scores_of(m, s, split, score, label);
         rc = ggn_stats_auc(score, label, out->windows, &out->auc, err);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "data/each.h"
 #include "nn/ssim.h"
 #include "observer/curve.h"
 #include "observer/flip.h"
@@ -23,7 +24,6 @@ void ggn_eval_set_release(struct ggn_eval_set *s)
 static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *err)
 {
     const struct ggn_dataset *d = &s->images.data;
-    s->n_scenes = d->n;
     s->blocks = malloc((size_t)(s->images.n > 0 ? s->images.n : 1) * sizeof *s->blocks);
     if (!s->blocks)
         return base_fail_nomem(err, "evaluation");
@@ -86,35 +86,6 @@ static int make_columns(struct ggn_eval_set *s, struct base_err *err)
         }
     }
     return 0;
-}
-
-/* --- blocks in parallel --- */
-
-struct each {
-    int (*fn)(void *, int, int, struct base_err *);
-    void *data;
-    struct base_err *errs; /* [blocks] */
-};
-
-static void do_block(void *data, long b, int worker)
-{
-    struct each *e = data;
-    e->errs[b].code = e->fn(e->data, (int)b, worker, &e->errs[b]);
-}
-
-int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *threads,
-                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data, struct base_err *err)
-{
-    struct each e = {fn, data, calloc((size_t)set->n_blocks, sizeof(struct base_err))};
-    int rc = 0;
-    if (!e.errs)
-        return base_fail_nomem(err, "evaluation");
-    base_threads_for(threads, set->n_blocks, do_block, &e);
-    for (int b = 0; b < set->n_blocks && !rc; b++)
-        if (e.errs[b].code != 0)
-            rc = base_fail(err, e.errs[b].code, "%s", e.errs[b].text);
-    free(e.errs);
-    return rc;
 }
 
 int ggn_eval_count(const struct ggn_eval_set *s, enum ggn_split split)
@@ -368,7 +339,7 @@ static int fill_statistics(struct ggn_eval_set *s, const struct ggn_eval_block *
     return rc;
 }
 
-static int fill_block(void *data, int index, int worker, struct base_err *err)
+static int fill_block(void *data, long index, int worker, struct base_err *err)
 {
     struct fill *f = data;
     const struct ggn_eval_block *block = &f->set->blocks[index];
@@ -422,7 +393,7 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
     if (!rc)
         rc = make_columns(&s, err);
     if (!rc)
-        rc = ggn_eval_each_block(&s, threads, fill_block, &f, err);
+        rc = ggn_each(threads, s.n_blocks, fill_block, &f, "evaluation", err);
     s.law = o->without_halves ? s.visible_means : s.visible;
     if (rc)
         ggn_eval_set_release(&s);

@@ -11,7 +11,7 @@
 struct ggn_eval_block {
     int series;     /* index into images.series */
     int view;       /* index into images.data.views */
-    int scene;      /* index that equal scene names share */
+    int scene;      /* the first view of its scene */
     uint32_t index; /* in the view's manifest */
     enum ggn_split split;
     struct ggn_label label; /* thresholds beyond the last level are censored there */
@@ -22,7 +22,7 @@ struct ggn_eval_block {
 struct ggn_eval_set {
     struct ggn_series_set images; /* owns: the images, continued beyond the recording where possible */
     int window;                   /* S: the first S-1 levels of a block make no case */
-    int n_blocks, n_scenes;
+    int n_blocks;
     struct ggn_eval_block *blocks; /* owns; ordered by view, then as the manifest lists them */
     size_t n;                      /* cases */
     double *spp, *seconds;         /* own; [n]; seconds: thread time spent on the block so far, NaN if unknown */
@@ -57,10 +57,6 @@ int ggn_eval_set_load(struct ggn_eval_set *set, const struct ggn_eval_options *o
                       int *skipped, struct base_err *err);
 void ggn_eval_set_release(struct ggn_eval_set *set);
 
-/* Calls fn for each block, in parallel; returns the first error (in order of blocks). */
-int ggn_eval_each_block(const struct ggn_eval_set *set, struct base_threads *threads,
-                        int (*fn)(void *data, int block, int worker, struct base_err *err), void *data,
-                        struct base_err *err);
 int ggn_eval_count(const struct ggn_eval_set *s, enum ggn_split split);
 
 #endif

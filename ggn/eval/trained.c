@@ -3,28 +3,20 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "data/each.h"
 #include "data/replay.h"
 #include "eval/viewer.h"
-#include "observer/observer.h"
 
 struct run {
     const struct ggn_eval_set *set;
     struct ggn_stop_rule rule;
     struct ggn_method *method;
-    struct ggn_viewer *viewers; /* [workers] */
-    const char *observer;
+    struct ggn_viewer *viewers;           /* [workers] */
+    const struct ggn_observer *observers; /* [views] */
 };
 
-/* The observer that judges a view: from the file at `path`, without the view where it was fitted; NULL: built in. */
-static int observer_of(const char *path, const struct ggn_eval_set *s, const struct ggn_eval_block *block,
-                       struct ggn_observer *o, struct base_err *err)
-{
-    *o = ggn_observer_default;
-    return path ? ggn_observer_read(path, s->images.data.views[block->view].name, o, err) : 0;
-}
-
 /* log2 of the law's error: at cases as the set says, at the levels before them as they were measured. [n_levels] */
-static void list_law(const struct run *r, const struct ggn_eval_block *b, const struct ggn_observer *o, double *law)
+static void list_law(const struct run *r, const struct ggn_eval_block *b, double *law)
 {
     const struct ggn_level_series *c = &r->set->images.series[b->series];
     const size_t pixels = (size_t)r->set->images.width * (size_t)r->set->images.height;
@@ -32,36 +24,34 @@ static void list_law(const struct run *r, const struct ggn_eval_block *b, const 
 
     for (int i = 0; i < c->n_levels; i++) {
         double seen = i < skipped ? c->measure[i].visible : r->set->law[b->first + (size_t)(i - skipped)];
-        law[i] = ggn_measure_octaves(ggn_observer_error(o, seen, pixels));
+        law[i] = ggn_measure_octaves(ggn_observer_error(&r->observers[b->view], seen, pixels));
     }
 }
 
 /* A block of a residual model. seen: [n_levels] */
-static int judge_by_law(const struct run *r, int index, struct ggn_viewer *viewer, struct ggn_seen *seen,
+static int judge_by_law(const struct run *r, long index, struct ggn_viewer *viewer, struct ggn_seen *seen,
                         struct base_err *err)
 {
     const struct ggn_eval_block *b = &r->set->blocks[index];
     const struct ggn_level_series *c = &r->set->images.series[b->series];
     const int skipped = r->set->window - 1;
-    struct ggn_observer o;
     double *law = malloc((size_t)c->n_levels * sizeof *law);
-    int rc = law ? observer_of(r->observer, r->set, b, &o, err) : base_fail_nomem(err, r->method->name);
 
-    if (!rc) {
-        list_law(r, b, &o, law);
-        viewer->law = law;
-        ggn_replay(c, &r->rule, ggn_viewer_logit, viewer, law, seen);
-        for (int i = skipped; i < c->n_levels; i++) {
-            size_t k = b->first + (size_t)(i - skipped);
-            r->method->score[k] = seen[i].p;
-            r->method->correction[k] = i > skipped && isnan(seen[i].p) ? r->method->correction[k - 1] : seen[i].correction;
-        }
+    if (!law)
+        return base_fail_nomem(err, r->method->name);
+    list_law(r, b, law);
+    viewer->law = law;
+    ggn_replay(c, &r->rule, ggn_viewer_logit, viewer, law, seen);
+    for (int i = skipped; i < c->n_levels; i++) {
+        size_t k = b->first + (size_t)(i - skipped);
+        r->method->score[k] = seen[i].p;
+        r->method->correction[k] = i > skipped && isnan(seen[i].p) ? r->method->correction[k - 1] : seen[i].correction;
     }
     free(law);
-    return rc;
+    return 0;
 }
 
-static int judge_block(void *data, int index, int worker, struct base_err *err)
+static int judge_block(void *data, long index, int worker, struct base_err *err)
 {
     const struct run *r = data;
     const struct ggn_eval_block *b = &r->set->blocks[index];
@@ -95,14 +85,14 @@ static int check_halves(const struct ggn_eval_set *s, const char *name, struct b
 }
 
 int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model,
-                     const struct ggn_policy *policy, const char *name, enum ggn_precision precision, const char *observer,
-                     struct base_threads *threads, struct base_err *err)
+                     const struct ggn_policy *policy, const char *name, enum ggn_precision precision,
+                     const struct ggn_observer *observers, struct base_threads *threads, struct base_err *err)
 {
     int workers = base_threads_count(threads), made = 0, window = model->hyper.window;
     struct run r = {.set = s,
                     .method = m,
                     .rule = {.policy = *policy, .window = window, .reach = model->hyper.reach},
-                    .observer = observer};
+                    .observers = observers};
 
     if (window < 2 || window > GGN_WINDOW_MAX)
         return base_fail(err, BASE_EINVAL, "%s: windows of %d images; evaluation takes 2 to %d", name, window,
@@ -120,7 +110,7 @@ int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const s
     if (!rc && r.rule.reach > 0)
         rc = check_halves(s, name, err);
     if (!rc)
-        rc = ggn_eval_each_block(s, threads, judge_block, &r, err);
+        rc = ggn_each(threads, s->n_blocks, judge_block, &r, "evaluation", err);
     for (int i = 0; i < made; i++)
         ggn_viewer_release(&r.viewers[i]);
     free(r.viewers);

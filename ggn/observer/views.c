@@ -5,44 +5,40 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "data/each.h"
 #include "figures/stats.h"
 
 struct work {
     const struct ggn_dataset_view *view;
     enum ggn_curve_source source;
     struct ggn_curve *curves;
-    struct base_err *errs; /* [n_blocks] */
 };
 
-static void make_curve(void *data, long i, int worker)
+static int make_curve(void *data, long i, int worker, struct base_err *err)
 {
     const struct work *w = data;
     const struct seq_manifest *m = &w->view->manifest;
     struct seq_block b;
+    struct base_err why = {0};
     (void)worker;
-    if (seq_manifest_read_block(w->view->dir, m, (uint32_t)i, &b, &w->errs[i]))
-        return;
-    ggn_curve_make(&b, w->source, m->reference_independent, &w->curves[i], &w->errs[i]);
-    seq_block_release(&b);
+    int rc = seq_manifest_read_block(w->view->dir, m, (uint32_t)i, &b, &why);
+    if (!rc) {
+        rc = ggn_curve_make(&b, w->source, m->reference_independent, &w->curves[i], &why);
+        seq_block_release(&b);
+    }
+    return rc ? base_fail(err, rc, "%s: %s", w->view->name, why.text) : 0;
 }
 
 int ggn_view_curves(const struct ggn_dataset_view *view, enum ggn_curve_source source, struct base_threads *threads,
                     struct ggn_curve *curves, struct base_err *err)
 {
     uint32_t n = view->manifest.n_blocks;
-    int rc = 0;
-    struct work w = {view, source, curves, calloc(n, sizeof(struct base_err))};
-    if (!w.errs)
-        return base_fail_nomem(err, view->dir);
+    struct work w = {view, source, curves};
     for (uint32_t i = 0; i < n; i++)
         curves[i] = (struct ggn_curve){0};
-    base_threads_for(threads, n, make_curve, &w);
-    for (uint32_t i = 0; i < n && !rc; i++)
-        if (w.errs[i].code)
-            rc = base_fail(err, w.errs[i].code, "%s: %s", view->name, w.errs[i].text);
+    int rc = ggn_each(threads, n, make_curve, &w, view->dir, err);
     for (uint32_t i = 0; i < n && rc; i++)
         ggn_curve_release(&curves[i]);
-    free(w.errs);
     return rc;
 }
 
