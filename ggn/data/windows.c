@@ -146,32 +146,31 @@ static void gain_table(float gain, float table[256])
         table[i] = gain == 1 ? (float)i / 255 : (float)base_srgb_oetf(fmin((double)gain * base_srgb_linear[i], 1));
 }
 
-/* Where the pixel of row y of the result comes from: src[start + x · step]. */
+/* Where the pixel of row y of the result comes from: src[start + x · step], in rows that lie `row` apart. */
 struct row_map {
     ptrdiff_t start, step;
 };
 
-static struct row_map map_row(const struct ggn_augment *a, int width, int height, int y)
+static struct row_map map_row(const struct ggn_augment *a, int width, int height, int row, int y)
 {
     struct row_map m;
 
     if (a->transpose) {
         int column = a->flip_x ? width - 1 - y : y;
-        m.step = a->flip_y ? -width : width;
-        m.start = column + (a->flip_y ? (ptrdiff_t)(height - 1) * width : 0);
+        m.step = a->flip_y ? -row : row;
+        m.start = column + (a->flip_y ? (ptrdiff_t)(height - 1) * row : 0);
     } else {
-        int row = a->flip_y ? height - 1 - y : y;
         m.step = a->flip_x ? -1 : 1;
-        m.start = (ptrdiff_t)row * width + (a->flip_x ? width - 1 : 0);
+        m.start = (ptrdiff_t)(a->flip_y ? height - 1 - y : y) * row + (a->flip_x ? width - 1 : 0);
     }
     return m;
 }
 
-static void plane_u8(const uint8_t *src, int width, int height, const struct ggn_augment *a, const float table[256],
+static void plane_u8(const uint8_t *src, int width, int height, int row, const struct ggn_augment *a, const float table[256],
                      float *out)
 {
     for (int y = 0; y < height; y++) {
-        struct row_map m = map_row(a, width, height, y);
+        struct row_map m = map_row(a, width, height, row, y);
         for (int x = 0; x < width; x++)
             out[(ptrdiff_t)y * width + x] = table[src[m.start + x * m.step]];
     }
@@ -182,7 +181,7 @@ static void plane_u16(const uint16_t *src, int width, int height, const struct g
                       float *out)
 {
     for (int y = 0; y < height; y++) {
-        struct row_map m = map_row(a, width, height, y);
+        struct row_map m = map_row(a, width, height, width, y);
         for (int x = 0; x < width; x++) {
             float v = (float)src[m.start + x * m.step] * (1 / 257.0F);
             int code = v < 254 ? (int)v : 254;
@@ -206,7 +205,7 @@ void ggn_window_planes(const struct ggn_level_series *series, int last, int leng
             if (denoised)
                 plane_u16(series->denoised + at, width, height, augment, table[c], out);
             else
-                plane_u8(series->noisy + at, width, height, augment, table[c], out);
+                plane_u8(series->noisy + at, width, height, width, augment, table[c], out);
         }
     const float *newest = planes + 3 * (size_t)(length - 1) * pixels;
     for (int k = 0; k < length - 1 && difference > 0; k++) {
@@ -227,35 +226,21 @@ int ggn_noise_map_plane(const struct ggn_level_series *series, int last, int wid
 
     for (int i = 0; i < 256; i++)
         table[i] = (float)(pow(gain, 1 / 2.4) * i) * GGN_NOISE_MAP_GAIN;
-    plane_u8(noise_map, width, height, a, table, plane);
+    plane_u8(noise_map, width, height, width, a, table, plane);
     return 1;
-}
-
-void ggn_window_scalars(const struct ggn_level_series *series, int last, int length, double error,
-                        float scalars[GGN_SCALARS])
-{
-    const int first = last - length + 1;
-
-    ggn_measure_scalars(series->measure + first, series->spp + first, length, error, scalars);
 }
 
 void ggn_crop_planes(const struct ggn_level_series *series, int level, int width, int height, int x0, int y0, int crop_w,
                      int crop_h, const struct ggn_augment *augment, float *noisy, float *reference)
 {
-    const size_t pixels = (size_t)width * (size_t)height;
+    const size_t pixels = (size_t)width * (size_t)height, corner = (size_t)y0 * (size_t)width + (size_t)x0;
+    const size_t crop = (size_t)crop_w * (size_t)crop_h;
     float table[256];
 
     for (size_t c = 0; c < 3; c++) {
         const uint8_t *x = series->noisy + (3 * (size_t)level + c) * pixels, *y = series->reference + c * pixels;
         gain_table(augment->gain[c], table);
-        for (int r = 0; r < crop_h; r++)
-            for (int s = 0; s < crop_w; s++) {
-                int u = augment->transpose ? r : s, v = augment->transpose ? s : r;
-                size_t at = (size_t)(y0 + (augment->flip_y ? crop_h - 1 - v : v)) * (size_t)width +
-                            (size_t)(x0 + (augment->flip_x ? crop_w - 1 - u : u));
-                size_t to = (c * (size_t)crop_h + (size_t)r) * (size_t)crop_w + (size_t)s;
-                noisy[to] = table[x[at]];
-                reference[to] = table[y[at]];
-            }
+        plane_u8(x + corner, crop_w, crop_h, width, augment, table, noisy + c * crop);
+        plane_u8(y + corner, crop_w, crop_h, width, augment, table, reference + c * crop);
     }
 }

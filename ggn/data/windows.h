@@ -67,10 +67,6 @@ void ggn_window_planes(const struct ggn_level_series *series, int last, int leng
 int ggn_noise_map_plane(const struct ggn_level_series *series, int last, int width, int height,
                         const struct ggn_augment *augment, float *plane);
 
-/* The scalars for a residual network of the window that ends at `last`, whose error is so many octaves; with measures. */
-void ggn_window_scalars(const struct ggn_level_series *series, int last, int length, double error,
-                        float scalars[GGN_SCALARS]);
-
 /* A crop for the denoiser: image `level` of the series and its reference, [3][size][size] each. */
 void ggn_crop_planes(const struct ggn_level_series *series, int level, int width, int height, int x0, int y0, int crop_w,
                      int crop_h, const struct ggn_augment *augment, float *noisy, float *reference);

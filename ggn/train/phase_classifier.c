@@ -61,8 +61,9 @@ static void fill_window(void *data, long i, int worker)
     s->planes[6 * (size_t)s->hyper.window * (size_t)s->plan->batch + (size_t)i] =
         ggn_noise_map_plane(c, w->last, s->set.width, s->set.height, &augment, noise_map) ? noise_map : NULL;
     if (s->hyper.scalars) {
+        const int first = w->last - s->hyper.window + 1;
         float *scalars = noise_map + ggn_series_set_values(&s->set) - GGN_SCALARS;
-        ggn_window_scalars(c, w->last, s->hyper.window, ggn_session_law(s, c, w->last), scalars);
+        ggn_measure_scalars(c->measure + first, c->spp + first, s->hyper.window, ggn_session_law(s, c, w->last), scalars);
         s->planes[(6 * (size_t)s->hyper.window + 1) * (size_t)s->plan->batch + (size_t)i] = scalars;
     }
     (void)worker;
