@@ -6,19 +6,21 @@
 
 #include "picture/png.h"
 
-int ggn_shown_path(char *path, const char *dir, int view, const char *name, struct base_err *err)
+int ggn_shown_write(const char *dir, int view, const char *name, int width, int height, const uint8_t *rgb,
+                    struct base_err *err)
 {
-    int n = snprintf(path, 4096, "%s/v%d/%s.png", dir, view, name);
-    return n > 0 && n < 4096 ? 0 : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
+    char path[4096];
+    int n = snprintf(path, sizeof path, "%s/v%d/%s.png", dir, view, name);
+    return n > 0 && n < (int)sizeof path ? pic_write_png(path, width, height, 3, rgb, err)
+                                         : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
 }
 
 int ggn_shown_write_block(const char *dir, int view, const struct ggn_shown_block *b, const char *what, int frames,
                           const uint8_t *rgb, struct base_err *err)
 {
-    char name[64], path[4096];
+    char name[64];
     snprintf(name, sizeof name, "b%u-%s", b->id, what);
-    int rc = ggn_shown_path(path, dir, view, name, err);
-    return !rc ? pic_write_png(path, (int)(b->x1 - b->x0), frames * (int)(b->y1 - b->y0), 3, rgb, err) : rc;
+    return ggn_shown_write(dir, view, name, (int)(b->x1 - b->x0), frames * (int)(b->y1 - b->y0), rgb, err);
 }
 
 int ggn_shown_takes_level(const struct ggn_shown_request *q, const struct ggn_shown_block *b, double spp)

@@ -10,8 +10,8 @@
 #include "base/err.h"
 #include "data/shown_view.h"
 
-/* path has room for 4096 bytes. */
-int ggn_shown_path(char *path, const char *dir, int view, const char *name, struct base_err *err);
+int ggn_shown_write(const char *dir, int view, const char *name, int width, int height, const uint8_t *rgb,
+                    struct base_err *err);
 /* rgb: the block's pixels, 3 codes each, those of a clip's frames below each other. */
 int ggn_shown_write_block(const char *dir, int view, const struct ggn_shown_block *b, const char *what, int frames,
                           const uint8_t *rgb, struct base_err *err);

@@ -7,7 +7,6 @@
 #include <sys/stat.h>
 
 #include "base/files.h"
-#include "picture/png.h"
 #include "picture/read.h"
 #include "data/shown_files.h"
 #include "data/shown_source.h"
@@ -289,17 +288,13 @@ static int know_condition(struct ggn_shown *s, int index, const char *name, cons
 static int prepare_conditions(const struct ggn_shown_request *q, const char *folder, int index, const struct picture *list,
                               int n, const struct pic_image *reference, struct ggn_shown *s, struct base_err *err)
 {
-    char path[4096];
+    const int width = reference->width, height = reference->height;
     uint8_t *noisy = NULL;
-    int found = 0, rc = ggn_shown_path(path, q->dir, index, "reference", err);
+    int found = 0, rc = ggn_shown_write(q->dir, index, "reference", width, height, reference->u8, err);
     if (!rc)
-        rc = pic_write_png(path, reference->width, reference->height, 3, reference->u8, err);
+        rc = ggn_shown_make_heavy(reference->u8, 3 * (size_t)width * (size_t)height, &noisy, err);
     if (!rc)
-        rc = ggn_shown_path(path, q->dir, index, "heavy", err);
-    if (!rc)
-        rc = ggn_shown_make_heavy(reference->u8, 3 * (size_t)reference->width * (size_t)reference->height, &noisy, err);
-    if (!rc)
-        rc = pic_write_png(path, reference->width, reference->height, 3, noisy, err);
+        rc = ggn_shown_write(q->dir, index, "heavy", width, height, noisy, err);
     free(noisy);
     for (int i = 0; i < n && !rc; i++) {
         struct pic_image image;
@@ -307,12 +302,10 @@ static int prepare_conditions(const struct ggn_shown_request *q, const char *fol
             continue;
         rc = know_condition(s, index, list[i].stem, folder, err);
         if (!rc)
-            rc = ggn_shown_path(path, q->dir, index, list[i].stem, err);
-        if (!rc)
             rc = read_picture(folder, list[i].name, GGN_SHOWN_AS_IS, &s->views[index], &image, err);
         if (rc)
             break;
-        rc = pic_write_png(path, image.width, image.height, 3, image.u8, err);
+        rc = ggn_shown_write(q->dir, index, list[i].stem, image.width, image.height, image.u8, err);
         pic_release(&image);
         found++;
     }
