@@ -33,21 +33,12 @@ static float *state_array(struct ggn_session *s, int i, size_t *count)
     i -= s->hyper.preset == GGN_PRESET_PAPER ? 5 : 3;
     if (i < 10)
         return ggn_trainer_state(s->trainer, i < 5 ? GGN_NET_M : GGN_NET_D, i % 5, count);
-    static const int net_of[] = {GGN_NET_M, GGN_NET_D, GGN_NET_R};
-    float *const lists[] = {s->best[GGN_NET_M], s->best[GGN_NET_D], s->best[GGN_NET_R]};
-    enum { LISTS = sizeof lists / sizeof lists[0] };
-    float *kept[LISTS];
-    int nets[LISTS], n = 0;
-    for (int k = 0; k < LISTS; k++)
-        if (lists[k]) {
-            nets[n] = net_of[k];
-            kept[n++] = lists[k];
-        }
+    static const int net_of[] = {GGN_NET_M, GGN_NET_D, GGN_NET_R}; /* the denoiser of preset paper only */
     i -= 10;
-    if (i >= n)
+    if (i >= GGN_NETS || !s->best[net_of[i]])
         return NULL;
-    *count = s->trainer->graph[nets[i]].n_learned;
-    return kept[i];
+    *count = s->trainer->graph[net_of[i]].n_learned;
+    return s->best[net_of[i]];
 }
 
 /* --- JSON ------------------------------------------------------------------------------------------------------------- */

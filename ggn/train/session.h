@@ -10,7 +10,7 @@
 #include "train/log.h"
 #include "train/train_plan.h"
 
-enum { GGN_PHASE_DENOISER, GGN_PHASE_CLASSIFIER, GGN_PHASE_DONE };
+enum { GGN_PHASE_DENOISER, GGN_PHASE_CLASSIFIER };
 
 /* Numbers of the run that a checkpoint keeps. */
 struct ggn_progress {
