@@ -32,7 +32,7 @@ double ggn_stats_quantile(double *x, size_t n, double q)
     return x[i] + (at - (double)i) * (x[i + 1] - x[i]);
 }
 
-double ggn_stats_pearson(const double *x, const double *y, size_t n)
+static double pearson(const double *x, const double *y, size_t n)
 {
     double mx = ggn_stats_mean(x, n), my = ggn_stats_mean(y, n), xy = 0.0, xx = 0.0, yy = 0.0;
     for (size_t i = 0; i < n; i++) {
@@ -56,23 +56,15 @@ static int compare_keyed(const void *a, const void *b)
     return (x->index > y->index) - (x->index < y->index);
 }
 
-static struct keyed *sorted(const double *x, size_t n)
-{
-    struct keyed *k = malloc((n > 0 ? n : 1) * sizeof *k);
-    if (!k)
-        return NULL;
-    for (size_t i = 0; i < n; i++)
-        k[i] = (struct keyed){x[i], i};
-    qsort(k, n, sizeof *k, compare_keyed);
-    return k;
-}
-
 /* rank[i] in 1..n; equal values share the mean of their ranks. */
 static int ranks(const double *x, size_t n, double *rank, struct base_err *err)
 {
-    struct keyed *k = sorted(x, n);
+    struct keyed *k = malloc((n > 0 ? n : 1) * sizeof *k);
     if (!k)
         return base_fail_nomem(err, "ranks");
+    for (size_t i = 0; i < n; i++)
+        k[i] = (struct keyed){x[i], i};
+    qsort(k, n, sizeof *k, compare_keyed);
     for (size_t i = 0, j; i < n; i = j) {
         for (j = i + 1; j < n && k[j].key == k[i].key;)
             j++;
@@ -92,7 +84,7 @@ int ggn_stats_spearman(const double *x, const double *y, size_t n, double *rho, 
     if (!rc)
         rc = ranks(y, n, r + n, err);
     if (!rc)
-        *rho = ggn_stats_pearson(r, r + n, n);
+        *rho = pearson(r, r + n, n);
     free(r);
     return rc;
 }

@@ -262,7 +262,9 @@ double ggn_curve_threshold(const struct ggn_curve *c, double limit, int *censore
     return log_cross(c->spp[last], c->visible[last], c->spp[last + 1], c->visible[last + 1], limit);
 }
 
-double ggn_curve_between(double x0, double y0, double x1, double y1, double x)
+/* y at x on the line through two points in log-log, in plain scales where a point has no place there; beyond the points the
+ * nearer y. */
+static double between(double x0, double y0, double x1, double y1, double x)
 {
     double t = x <= x0 ? 0.0 : x >= x1 ? 1.0 : log(x / x0) / log(x1 / x0);
     return y0 > 0.0 && y1 > 0.0 ? y0 * pow(y1 / y0, t) : y0 + t * (y1 - y0);
@@ -277,5 +279,5 @@ double ggn_curve_at(const struct ggn_curve *c, double spp)
         return c->visible[c->n - 1];
     while (c->spp[i + 1] < spp)
         i++;
-    return ggn_curve_between(c->spp[i], c->visible[i], c->spp[i + 1], c->visible[i + 1], spp);
+    return between(c->spp[i], c->visible[i], c->spp[i + 1], c->visible[i + 1], spp);
 }

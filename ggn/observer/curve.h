@@ -39,9 +39,6 @@ int ggn_curve_means(const struct seq_block *block, const struct seq_record *earl
 /* Smallest spp from which the noise stays at or below `limit`, interpolated between levels in log-log. censored: still above
  * at the last level, which is then returned. A curve that starts below gives its first level. */
 double ggn_curve_threshold(const struct ggn_curve *curve, double limit, int *censored);
-/* y at x on the line through two points in log-log, in plain scales where a point has no place there; beyond the points the
- * nearer y. */
-double ggn_curve_between(double x0, double y0, double x1, double y1, double x);
 /* Visible noise at spp, interpolated in log-log; before the first level it is that level's, as 1/sqrt(spp) rises; beyond the
  * last that level's. */
 double ggn_curve_at(const struct ggn_curve *curve, double spp);

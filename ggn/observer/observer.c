@@ -6,14 +6,12 @@ static const double STUDY_REFERENCE = 20000.0; /* R */
 
 const struct ggn_observer ggn_observer_default = {.level = 0.261835, .spread = 0.437111};
 
-static double min(double a, double b) { return a < b ? a : b; }
-
 double ggn_observer_from_study(double spp)
 {
     return spp >= SEQ_STUDY_CAP ? SEQ_SIMULATED_CAP : 1.0 / (1.0 / spp - 1.0 / STUDY_REFERENCE);
 }
 
-double ggn_observer_to_study(double spp) { return min(1.0 / (1.0 / spp + 1.0 / STUDY_REFERENCE), SEQ_STUDY_CAP); }
+double ggn_observer_to_study(double spp) { return fmin(1.0 / (1.0 / spp + 1.0 / STUDY_REFERENCE), SEQ_STUDY_CAP); }
 
 /* Standard error of the pooled Gaussian noise of P pixels is this over sqrt(P), as a share of it: a sixth moment scatters by
  * sqrt(10170)/15, its root by a sixth of that, and the blur leaves about a third of the pixels independent. */

@@ -6,21 +6,13 @@
 #include <cjson/cJSON.h>
 
 #include "base/files.h"
+#include "base/json.h"
 #include "observer/observer.h"
 
 void ggn_observer_describe(const struct ggn_observer *o, char *text, size_t room)
 {
     snprintf(text, room, "model observer: noise in L* is seen above %.4f sqrt(texture + 2) of a patch, spread %.2f octaves",
              o->level, o->spread);
-}
-
-static int get(const cJSON *root, const char *name, double lo, double hi, double *out)
-{
-    const cJSON *v = cJSON_GetObjectItemCaseSensitive(root, name);
-    if (!cJSON_IsNumber(v) || !(v->valuedouble >= lo && v->valuedouble <= hi))
-        return 0;
-    *out = v->valuedouble;
-    return 1;
 }
 
 /* What was fitted without this view; root where it had no part in the fit. */
@@ -45,7 +37,7 @@ int ggn_observer_read(const char *path, const char *left_out, struct ggn_observe
         return rc;
     cJSON *root = cJSON_ParseWithLength(text, size);
     const cJSON *from = fit_without(root, left_out);
-    if (!get(from, "level", 1e-6, 1e3, &o.level) || !get(root, "spread", 1e-3, 10, &o.spread))
+    if (!base_json_get(from, "level", 1e-6, 1e3, &o.level) || !base_json_get(root, "spread", 1e-3, 10, &o.spread))
         rc = base_fail(err, BASE_EINVAL,
                        "%s: level or spread is missing or out of range (ggn label --calibrate writes them)", path);
     else if (cJSON_HasObjectItem(root, "exponent"))

@@ -6,36 +6,26 @@
 #include "base/colour.h"
 #include "model/visibility.h"
 
-struct workspace { /* for one block; owns */
+struct workspace {             /* for one block */
+    double *texture, *scratch; /* `texture` owns all, one allocation */
     float *rgb, *image, *reference[2], *seen[2];
-    double *texture, *scratch;
 };
 
-static void release(struct workspace *w)
+/* Empty without memory. */
+static struct workspace make_room(int width, int height)
 {
-    free(w->rgb);
-    free(w->image);
-    for (int i = 0; i < 2; i++) {
-        free(w->reference[i]);
-        free(w->seen[i]);
-    }
-    free(w->texture);
-    free(w->scratch);
-}
-
-static int init(struct workspace *w, int width, int height, struct base_err *err)
-{
-    size_t n = (size_t)width * (size_t)height;
-    *w = (struct workspace){.rgb = malloc(3 * n * sizeof *w->rgb),
-                            .image = malloc(n * sizeof *w->image),
-                            .reference = {malloc(n * sizeof(float)), malloc(n * sizeof(float))},
-                            .seen = {malloc(n * sizeof(float)), malloc(n * sizeof(float))},
-                            .texture = malloc(ggn_visible_patches(width, height) * sizeof *w->texture),
-                            .scratch = malloc(ggn_visibility_scratch(width) * sizeof *w->scratch)};
-    if (w->rgb && w->image && w->reference[0] && w->reference[1] && w->seen[0] && w->seen[1] && w->texture && w->scratch)
-        return 0;
-    release(w);
-    return base_fail_nomem(err, "blocks of an image");
+    const size_t n = (size_t)width * (size_t)height, patches = ggn_visible_patches(width, height);
+    const size_t doubles = patches + ggn_visibility_scratch(width);
+    double *memory = malloc(doubles * sizeof *memory + 8 * n * sizeof(float));
+    if (!memory)
+        return (struct workspace){0};
+    float *at = (float *)(memory + doubles);
+    return (struct workspace){.texture = memory,
+                              .scratch = memory + patches,
+                              .rgb = at,
+                              .image = at + 3 * n,
+                              .reference = {at + 4 * n, at + 5 * n},
+                              .seen = {at + 6 * n, at + 7 * n}};
 }
 
 static void lightness_of(const struct pic_image *image, const struct ggn_remaining *b, float *rgb, float *lightness)
@@ -102,10 +92,10 @@ int ggn_remaining_count(int width, int height, int block) { return ((width - 1) 
 int ggn_remaining(const struct ggn_observer *observer, const struct pic_image *const references[2],
                   const struct pic_image *image, int block, struct ggn_remaining *blocks, float *map, struct base_err *err)
 {
-    struct workspace w;
-    int rc = init(&w, block < image->width ? block : image->width, block < image->height ? block : image->height, err);
-    if (rc)
-        return rc;
+    struct workspace w =
+        make_room(block < image->width ? block : image->width, block < image->height ? block : image->height);
+    if (!w.texture)
+        return base_fail_nomem(err, "blocks of an image");
     for (int y = 0; y < image->height; y += block)
         for (int x = 0; x < image->width; x += block, blocks++) {
             int right = image->width - x, below = image->height - y;
@@ -115,6 +105,6 @@ int ggn_remaining(const struct ggn_observer *observer, const struct pic_image *c
             lightness_of(image, blocks, w.rgb, w.image);
             measure(observer, blocks, references[1] != NULL, &w, map, image->width);
         }
-    release(&w);
+    free(w.texture);
     return 0;
 }
