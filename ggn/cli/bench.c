@@ -83,7 +83,7 @@ static int create_networks(const struct bench *b, struct ggn_exec *e[GGN_NETS], 
         if (!e[net])
             return err->code;
         for (int c = 0; c < g->value[0].c; c++)
-            ggn_plane_copy(&g->value[0], ggn_exec_plane(e[net], 0, 0, c), b->noisy[c], b->trainer->hyper.width);
+            ggn_exec_load(e[net], 0, c, b->noisy[c], b->trainer->hyper.width);
     }
     return 0;
 }

@@ -59,19 +59,11 @@ struct ggn_exact *ggn_exact_create(const struct ggn_hyper *hyper, const struct g
     return e;
 }
 
-/* Plane c of a network's input or output (value 0 or the last). */
-static real *plane(const struct ggn_exact *e, int net, int value, int c)
-{
-    return ggn_exec_plane(e->exec[net], value, 0, c);
-}
-
-static int last(const struct ggn_exact *e, int net) { return e->graph[net].n_values - 1; }
-
 /* Plane c of input `net`: codes · scale; codes NULL: `scale` everywhere. */
 static void load(const struct ggn_exact *e, int net, int c, const uint8_t *codes, const uint16_t *fixed, double scale)
 {
     const struct ggn_value *v = &e->graph[net].value[0];
-    real *to = plane(e, net, 0, c);
+    real *to = ggn_exec_plane(e->exec[net], 0, 0, c);
 
     for (int y = 0; y < v->h; y++)
         for (int x = 0; x < v->w; x++) {
@@ -82,14 +74,14 @@ static void load(const struct ggn_exact *e, int net, int c, const uint8_t *codes
 
 void ggn_exact_denoise(struct ggn_exact *e, const uint8_t *noisy, uint16_t *denoised)
 {
-    const struct ggn_value *v = &e->graph[GGN_NET_R].value[last(e, GGN_NET_R)];
+    const struct ggn_value *v = ggn_graph_output(&e->graph[GGN_NET_R]);
     const size_t pixels = (size_t)v->w * (size_t)v->h;
 
     for (int c = 0; c < 3; c++)
         load(e, GGN_NET_R, c, noisy + (size_t)c * pixels, NULL, 1.0 / 255);
     ggn_exec_forward(e->exec[GGN_NET_R], e->weights[GGN_NET_R], 1, GGN_EVAL);
     for (int c = 0; c < 3; c++) {
-        const real *from = plane(e, GGN_NET_R, last(e, GGN_NET_R), c);
+        const real *from = ggn_exec_output(e->exec[GGN_NET_R], 0, c);
         for (int y = 0; y < v->h; y++)
             for (int x = 0; x < v->w; x++) {
                 double p = from[(size_t)y * (size_t)v->row + (size_t)x], code = floor(fmax(p, 0) * GGN_FIXED_ONE + 0.5);
@@ -103,8 +95,8 @@ void ggn_exact_denoise(struct ggn_exact *e, const uint8_t *noisy, uint16_t *deno
 static void map_into(struct ggn_exact *e, int c)
 {
     ggn_exec_forward(e->exec[GGN_NET_M], e->weights[GGN_NET_M], 1, GGN_EVAL);
-    ggn_plane_copy(&e->graph[GGN_NET_D].value[0], plane(e, GGN_NET_D, 0, c), plane(e, GGN_NET_M, last(e, GGN_NET_M), 0),
-                   e->graph[GGN_NET_M].value[last(e, GGN_NET_M)].row);
+    ggn_exec_load(e->exec[GGN_NET_D], 0, c, ggn_exec_output(e->exec[GGN_NET_M], 0, 0),
+                  ggn_graph_output(&e->graph[GGN_NET_M])->row);
 }
 
 double ggn_exact_logit(struct ggn_exact *e, const uint8_t *const *noisy, const uint16_t *const *denoised,
@@ -126,7 +118,7 @@ double ggn_exact_logit(struct ggn_exact *e, const uint8_t *const *noisy, const u
         load(e, GGN_NET_D, 3, NULL, NULL, noise_map ? 1 : 0);
     }
     for (int i = 0; i < e->hyper.scalars; i++)
-        plane(e, GGN_NET_D, GGN_D_SCALARS, 0)[i] = (double)scalars[i];
+        ggn_exec_plane(e->exec[GGN_NET_D], GGN_D_SCALARS, 0, 0)[i] = (double)scalars[i];
     ggn_exec_forward(e->exec[GGN_NET_D], e->weights[GGN_NET_D], 1, GGN_EVAL);
-    return *plane(e, GGN_NET_D, last(e, GGN_NET_D), 0);
+    return *ggn_exec_output(e->exec[GGN_NET_D], 0, 0);
 }

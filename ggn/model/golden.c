@@ -87,15 +87,9 @@ static void release(struct state *s)
     free(s->reference);
 }
 
-static void copy_in(const struct ggn_exec *e, int n, int c, const real *from, int from_row)
-{
-    ggn_plane_copy(&e->graph->value[0], ggn_exec_plane(e, 0, n, c), from, from_row);
-}
-
 static double value_at(const struct ggn_exec *e, int n, int c, int y, int x)
 {
-    int out = e->graph->n_values - 1;
-    return (double)ggn_exec_plane(e, out, n, c)[(long)y * e->graph->value[out].row + x];
+    return (double)ggn_exec_output(e, n, c)[(long)y * ggn_graph_output(e->graph)->row + x];
 }
 
 static void record_stages(const struct ggn_exec *e, struct ggn_golden *out)
@@ -115,27 +109,26 @@ static void record_stages(const struct ggn_exec *e, struct ggn_golden *out)
 /* All three networks on window w, as one decision without a history. */
 static void evaluate_window(struct state *s, int w)
 {
-    const int r_out = s->r->graph->n_values - 1, m_out = s->m->graph->n_values - 1;
+    const int r_row = ggn_graph_output(s->r->graph)->row, m_row = ggn_graph_output(s->m->graph)->row;
 
     for (int i = 0; i < IMAGES; i++)
         for (int c = 0; c < 3; c++)
-            copy_in(s->r, i, c, s->noisy_plane[w * PLANES + 3 * i + c], SIDE);
+            ggn_exec_load(s->r, i, c, s->noisy_plane[w * PLANES + 3 * i + c], SIDE);
     ggn_exec_forward(s->r, s->t->weights[GGN_NET_R], IMAGES, GGN_EVAL);
     for (int k = 0; k < PLANES; k++) {
-        copy_in(s->m, 0, k, ggn_exec_plane(s->r, r_out, k / 3, k % 3), s->r->graph->value[r_out].row);
-        copy_in(s->m, 1, k, s->noisy_plane[w * PLANES + k], SIDE);
+        ggn_exec_load(s->m, 0, k, ggn_exec_output(s->r, k / 3, k % 3), r_row);
+        ggn_exec_load(s->m, 1, k, s->noisy_plane[w * PLANES + k], SIDE);
     }
     ggn_exec_forward(s->m, s->t->weights[GGN_NET_M], 2, GGN_EVAL);
     for (int k = 0; k < 2; k++)
-        copy_in(s->d, 0, k, ggn_exec_plane(s->m, m_out, k, 0), s->m->graph->value[m_out].row);
+        ggn_exec_load(s->d, 0, k, ggn_exec_output(s->m, k, 0), m_row);
     ggn_exec_forward(s->d, s->t->weights[GGN_NET_D], 1, GGN_EVAL);
 }
 
 /* Everything that is reported about window 0. */
 static int record_window0(struct state *s, struct ggn_golden *out, struct base_err *err)
 {
-    const struct ggn_value *r = &s->r->graph->value[s->r->graph->n_values - 1];
-    const struct ggn_value *m = &s->m->graph->value[s->m->graph->n_values - 1];
+    const struct ggn_value *r = ggn_graph_output(s->r->graph), *m = ggn_graph_output(s->m->graph);
     const struct ggn_value plain = {.h = SIDE, .w = SIDE, .row = SIDE};
     struct moments x = {0}, denoised = {0}, noisy_map = {0}, denoised_map = {0};
     struct ggn_ssim *ssim = ggn_ssim_create(SIDE, SIDE, NULL, err);
@@ -145,10 +138,10 @@ static int record_window0(struct state *s, struct ggn_golden *out, struct base_e
         return BASE_ENOMEM;
     for (int k = 0; k < PLANES; k++) {
         add_plane(&x, s->noisy_plane[k], &plain);
-        add_plane(&denoised, ggn_exec_plane(s->r, s->r->graph->n_values - 1, k / 3, k % 3), r);
+        add_plane(&denoised, ggn_exec_output(s->r, k / 3, k % 3), r);
     }
-    add_plane(&denoised_map, ggn_exec_plane(s->m, s->m->graph->n_values - 1, 0, 0), m);
-    add_plane(&noisy_map, ggn_exec_plane(s->m, s->m->graph->n_values - 1, 1, 0), m);
+    add_plane(&denoised_map, ggn_exec_output(s->m, 0, 0), m);
+    add_plane(&noisy_map, ggn_exec_output(s->m, 1, 0), m);
     out->x_first = (double)s->noisy_plane[0][0];
     out->x_last = (double)s->noisy_plane[PLANES - 1][AREA - 1];
     out->x_mean = mean_of(&x);
@@ -175,7 +168,7 @@ static int record_window0(struct state *s, struct ggn_golden *out, struct base_e
         for (int c = 0; c < 3; c++) {
             ggn_plane_copy(r, padded + (size_t)c * SIDE * (size_t)r->row, s->reference_plane[c], SIDE);
             reference[c] = padded + (size_t)c * SIDE * (size_t)r->row;
-            denoised0[c] = ggn_exec_plane(s->r, s->r->graph->n_values - 1, 0, c);
+            denoised0[c] = ggn_exec_output(s->r, 0, c);
         }
         out->ssim[3] = ggn_ssim_mean(ssim, denoised0, reference, NULL, 3, r->row, 0);
     }

@@ -51,15 +51,7 @@ void ggn_inference_destroy(struct ggn_inference *j)
 
 static const struct ggn_value *input(const struct ggn_inference *j, int net) { return &j->model->graph[net].value[0]; }
 
-static const struct ggn_value *output(const struct ggn_inference *j, int net)
-{
-    return &j->model->graph[net].value[j->model->graph[net].n_values - 1];
-}
-
-static float *output_plane(const struct ggn_inference *j, int net)
-{
-    return ggn_exec_plane(j->exec[net], j->model->graph[net].n_values - 1, 0, 0);
-}
+static float *output_plane(const struct ggn_inference *j, int net) { return ggn_exec_output(j->exec[net], 0, 0); }
 
 static void forward(struct ggn_inference *j, int net)
 {
@@ -68,7 +60,7 @@ static void forward(struct ggn_inference *j, int net)
 
 void ggn_inference_denoise(struct ggn_inference *j, const uint8_t *noisy, uint16_t *denoised, int width, int height)
 {
-    const struct ggn_value *in = input(j, GGN_NET_R), *out = output(j, GGN_NET_R);
+    const struct ggn_value *in = input(j, GGN_NET_R), *out = ggn_graph_output(&j->model->graph[GGN_NET_R]);
     const int nx = ggn_tile_count(width, in->w), ny = ggn_tile_count(height, in->h);
 
     for (int t = 0; t < nx * ny; t++) {
@@ -84,10 +76,9 @@ void ggn_inference_denoise(struct ggn_inference *j, const uint8_t *noisy, uint16
 /* The generator's map of its present input, into plane `which` of the discriminator's input. */
 static void map_into(struct ggn_inference *j, int which)
 {
-    const struct ggn_value *map = output(j, GGN_NET_M), *to = input(j, GGN_NET_D);
-
     forward(j, GGN_NET_M);
-    ggn_plane_copy(to, ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, which), output_plane(j, GGN_NET_M), map->row);
+    ggn_exec_load(j->exec[GGN_NET_D], 0, which, output_plane(j, GGN_NET_M),
+                  ggn_graph_output(&j->model->graph[GGN_NET_M])->row);
 }
 
 /* The noise map, and whether there is one, into the discriminator's input. */

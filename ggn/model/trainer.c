@@ -218,10 +218,8 @@ static int update(struct ggn_trainer *t, int net, size_t n, struct base_err *err
 /* Copies `n` gap-free planes into the first channels of image i of the executor's input. */
 static void set_input(const struct ggn_exec *e, int i, const real *const *planes, int n)
 {
-    const struct ggn_value *v = &e->graph->value[0];
-
     for (int c = 0; c < n; c++)
-        ggn_plane_copy(v, ggn_exec_plane(e, 0, i, c), planes[c], v->w);
+        ggn_exec_load(e, i, c, planes[c], e->graph->value[0].w);
 }
 
 /* 1 − SSIM of the denoised images to the references, its gradient into R's output. */
@@ -309,7 +307,7 @@ static void exchange_maps(struct ggn_trainer *t, const struct maps of[2], int co
         if (back)
             ggn_plane_copy(v, ggn_exec_grad(m, out, n, 0), ggn_exec_grad(t->d, 0, image, channel), v->row);
         else
-            ggn_plane_copy(v, ggn_exec_plane(t->d, 0, image, channel), ggn_exec_plane(m, out, n, 0), v->row);
+            ggn_exec_load(t->d, image, channel, ggn_exec_output(m, n, 0), v->row);
     }
 }
 
@@ -336,7 +334,7 @@ void ggn_trainer_set_scalars(struct ggn_trainer *t, const real *const *scalars, 
 
 double ggn_trainer_answer(const struct ggn_trainer *t, int i, double law)
 {
-    double z = (double)*ggn_exec_plane(t->d, t->graph[GGN_NET_D].n_values - 1, i, 0);
+    double z = (double)*ggn_exec_output(t->d, i, 0);
 
     return t->hyper.reach > 0 ? law + ggn_residual_correction(z, t->hyper.reach) : z;
 }
@@ -423,8 +421,7 @@ static int paper_denoise_image(struct ggn_trainer *t, const struct ggn_batch *b,
 static int paper_denoise(struct ggn_trainer *t, const struct ggn_batch *b, struct ggn_paper_record *record,
                          struct base_err *err)
 {
-    const int out = t->graph[GGN_NET_R].n_values - 1;
-    const struct ggn_value *v = &t->graph[GGN_NET_R].value[out];
+    const int row = ggn_graph_output(&t->graph[GGN_NET_R])->row;
 
     for (int k = 0; k < t->hyper.window; k++) {
         int rc = paper_denoise_image(t, b, k, record, err);
@@ -432,7 +429,7 @@ static int paper_denoise(struct ggn_trainer *t, const struct ggn_batch *b, struc
             return rc;
         for (int i = 0; i < b->count; i++)
             for (int c = 0; c < 3; c++)
-                ggn_plane_copy(v, ggn_exec_plane(t->m, 0, i, 3 * k + c), ggn_exec_plane(t->r, out, i, c), v->row);
+                ggn_exec_load(t->m, i, 3 * k + c, ggn_exec_output(t->r, i, c), row);
     }
     return 0;
 }

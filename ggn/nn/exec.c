@@ -137,12 +137,19 @@ void ggn_exec_destroy(struct ggn_exec *e)
 
 real *ggn_exec_plane(const struct ggn_exec *e, int value, int n, int c) { return ggn_plane_in(e, e->acts, value, n, c); }
 
+real *ggn_exec_output(const struct ggn_exec *e, int n, int c) { return ggn_exec_plane(e, e->graph->n_values - 1, n, c); }
+
 real *ggn_exec_grad(const struct ggn_exec *e, int value, int n, int c) { return ggn_plane_in(e, e->grads, value, n, c); }
 
 void ggn_plane_copy(const struct ggn_value *v, real *to, const real *from, int row)
 {
     for (int y = 0; y < v->h; y++)
         memcpy(to + (long)y * v->row, from + (long)y * row, (size_t)v->w * sizeof *to);
+}
+
+void ggn_exec_load(const struct ggn_exec *e, int n, int c, const real *from, int row)
+{
+    ggn_plane_copy(&e->graph->value[0], ggn_exec_plane(e, 0, n, c), from, row);
 }
 
 #define PASSES(op, name, text) [GGN_OP_##op] = &GGN_LAYER(name),

@@ -55,11 +55,14 @@ void ggn_exec_destroy(struct ggn_exec *exec);
 /* Element (0,0) of plane `c` of value `value` of image `n`; rows are graph->value[value].row apart. Value 0 is the input,
  * which the caller writes (h × w elements of each plane and nothing else); n_values − 1 is the output. */
 real *ggn_exec_plane(const struct ggn_exec *exec, int value, int n, int c);
+real *ggn_exec_output(const struct ggn_exec *exec, int n, int c);
 /* The same for the gradient; the caller writes that of the output before backward and may read that of the input after. */
 real *ggn_exec_grad(const struct ggn_exec *exec, int value, int n, int c);
 
 /* Copies one plane of the size of `v` from rows that lie `row` apart to rows as `v` has them. */
 void ggn_plane_copy(const struct ggn_value *v, real *to, const real *from, int row);
+/* The same into plane `c` of the input of image `n`. */
+void ggn_exec_load(const struct ggn_exec *exec, int n, int c, const real *from, int row);
 
 /* Images 0..batch−1. GGN_TRAIN updates the running statistics in `weights` (not the packed ones: pack before evaluating). */
 void ggn_exec_forward(struct ggn_exec *exec, struct ggn_weights *weights, int batch, enum ggn_mode mode);

@@ -26,7 +26,7 @@ static int input_planes(real **out, const struct ggn_task *t, real *base, long n
 /* The Winograd form of the layer's weights, or NULL where the direct convolution is used. */
 static const real *wino_weights(const struct ggn_task *t, int c_in, int c_out, const real *all)
 {
-    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
     const int suits = t->l->kernel == 3 && ggn_wino_suits(c_in, c_out, v->h, v->w, t->e->kernels->lanes);
     return all && suits ? all + 4 * t->l->pack : NULL;
 }
@@ -34,7 +34,7 @@ static const real *wino_weights(const struct ggn_task *t, int c_in, int c_out, c
 /* Cuts the work into pieces that depend on the shape only. `wino`: all Winograd weights of this direction or NULL. */
 static long cut_conv(struct ggn_task *t, int c_in, int c_out, const real *wino)
 {
-    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
 
     t->wino = wino_weights(t, c_in, c_out, wino);
     if (t->wino) {
@@ -71,8 +71,7 @@ static void run_conv_piece(const struct ggn_task *t, const struct ggn_conv *conv
 static void conv_piece(void *data, long i, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_graph *g = t->e->graph;
-    const struct ggn_value *v = &g->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
     long n = i / ((long)t->px_blocks * t->oc_groups);
     real *x[GGN_MAX_CHANNELS], *y[GGN_MAX_CHANNELS];
     struct ggn_conv conv = {
@@ -100,15 +99,14 @@ static void conv_forward(struct ggn_task *t)
 {
     const struct ggn_graph *g = t->e->graph;
 
-    ggn_task_run(t, cut_conv(t, ggn_layer_c_in(g, t->l), g->value[t->l->out].c, t->w->wino), conv_piece);
+    ggn_task_run(t, cut_conv(t, ggn_layer_c_in(g, t->l), ggn_task_out(t)->c, t->w->wino), conv_piece);
 }
 
 /* dX = the same convolution with inputs and outputs swapped and taps mirrored. */
 static void conv_back_piece(void *data, long i, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_graph *g = t->e->graph;
-    const struct ggn_value *v = &g->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
     long n = i / ((long)t->px_blocks * t->oc_groups);
     real *dy[GGN_MAX_CHANNELS], *dx[GGN_MAX_CHANNELS];
     unsigned char add[GGN_MAX_CHANNELS];
@@ -127,7 +125,7 @@ static void conv_back_piece(void *data, long i, int worker)
 
     conv.n_out = input_planes(dx, t, t->e->grads, n);
     for (int c = 0; c < conv.n_out; c++)
-        add[c] = (unsigned char)(c < g->value[t->l->in].c ? t->l->add_in : t->l->add_in2);
+        add[c] = (unsigned char)(c < ggn_task_in(t)->c ? t->l->add_in : t->l->add_in2);
     for (int c = 0; c < v->c; c++)
         dy[c] = ggn_grad(t, t->l->out, n, c);
     run_conv_piece(t, &conv, i, worker);
@@ -137,8 +135,7 @@ static void conv_back_piece(void *data, long i, int worker)
 static void conv_act_back(void *data, long c, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_graph *g = t->e->graph;
-    const struct ggn_value *v = &g->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
     double sum = 0;
 
     for (int n = 0; n < t->e->batch; n++) {
@@ -159,7 +156,7 @@ struct weight_part {
 /* Where the taps of an output and an input channel lie among the weights, and in which order. */
 static size_t weight_at(const struct ggn_task *t, int o, int i)
 {
-    const size_t n_in = (size_t)ggn_layer_c_in(t->e->graph, t->l), c_out = (size_t)t->e->graph->value[t->l->out].c;
+    const size_t n_in = (size_t)ggn_layer_c_in(t->e->graph, t->l), c_out = (size_t)ggn_task_out(t)->c;
     const size_t pair = t->l->transposed ? (size_t)i * c_out + (size_t)o : (size_t)o * n_in + (size_t)i;
     return pair * (size_t)(t->l->kernel * t->l->kernel);
 }
@@ -168,7 +165,7 @@ static size_t weight_at(const struct ggn_task *t, int o, int i)
 static long cut_weights(struct ggn_task *t)
 {
     const struct ggn_kernels *k = t->e->kernels;
-    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
     const int n_in = ggn_layer_c_in(t->e->graph, t->l);
 
     t->weights_by_wino = k->wino_grad && t->l->kernel == 3 && ggn_wino_grad_suits(n_in, v->c, v->h, v->w, k->lanes);
@@ -182,7 +179,7 @@ static long cut_weights(struct ggn_task *t)
 static void weights_by_definition(const struct ggn_task *t, const struct weight_part *p, real *const *x,
                                   const real *const *dy, real *acc, real *leaf)
 {
-    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
     const struct ggn_kernels *k = t->e->kernels;
     const int taps = t->l->kernel * t->l->kernel, values = p->ot * p->nic * taps;
     const long px = (long)v->h * v->row;
@@ -204,7 +201,7 @@ static void weights_by_definition(const struct ggn_task *t, const struct weight_
 static void weights_by_wino(const struct ggn_task *t, const struct weight_part *p, real *const *x, const real *const *dy,
                             real *scratch, real *leaf)
 {
-    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
     const struct ggn_conv_grad grad = {
         .x = (const real *const *)x,
         .dy = dy,
@@ -225,7 +222,7 @@ static void weights_by_wino(const struct ggn_task *t, const struct weight_part *
 static void conv_weight_back(void *data, long i, int worker)
 {
     const struct ggn_task *t = data;
-    const int n_in = ggn_layer_c_in(t->e->graph, t->l), c_out = t->e->graph->value[t->l->out].c;
+    const int n_in = ggn_layer_c_in(t->e->graph, t->l), c_out = ggn_task_out(t)->c;
     const long n = i / (t->oc_groups * t->ic_groups);
     struct weight_part p = {.oc = (int)(i / t->ic_groups % t->oc_groups) * t->oc_group,
                             .ic0 = (int)(i % t->ic_groups) * t->ic_group};
@@ -258,7 +255,7 @@ static int needs_input_grad(const struct ggn_task *t) { return t->l->in != 0 || 
 static void conv_backward(struct ggn_task *t)
 {
     const struct ggn_graph *g = t->e->graph;
-    const int c_out = g->value[t->l->out].c;
+    const int c_out = ggn_task_out(t)->c;
     const int c_in = ggn_layer_c_in(g, t->l);
 
     ggn_task_run(t, c_out, conv_act_back);
@@ -274,8 +271,7 @@ const struct ggn_layer_passes GGN_LAYER(conv) = {conv_forward, conv_backward};
 static void im2col_piece(void *data, long i, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_graph *g = t->e->graph;
-    const struct ggn_value *in = &g->value[t->l->in], *out = &g->value[t->l->out];
+    const struct ggn_value *in = ggn_task_in(t), *out = ggn_task_out(t);
     long n = i / out->c;
     int c = (int)(i % out->c), dy = c % 9 / 3 - t->l->pad, dx = c % 3 - t->l->pad;
     const real *x = ggn_act(t, t->l->in, n, c / 9);
@@ -298,16 +294,12 @@ static void im2col_piece(void *data, long i, int worker)
     (void)worker;
 }
 
-static void im2col_forward(struct ggn_task *t)
-{
-    ggn_task_run(t, (long)t->e->batch * t->e->graph->value[t->l->out].c, im2col_piece);
-}
+static void im2col_forward(struct ggn_task *t) { ggn_task_run(t, (long)t->e->batch * ggn_task_out(t)->c, im2col_piece); }
 
 static void im2col_back_piece(void *data, long i, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_graph *g = t->e->graph;
-    const struct ggn_value *in = &g->value[t->l->in], *out = &g->value[t->l->out];
+    const struct ggn_value *in = ggn_task_in(t), *out = ggn_task_out(t);
     long n = i / in->c;
     int c = (int)(i % in->c);
     real *dx = ggn_grad(t, t->l->in, n, c);
@@ -329,7 +321,7 @@ static void im2col_back_piece(void *data, long i, int worker)
 static void im2col_backward(struct ggn_task *t)
 {
     if (needs_input_grad(t))
-        ggn_task_run(t, (long)t->e->batch * t->e->graph->value[t->l->in].c, im2col_back_piece);
+        ggn_task_run(t, (long)t->e->batch * ggn_task_in(t)->c, im2col_back_piece);
 }
 
 const struct ggn_layer_passes GGN_LAYER(im2col) = {im2col_forward, im2col_backward};

@@ -11,20 +11,17 @@
 /* The two sums of image n of this process and channel c. */
 static double *bn_sums_of(const struct ggn_task *t, int n, int c)
 {
-    return t->e->sums + 2 * ((size_t)(n + 1) * (size_t)t->e->graph->value[t->l->out].c + (size_t)c);
+    return t->e->sums + 2 * ((size_t)(n + 1) * (size_t)ggn_task_out(t)->c + (size_t)c);
 }
 
 /* One of the two, 0 or 1, over the whole batch [channels]. */
-static double *bn_total(const struct ggn_task *t, int k)
-{
-    return t->e->sums + (size_t)k * (size_t)t->e->graph->value[t->l->out].c;
-}
+static double *bn_total(const struct ggn_task *t, int k) { return t->e->sums + (size_t)k * (size_t)ggn_task_out(t)->c; }
 
 /* Mean of one channel of one image, and the sum of squares around it. */
 static void bn_image(void *data, long i, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
     const int n = (int)(i / v->c), c = (int)(i % v->c);
     const real *x = ggn_act(t, t->l->in, n, c);
     double *sums = bn_sums_of(t, n, c);
@@ -37,7 +34,7 @@ static void bn_image(void *data, long i, int worker)
 /* Batch statistics from those of the images (Chan, Golub & LeVeque 1979): sums of means and of squares around the mean. */
 static void bn_combine(const struct ggn_task *t)
 {
-    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
     const double pixels = (double)v->h * v->w;
     double *means = bn_total(t, 0), *squares = bn_total(t, 1);
 
@@ -55,7 +52,7 @@ static void bn_combine(const struct ggn_task *t)
 /* Of channel c: biased variance to normalise, unbiased for the running estimate. */
 static void bn_statistics(const struct ggn_task *t, long c)
 {
-    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
     const size_t s = t->l->stats + (size_t)c;
     const double count = (double)v->h * v->w * t->e->batch;
     const double mean = bn_total(t, 0)[c] / t->e->batch, var = bn_total(t, 1)[c] / count;
@@ -70,8 +67,7 @@ static void bn_statistics(const struct ggn_task *t, long c)
 static void bn_channel(void *data, long c, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_graph *g = t->e->graph;
-    const struct ggn_value *v = &g->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
     const size_t s = t->l->stats + (size_t)c;
     real scale = t->w->scale[s], shift = t->w->shift[s];
 
@@ -91,7 +87,7 @@ static void bn_channel(void *data, long c, int worker)
 
 static void bn_forward(struct ggn_task *t)
 {
-    const int channels = t->e->graph->value[t->l->out].c;
+    const int channels = ggn_task_out(t)->c;
 
     if (t->e->mode == GGN_TRAIN) {
         ggn_task_run(t, (long)t->e->batch * channels, bn_image);
@@ -105,7 +101,7 @@ static void bn_forward(struct ggn_task *t)
 static void bn_back_image(void *data, long i, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_value *v = &t->e->graph->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
     const int n = (int)(i / v->c), c = (int)(i % v->c);
 
     t->e->kernels->bn_sums(bn_sums_of(t, n, c), ggn_grad(t, t->l->out, n, c), ggn_act(t, t->l->in, n, c),
@@ -116,8 +112,7 @@ static void bn_back_image(void *data, long i, int worker)
 static void bn_back_channel(void *data, long c, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_graph *g = t->e->graph;
-    const struct ggn_value *v = &g->value[t->l->out];
+    const struct ggn_value *v = ggn_task_out(t);
     const size_t s = t->l->stats + (size_t)c;
     const double count = (double)v->h * v->w * t->e->batch;
     const double inv = (double)t->e->bn_inv[s], mean = (double)t->e->bn_mean[s];
@@ -137,7 +132,7 @@ static void bn_back_channel(void *data, long c, int worker)
 
 static void bn_backward(struct ggn_task *t)
 {
-    const int channels = t->e->graph->value[t->l->out].c;
+    const int channels = ggn_task_out(t)->c;
 
     ggn_task_run(t, (long)t->e->batch * channels, bn_back_image);
     memset(t->e->sums, 0, 2 * (size_t)channels * sizeof *t->e->sums);
@@ -162,8 +157,7 @@ struct pair {
 
 static struct pair pair_of(const struct ggn_task *t, long i)
 {
-    const struct ggn_graph *g = t->e->graph;
-    struct pair p = {.in = &g->value[t->l->in], .out = &g->value[t->l->out]};
+    struct pair p = {.in = ggn_task_in(t), .out = ggn_task_out(t)};
 
     p.n = i / p.in->c;
     p.c = (int)(i % p.in->c);
@@ -193,10 +187,7 @@ static struct pair pair_of(const struct ggn_task *t, long i)
         (void)worker; \
         (void)k; \
     } \
-    static void name(struct ggn_task *t) \
-    { \
-        ggn_task_run(t, (long)t->e->batch * t->e->graph->value[t->l->in].c, name##_plane); \
-    }
+    static void name(struct ggn_task *t) { ggn_task_run(t, (long)t->e->batch *ggn_task_in(t)->c, name##_plane); }
 
 PLANE_LAYER(lrelu, k->lrelu(p.y, p.x, (real)t->l->slope, p.in->h, p.in->w, p.in->row),
             k->lrelu_grad(p.dx, p.dy, p.y, (real)t->l->slope, t->l->add_in, p.in->h, p.in->w, p.in->row))
@@ -303,7 +294,7 @@ static void linear_unit(void *data, long o, int worker)
 {
     const struct ggn_task *t = data;
     const struct ggn_graph *g = t->e->graph;
-    const long c_in = g->value[t->l->in].c, c_all = ggn_layer_c_in(g, t->l);
+    const long c_in = ggn_task_in(t)->c, c_all = ggn_layer_c_in(g, t->l);
     const real *w = t->w->params + t->l->weight + (size_t)(o * c_all);
 
     for (int n = 0; n < t->e->batch; n++) {
@@ -315,13 +306,13 @@ static void linear_unit(void *data, long o, int worker)
     (void)worker;
 }
 
-static void linear_forward(struct ggn_task *t) { ggn_task_run(t, t->e->graph->value[t->l->out].c, linear_unit); }
+static void linear_forward(struct ggn_task *t) { ggn_task_run(t, ggn_task_out(t)->c, linear_unit); }
 
 /* dW[o] += Σ_n dY[n][o]·X[n], db[o] += Σ_n dY[n][o] */
 static void linear_weight_back(void *data, long o, int worker)
 {
     const struct ggn_task *t = data;
-    const long c_in = t->e->graph->value[t->l->in].c, c_all = ggn_layer_c_in(t->e->graph, t->l);
+    const long c_in = ggn_task_in(t)->c, c_all = ggn_layer_c_in(t->e->graph, t->l);
     real *dw = t->e->params_grad + t->l->weight + (size_t)(o * c_all);
 
     for (int n = 0; n < t->e->batch; n++) {
@@ -343,7 +334,7 @@ static void linear_value_back(const struct ggn_task *t, long n, int in, long fir
 
     if (!add)
         memset(dx, 0, (size_t)c_in * sizeof *dx);
-    for (int o = 0; o < g->value[t->l->out].c; o++)
+    for (int o = 0; o < ggn_task_out(t)->c; o++)
         t->e->kernels->axpy(dx, ggn_grad(t, t->l->out, n, 0)[o], t->w->params + t->l->weight + (size_t)(o * c_all + first),
                             c_in);
 }
@@ -354,13 +345,13 @@ static void linear_input_back(void *data, long n, int worker)
 
     linear_value_back(t, n, t->l->in, 0, t->l->add_in);
     if (t->l->in2 >= 0)
-        linear_value_back(t, n, t->l->in2, t->e->graph->value[t->l->in].c, t->l->add_in2);
+        linear_value_back(t, n, t->l->in2, ggn_task_in(t)->c, t->l->add_in2);
     (void)worker;
 }
 
 static void linear_backward(struct ggn_task *t)
 {
-    ggn_task_run(t, t->e->graph->value[t->l->out].c, linear_weight_back);
+    ggn_task_run(t, ggn_task_out(t)->c, linear_weight_back);
     ggn_task_run(t, t->e->batch, linear_input_back);
 }
 

@@ -123,6 +123,8 @@ int ggn_graph_end(struct ggn_graph *g, struct base_err *err);
  * between values of equal height and width, whose zero padding lies at the same places. Returns the elements per image. */
 size_t ggn_graph_place(const struct ggn_graph *g, size_t offset[GGN_MAX_LAYERS + 1]);
 
+/* The last value. */
+static inline const struct ggn_value *ggn_graph_output(const struct ggn_graph *g) { return &g->value[g->n_values - 1]; }
 /* "conv" … */
 const char *ggn_op_name(enum ggn_op op);
 /* Channels of `in` and `in2` together. */

@@ -34,6 +34,10 @@ static inline void ggn_task_run(const struct ggn_task *t, long n, void (*fn)(voi
     base_threads_for(t->e->threads, n, fn, (void *)(size_t)t);
 }
 
+/* The layer's first input and its output. */
+static inline const struct ggn_value *ggn_task_in(const struct ggn_task *t) { return &t->e->graph->value[t->l->in]; }
+static inline const struct ggn_value *ggn_task_out(const struct ggn_task *t) { return &t->e->graph->value[t->l->out]; }
+
 /* Element (0,0) of plane c of a value of image n, among the activations or their gradients. */
 static inline real *ggn_plane_in(const struct ggn_exec *e, real *base, int value, long n, int c)
 {

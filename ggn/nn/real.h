@@ -35,8 +35,10 @@ typedef double real;
 #define ggn_exec_create GGN_TYPED(ggn_exec_create)
 #define ggn_exec_destroy GGN_TYPED(ggn_exec_destroy)
 #define ggn_exec_plane GGN_TYPED(ggn_exec_plane)
+#define ggn_exec_output GGN_TYPED(ggn_exec_output)
 #define ggn_exec_grad GGN_TYPED(ggn_exec_grad)
 #define ggn_plane_copy GGN_TYPED(ggn_plane_copy)
+#define ggn_exec_load GGN_TYPED(ggn_exec_load)
 #define ggn_exec_forward GGN_TYPED(ggn_exec_forward)
 #define ggn_exec_backward GGN_TYPED(ggn_exec_backward)
 

@@ -99,16 +99,14 @@ static struct ggn_batch fill_batch(struct ggn_session *s, const struct fill *f, 
 static void generate(struct ggn_session *s, const float *const *planes, int count, int channel)
 {
     struct ggn_trainer *t = s->trainer;
-    const int n = 3 * s->hyper.window, out = t->m->graph->n_values - 1;
-    const struct ggn_value *in = &t->m->graph->value[0], *map = &t->d->graph->value[0];
+    const int n = 3 * s->hyper.window;
 
     for (int i = 0; i < count; i++)
         for (int k = 0; k < n; k++)
-            ggn_plane_copy(in, ggn_exec_plane(t->m, 0, i, k), planes[i * n + k], s->set.width);
+            ggn_exec_load(t->m, i, k, planes[i * n + k], s->set.width);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], count, GGN_EVAL);
     for (int i = 0; i < count; i++)
-        ggn_plane_copy(map, ggn_exec_plane(t->d, 0, i, channel), ggn_exec_plane(t->m, out, i, 0),
-                       t->m->graph->value[out].row);
+        ggn_exec_load(t->d, i, channel, ggn_exec_output(t->m, i, 0), ggn_graph_output(t->m->graph)->row);
 }
 
 /* With a residual, log2 of the law's error at the end of a window; else 0. */
@@ -147,7 +145,7 @@ enum { DENOISED_AT_ONCE = 4 }; /* images */
 static void denoise_images(const struct ggn_session *s, struct ggn_exec *exec, struct ggn_level_series *c, int first,
                            int count)
 {
-    const struct ggn_value *in = &exec->graph->value[0], *out = &exec->graph->value[exec->graph->n_values - 1];
+    const struct ggn_value *in = &exec->graph->value[0], *out = ggn_graph_output(exec->graph);
     const int width = s->set.width, height = s->set.height;
     const size_t values = ggn_series_set_values(&s->set);
 
@@ -157,7 +155,7 @@ static void denoise_images(const struct ggn_session *s, struct ggn_exec *exec, s
     ggn_exec_forward(exec, s->r, count, GGN_EVAL);
     for (int i = 0; i < count; i++)
         ggn_tile_store_u16(c->denoised + (size_t)(first + i) * values, width, height, 0, 0, width, height,
-                           ggn_exec_plane(exec, exec->graph->n_values - 1, i, 0), (size_t)out->row, out->plane);
+                           ggn_exec_output(exec, i, 0), (size_t)out->row, out->plane);
 }
 
 static int denoise_series(const struct ggn_session *s, struct ggn_exec *exec, struct ggn_level_series *c,

@@ -98,13 +98,12 @@ static void evaluate(struct ggn_session *s, int count, double *loss)
 {
     struct ggn_trainer *t = s->trainer;
     const struct ggn_value *in = &t->r->graph->value[0];
-    const int out = t->r->graph->n_values - 1;
     const size_t plane = (size_t)s->crop * (size_t)s->crop;
 
     for (int i = 0; i < count; i++)
         for (int c = 0; c < 3; c++) {
             const float *x = s->buffer + ((size_t)i * 6 + (size_t)c) * plane;
-            ggn_plane_copy(in, ggn_exec_plane(t->r, 0, i, c), x, in->w);
+            ggn_exec_load(t->r, i, c, x, in->w);
             /* the input's gradient is not used here: its planes hold the reference in the output's layout */
             ggn_plane_copy(in, ggn_exec_grad(t->r, 0, i, c), x + 3 * plane, in->w);
         }
@@ -112,7 +111,7 @@ static void evaluate(struct ggn_session *s, int count, double *loss)
     for (int i = 0; i < count; i++) {
         const float *x[3], *y[3];
         for (int c = 0; c < 3; c++) {
-            x[c] = ggn_exec_plane(t->r, out, i, c);
+            x[c] = ggn_exec_output(t->r, i, c);
             y[c] = ggn_exec_grad(t->r, 0, i, c);
         }
         loss[i] = 1 - ggn_ssim_mean(t->ssim, x, y, NULL, 3, in->row, 0);
