@@ -53,6 +53,19 @@ static int encoder_stage(struct ggn_graph *g, int x, int stage, int width)
     return x;
 }
 
+/* The encoder of both networks, up to the first convolution of its last stage. stages: [4] get the values before it. */
+static int encode(struct ggn_graph *g, int width, int stages[4])
+{
+    int x = 0;
+
+    for (int i = 0; i < 4; i++)
+        x = stages[i] = encoder_stage(g, x, i, width);
+    ggn_graph_stage(g, enc_name[4]);
+    x = ggn_graph_maxpool(g, x, 2);
+    x = ggn_graph_conv(g, x, -1, 16 * width, 3, 0, SLOPE);
+    return ggn_graph_bn(g, x);
+}
+
 /* Up to the size of value `like`: one zero row or column where that size is odd. */
 static int up_like(struct ggn_graph *g, int x, int like)
 {
@@ -62,15 +75,10 @@ static int up_like(struct ggn_graph *g, int x, int like)
 static void build_denoiser(struct ggn_graph *g, const struct ggn_hyper *p)
 {
     const int k = p->k_r;
-    int skip[4], x = 0;
+    int skip[4];
 
     ggn_graph_begin(g, "denoiser", 3, p->height, p->width);
-    for (int i = 0; i < 4; i++)
-        x = skip[i] = encoder_stage(g, x, i, k);
-    ggn_graph_stage(g, "enc4");
-    x = ggn_graph_maxpool(g, x, 2);
-    x = ggn_graph_conv(g, x, -1, 16 * k, 3, 0, SLOPE);
-    x = ggn_graph_bn(g, x);
+    int x = encode(g, k, skip);
     x = ggn_graph_conv(g, x, -1, 8 * k, 3, 0, SLOPE);
     x = up_like(g, x, skip[3]);
     ggn_graph_mark(g, x, "enc4");
@@ -93,15 +101,10 @@ static void build_denoiser(struct ggn_graph *g, const struct ggn_hyper *p)
 static void build_generator(struct ggn_graph *g, const struct ggn_hyper *p)
 {
     const int k = p->k_m;
-    int like[4], x = 0;
+    int like[4];
 
     ggn_graph_begin(g, "generator", 3 * p->window, p->height, p->width);
-    for (int i = 0; i < 4; i++)
-        x = like[i] = encoder_stage(g, x, i, k);
-    ggn_graph_stage(g, "enc4");
-    x = ggn_graph_maxpool(g, x, 2);
-    x = ggn_graph_conv(g, x, -1, 16 * k, 3, 0, SLOPE);
-    x = ggn_graph_bn(g, x);
+    int x = encode(g, k, like);
     ggn_graph_stage(g, "dec0");
     x = ggn_graph_conv(g, x, -1, 8 * k, 3, 1, SLOPE);
     x = ggn_graph_bn(g, x);
