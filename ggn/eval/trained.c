@@ -28,50 +28,34 @@ static void list_law(const struct run *r, const struct ggn_eval_block *b, double
     }
 }
 
-/* A block of a residual model. seen: [n_levels] */
-static int judge_by_law(const struct run *r, long index, struct ggn_viewer *viewer, struct ggn_seen *seen,
-                        struct base_err *err)
-{
-    const struct ggn_eval_block *b = &r->set->blocks[index];
-    const struct ggn_level_series *c = &r->set->images.series[b->series];
-    const int skipped = r->set->window - 1;
-    double *law = malloc((size_t)c->n_levels * sizeof *law);
-
-    if (!law)
-        return base_fail_nomem(err, r->method->name);
-    list_law(r, b, law);
-    viewer->law = law;
-    ggn_replay(c, &r->rule, ggn_viewer_logit, viewer, law, seen);
-    for (int i = skipped; i < c->n_levels; i++) {
-        size_t k = b->first + (size_t)(i - skipped);
-        r->method->score[k] = seen[i].p;
-        r->method->correction[k] = i > skipped && isnan(seen[i].p) ? r->method->correction[k - 1] : seen[i].correction;
-    }
-    free(law);
-    return 0;
-}
-
 static int judge_block(void *data, long index, int worker, struct base_err *err)
 {
     const struct run *r = data;
     const struct ggn_eval_block *b = &r->set->blocks[index];
     const struct ggn_level_series *c = &r->set->images.series[b->series];
-    const int skipped = r->set->window - 1;
-    struct ggn_seen *seen = malloc((size_t)c->n_levels * sizeof *seen);
+    const int skipped = r->set->window - 1, by_law = r->rule.reach > 0;
+    const size_t levels = (size_t)c->n_levels;
+    struct ggn_viewer *viewer = &r->viewers[worker];
+    struct ggn_seen *seen = malloc(levels * sizeof *seen);
+    double *law = by_law ? malloc(levels * sizeof *law) : NULL;
+    int rc = !seen || (by_law && !law) ? base_fail_nomem(err, r->method->name) : 0;
 
-    if (!seen)
-        return base_fail_nomem(err, r->method->name);
-    ggn_viewer_turn(&r->viewers[worker], c);
-    if (r->rule.reach > 0) {
-        int rc = judge_by_law(r, index, &r->viewers[worker], seen, err);
-        free(seen);
-        return rc;
+    if (!rc && by_law)
+        list_law(r, b, law);
+    if (!rc) {
+        ggn_viewer_turn(viewer, c);
+        viewer->law = law;
+        ggn_replay(c, &r->rule, ggn_viewer_logit, viewer, law, seen);
     }
-    ggn_replay(c, &r->rule, ggn_viewer_logit, &r->viewers[worker], NULL, seen);
-    for (int i = skipped; i < c->n_levels; i++)
-        r->method->score[b->first + (size_t)(i - skipped)] = seen[i].p;
+    for (int i = skipped; i < c->n_levels && !rc; i++) {
+        const size_t k = b->first + (size_t)(i - skipped);
+        r->method->score[k] = seen[i].p;
+        if (by_law)
+            r->method->correction[k] = i > skipped && isnan(seen[i].p) ? r->method->correction[k - 1] : seen[i].correction;
+    }
+    free(law);
     free(seen);
-    return 0;
+    return rc;
 }
 
 static int check_halves(const struct ggn_eval_set *s, const char *name, struct base_err *err)
