@@ -47,8 +47,6 @@ int ggn_cmd_fail(const char *command, const struct base_err *err);
 
 /* Under mpirun the processes of the job, else NULL. What a process says with ggn_cmd_fail is said once, by rank 0. */
 extern struct job *ggn_cmd_job;
-/* Rank 0 ends the job: the others leave it to be asked (base/interrupt.h). */
-void ggn_cmd_follow_rank_0(void);
 
 /* Reads the two pictures that a command compares, of equal size; says on stderr how many pixels of one could not be shown as
  * they are. images: zeroed; the caller releases both, also after a failure. */

@@ -385,7 +385,8 @@ int ggn_cmd_label(int argc, char **argv)
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
     base_interrupt_catch();
-    ggn_cmd_follow_rank_0();
+    if (job_rank(ggn_cmd_job) > 0) /* rank 0 ends the job */
+        base_interrupt_ignore();
     if ((o.trials || o.calibrate || o.check) && job_rank(ggn_cmd_job) > 0)
         return GGN_EXIT_OK;
     if (o.trials) {

@@ -24,12 +24,6 @@ struct job *ggn_cmd_job;
 
 static char last_words[512]; /* what a process other than rank 0 would have said */
 
-void ggn_cmd_follow_rank_0(void)
-{
-    if (job_rank(ggn_cmd_job) > 0)
-        base_interrupt_ignore();
-}
-
 int ggn_cmd_read_pair(const char *command, const char *const paths[2], struct pic_image images[2], struct base_err *err)
 {
     int rc = 0;

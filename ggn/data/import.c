@@ -189,29 +189,21 @@ static int check_finite(const char *path, const struct pic_image *p, struct base
     return 0;
 }
 
-/* Codes and, from files of light, linear values. */
-static int read_picture(const struct view *v, const char *file, struct pic_image *p, struct base_err *err)
+/* Codes and, from files of light, linear values. layer: those of the first half of the samples in the same file, without
+ * codes; NULL: the picture. */
+static int read_picture(const struct view *v, const char *file, const char *layer, struct pic_image *p, struct base_err *err)
 {
     char path[4400];
     snprintf(path, sizeof path, "%s/%s", v->dir, file);
-    int rc = strcmp(v->ending, ".rawls") == 0 ? ggn_rawls_read(path, p, err) : pic_read_light(path, p, err);
+    int rc = layer                              ? pic_read_layer(path, layer, p, err)
+             : strcmp(v->ending, ".rawls") == 0 ? ggn_rawls_read(path, p, err)
+                                                : pic_read_light(path, p, err);
     if (rc)
         return rc;
-    rc = p->u8 ? 0 : pic_encode(path, p, err);
+    rc = layer || p->u8 ? 0 : pic_encode(path, p, err);
     if (!rc)
         rc = check_finite(path, p, err);
     if (rc)
-        pic_release(p);
-    return rc;
-}
-
-/* The layer of the first half of the samples. */
-static int read_layer(const struct view *v, const char *file, struct pic_image *p, struct base_err *err)
-{
-    char path[4400];
-    snprintf(path, sizeof path, "%s/%s", v->dir, file);
-    int rc = pic_read_layer(path, HALF, p, err);
-    if (!rc && (rc = check_finite(path, p, err)) != 0)
         pic_release(p);
     return rc;
 }
@@ -230,14 +222,14 @@ static void pair_release(struct pair *p)
 
 static int read_pair(const struct view *v, const struct level *level, struct pair *p, struct base_err *err)
 {
-    int rc = read_picture(v, level->file, &p->all, err);
+    int rc = read_picture(v, level->file, NULL, &p->all, err);
     if (rc)
         return rc;
     p->has_half = level->half[0] || v->has_layers;
     if (level->half[0])
-        rc = read_picture(v, level->half, &p->half, err);
+        rc = read_picture(v, level->half, NULL, &p->half, err);
     else if (v->has_layers)
-        rc = read_layer(v, level->file, &p->half, err);
+        rc = read_picture(v, level->file, HALF, &p->half, err);
     if (!rc && p->has_half && (p->half.width != p->all.width || p->half.height != p->all.height))
         rc = base_fail(err, BASE_EINVAL, "%s/%s: %dx%d, its half has %dx%d", v->dir, level->file, p->all.width,
                        p->all.height, p->half.width, p->half.height);
@@ -249,7 +241,7 @@ static int read_pair(const struct view *v, const struct level *level, struct pai
 static int has_layers(const struct view *v)
 {
     struct pic_image half = {0};
-    int has = !strcmp(v->ending, ".exr") && !v->levels[0].half[0] && !read_layer(v, v->levels[0].file, &half, NULL);
+    int has = !strcmp(v->ending, ".exr") && !v->levels[0].half[0] && !read_picture(v, v->levels[0].file, HALF, &half, NULL);
     pic_release(&half);
     return has;
 }
@@ -410,7 +402,7 @@ static int init_manifest(const struct view *v, const struct ggn_import_options *
 {
     const int has_halves = v->has_layers || v->levels[0].half[0];
     struct pic_image first;
-    int rc = read_picture(v, v->levels[0].file, &first, err);
+    int rc = read_picture(v, v->levels[0].file, NULL, &first, err);
     if (rc)
         return rc;
     *m = (struct seq_manifest){.width = (uint32_t)first.width,
