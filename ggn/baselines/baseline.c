@@ -179,15 +179,15 @@ static int parse(struct ggn_baseline *b, const cJSON *root, const struct ggn_con
     return rc;
 }
 
-static int finish_load(struct ggn_baseline *b, struct ggn_container *c, const char *name, enum ggn_baseline_kind kind,
+int ggn_baseline_parse(struct ggn_baseline *b, const struct ggn_container *c, const char *name, enum ggn_baseline_kind kind,
                        struct base_err *err)
 {
     struct base_err inner = {0};
     cJSON *root = cJSON_Parse(c->json);
-    int rc = root ? parse(b, root, c, kind, &inner) : base_fail(&inner, BASE_EINVAL, "the description is not JSON");
 
+    *b = (struct ggn_baseline){0};
+    int rc = root ? parse(b, root, c, kind, &inner) : base_fail(&inner, BASE_EINVAL, "the description is not JSON");
     cJSON_Delete(root);
-    ggn_container_release(c);
     if (!rc)
         return 0;
     ggn_baseline_release(b);
@@ -200,17 +200,11 @@ int ggn_baseline_load(struct ggn_baseline *b, const char *path, enum ggn_baselin
     int rc = ggn_container_read(&c, path, err);
 
     *b = (struct ggn_baseline){0};
-    return rc ? rc : finish_load(b, &c, path, kind, err);
-}
-
-int ggn_baseline_load_memory(struct ggn_baseline *b, const char *name, const void *data, size_t size,
-                             enum ggn_baseline_kind kind, struct base_err *err)
-{
-    struct ggn_container c;
-    int rc = ggn_container_parse(&c, name, data, size, err);
-
-    *b = (struct ggn_baseline){0};
-    return rc ? rc : finish_load(b, &c, name, kind, err);
+    if (rc)
+        return rc;
+    rc = ggn_baseline_parse(b, &c, path, kind, err);
+    ggn_container_release(&c);
+    return rc;
 }
 
 /* --- judging ----------------------------------------------------------------------------------------------------------- */

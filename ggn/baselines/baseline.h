@@ -48,8 +48,9 @@ int ggn_baseline_save(const struct ggn_baseline *b, const char *path, enum ggn_t
 /* kind: the one that is expected, GGN_BASELINES: any. BASE_EINVAL with one line that names the file for anything that is no
  * such baseline. On failure *b is empty. */
 int ggn_baseline_load(struct ggn_baseline *b, const char *path, enum ggn_baseline_kind kind, struct base_err *err);
-int ggn_baseline_load_memory(struct ggn_baseline *b, const char *name, const void *data, size_t size,
-                             enum ggn_baseline_kind kind, struct base_err *err);
+/* The same of a file that was read already; `name` is for messages. */
+int ggn_baseline_parse(struct ggn_baseline *b, const struct ggn_container *c, const char *name, enum ggn_baseline_kind kind,
+                       struct base_err *err);
 
 /* Features of one image of width x height: tiles times b->features. */
 size_t ggn_baseline_feature_count(const struct ggn_baseline *b, int width, int height);

@@ -75,7 +75,7 @@ int ggn_cmd_inspect(int argc, char **argv)
 
     if (base_options_parse(&options, argc, argv, &o, &err) || ggn_container_read(&c, o.path, &err))
         return ggn_cmd_fail(argv[0], &err);
-    int rc = ggn_model_load_memory(o.path, c.data, c.size, &model, &err);
+    int rc = ggn_model_parse(&c, o.path, &model, &err);
     if (!rc && o.json)
         printf("%s\n", c.json);
     else if (!rc)

@@ -139,12 +139,11 @@ static int from_container(const struct ggn_container *c, struct ggn_model **mode
     return 0;
 }
 
-static int finish_load(struct ggn_container *c, const char *name, struct ggn_model **model, struct base_err *err)
+int ggn_model_parse(const struct ggn_container *c, const char *name, struct ggn_model **model, struct base_err *err)
 {
     struct base_err inner = {0};
     int rc = from_container(c, model, &inner);
 
-    ggn_container_release(c);
     return rc ? base_fail(err, rc, "%s: %s", name, inner.text) : 0;
 }
 
@@ -152,14 +151,12 @@ int ggn_model_load(const char *path, struct ggn_model **model, struct base_err *
 {
     struct ggn_container c;
     int rc = ggn_container_read(&c, path, err);
-    return rc ? rc : finish_load(&c, path, model, err);
-}
 
-int ggn_model_load_memory(const char *name, const void *data, size_t size, struct ggn_model **model, struct base_err *err)
-{
-    struct ggn_container c;
-    int rc = ggn_container_parse(&c, name, data, size, err);
-    return rc ? rc : finish_load(&c, name, model, err);
+    if (rc)
+        return rc;
+    rc = ggn_model_parse(&c, path, model, err);
+    ggn_container_release(&c);
+    return rc;
 }
 
 int ggn_model_save(const struct ggn_model *m, const char *path, enum ggn_type type, struct base_err *err)

@@ -25,7 +25,8 @@ void ggn_model_destroy(struct ggn_model *model);
 
 /* BASE_EINVAL with one line that names the file for anything that is not a model this program can run. */
 int ggn_model_load(const char *path, struct ggn_model **model, struct base_err *err);
-int ggn_model_load_memory(const char *name, const void *data, size_t size, struct ggn_model **model, struct base_err *err);
+/* The same of a file that was read already; `name` is for messages. */
+int ggn_model_parse(const struct ggn_container *c, const char *name, struct ggn_model **model, struct base_err *err);
 /* Atomic. `type` is that of the convolution and linear weights; biases, batch norm and statistics are always f32. */
 int ggn_model_save(const struct ggn_model *model, const char *path, enum ggn_type type, struct base_err *err);
 

@@ -82,6 +82,7 @@ static void judge_by(const struct ggn_baseline *b)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
+    struct ggn_container c;
     struct ggn_model *m = NULL;
     struct ggn_baseline b;
     uint8_t *copy = malloc(size + 1);
@@ -92,16 +93,19 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     for (int mended = 0; mended < 2; mended++) {
         if (mended && size >= 64)
             mend(copy, size);
-        if (ggn_model_load_memory("fuzz", copy, size, &m, NULL) == 0) {
+        if (ggn_container_parse(&c, "fuzz", copy, size, NULL))
+            continue;
+        if (ggn_model_parse(&c, "fuzz", &m, NULL) == 0) {
             if (m->hyper.height * m->hyper.width <= 64 * 64)
                 decide(m);
             ggn_model_destroy(m);
         }
-        if (ggn_baseline_load_memory(&b, "fuzz", copy, size, GGN_BASELINES, NULL) == 0) {
+        if (ggn_baseline_parse(&b, &c, "fuzz", GGN_BASELINES, NULL) == 0) {
             if (b.height * b.width <= 64 * 64)
                 judge_by(&b);
             ggn_baseline_release(&b);
         }
+        ggn_container_release(&c);
     }
     free(copy);
     return 0;

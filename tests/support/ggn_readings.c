@@ -38,10 +38,15 @@ static char *model(size_t items, size_t *size)
 static double read_model(char *bytes, size_t size, size_t items)
 {
     struct ggn_model *m = NULL;
+    struct ggn_container c;
     struct base_err err = {0};
     double start_s = base_clock_thread_s();
-    double s = ended(start_s, ggn_model_load_memory("model", bytes, size, &m, &err), &err);
+    int rc = ggn_container_parse(&c, "model", bytes, size, &err);
+    if (!rc)
+        rc = ggn_model_parse(&c, "model", &m, &err);
+    double s = ended(start_s, rc, &err);
     (void)items;
+    ggn_container_release(&c);
     ggn_model_destroy(m);
     free(bytes);
     return s;

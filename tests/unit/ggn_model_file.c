@@ -83,9 +83,13 @@ static void test_round_trip(void **state)
 static void refuse(const char *data, size_t size, const char *expected)
 {
     struct ggn_model *m = NULL;
+    struct ggn_container c;
     struct base_err err = {0};
-    int rc = ggn_model_load_memory("m.ggn", data, size, &m, &err);
+    int rc = ggn_container_parse(&c, "m.ggn", data, size, &err);
 
+    if (!rc)
+        rc = ggn_model_parse(&c, "m.ggn", &m, &err);
+    ggn_container_release(&c);
     assert_int_equal(rc, BASE_EINVAL);
     assert_null(m);
     assert_null(strchr(err.text, '\n'));
