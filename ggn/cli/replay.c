@@ -18,11 +18,12 @@
 enum { MAX_FILES = 16, MAX_ADJUSTED = 8, USUAL_WINDOW = 6 };
 
 struct options {
-    const char *data, *validation, *test, *observer, *out;
+    struct ggn_eval_options set;
+    const char *observer, *out;
     const char *models[MAX_FILES], *baselines[MAX_FILES];
     int n_models, n_baselines, n_adjusted;
-    int window, precision, no_quality, no_ssim, no_halves, recorded, threads;
-    double visible, cadence, ratio;
+    int precision, no_quality, threads;
+    double visible;
     struct {
         char name[16];
         double value;
@@ -50,11 +51,11 @@ static const char *const precisions[] = {"f32", "f64", NULL}; /* enum ggn_precis
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
     {.help = "What is replayed:"},
-    {"data", 'd', "DATA", TO(data), .input = BASE_FOLDER, .needed = 1,
+    {"data", 'd', "DATA", TO(set.dir), .input = BASE_FOLDER, .needed = 1,
      .help = "labelled data set: a folder of sequences (needed)"},
-    {"validation", 'V', "SCENE,...", TO(validation),
+    {"validation", 'V', "SCENE,...", TO(set.split.validation),
      .help = "validation scenes, over the split of the data set or the models"},
-    {"test", 'T', "SCENE,...", TO(test), .help = "test scenes, likewise"},
+    {"test", 'T', "SCENE,...", TO(set.split.test), .help = "test scenes, likewise"},
     {"model", 'm', "FILE", BASE_TO_LIST(struct options, models, n_models, "models"), .input = BASE_FILE,
      .help = "trained model (.ggn); may be repeated"},
     {"baseline", 0, "FILE", BASE_TO_LIST(struct options, baselines, n_baselines, "baselines"), .input = BASE_FILE,
@@ -67,15 +68,16 @@ static const struct base_option list[] = {
      .help = "share of viewers that may still see noise (that of the files)"},
     {"param", 'p', "KEY=NUMBER", .set = add_adjusted,
      .help = "judge as the criterion does with this parameter: visible, passes, first-spp"},
-    {"cadence", 0, "R", TO(cadence), 1.02, 16, .help = "simulate all levels, this far apart, and ask as often"},
-    {"ratio", 0, "R", TO(ratio), 1, 16, .help = "thin the levels, and the checks, to this ratio of samples; else keep all"},
-    {"recorded", 0, NULL, TO(recorded),
+    {"cadence", 0, "R", TO(set.cadence), 1.02, 16, .help = "simulate all levels, this far apart, and ask as often"},
+    {"ratio", 0, "R", TO(set.ratio), 1, 16,
+     .help = "thin the levels, and the checks, to this ratio of samples; else keep all"},
+    {"recorded", 0, NULL, TO(set.recorded),
      .help = "recorded levels only, instead of going on with the samples of the reference"},
-    {"window", 'w', "S", TO(window), 1, 16, .help = "levels that a window has at least (as the models say, or 6)"},
+    {"window", 'w', "S", TO(set.window), 1, 16, .help = "levels that a window has at least (as the models say, or 6)"},
     {"precision", 0, NULL, TO(precision), .words = precisions, .help = "of the networks' arithmetic (f32)"},
-    {"no-pictures", 0, NULL, TO(no_halves), .help = "networks as in a host without half buffers"},
+    {"no-pictures", 0, NULL, TO(set.without_halves), .help = "networks as in a host without half buffers"},
     {"no-quality", 0, NULL, TO(no_quality), .help = "skip FLIP and SSIM"},
-    {"no-ssim", 0, NULL, TO(no_ssim), .help = "skip SSIM"},
+    {"no-ssim", 0, NULL, TO(set.no_ssim), .help = "skip SSIM"},
     {"threads", 't', "N", TO(threads), 1, 1024, .help = "worker threads (all processors)"},
     {0}};
 
@@ -95,8 +97,10 @@ static void adjust(const struct options *o, struct ggn_policy *policy)
         policy->threshold = o->visible;
     for (int i = 0; i < o->n_adjusted; i++)
         ggn_policy_adjust(policy, o->adjusted[i].name, o->adjusted[i].value);
-    if (o->cadence > 0)
-        policy->ratio = o->cadence, policy->n_levels = 0;
+    if (o->set.cadence > 0) {
+        policy->ratio = o->set.cadence;
+        policy->n_levels = 0;
+    }
 }
 
 /* --- what is not as in a render --- */
@@ -157,19 +161,12 @@ static int load_models(struct replay *r, struct ggn_eval_options *eo, struct bas
 
 static int load(struct replay *r, struct base_err *err)
 {
-    const struct options *o = r->o;
-    struct ggn_eval_options eo = {.dir = o->data,
-                                  .split = {.validation = o->validation, .test = o->test, .learned = r->learned},
-                                  .window = o->window,
-                                  .quality = !o->no_quality,
-                                  .no_ssim = o->no_ssim,
-                                  .recorded = o->recorded,
-                                  .ratio = o->ratio,
-                                  .cadence = o->cadence,
-                                  .seed = 1,
-                                  .without_halves = o->no_halves};
-    eo.split.n_learned = o->n_models;
-    r->threads = base_threads_create(o->threads, err);
+    struct ggn_eval_options eo = r->o->set;
+    eo.quality = !r->o->no_quality;
+    eo.seed = 1;
+    eo.split.learned = r->learned;
+    eo.split.n_learned = r->o->n_models;
+    r->threads = base_threads_create(r->o->threads, err);
     int rc = r->threads ? load_models(r, &eo, err) : err->code;
     if (rc)
         return rc;

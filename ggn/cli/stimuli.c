@@ -10,19 +10,15 @@
 
 struct options {
     const char *views[GGN_SHOWN_MAX_VIEWS];
-    int n_views, task, block;
-    uint32_t spp_min, spp_max;
-    double spacing;
-    const char *dir;
-    enum ggn_shown_kind kinds[GGN_SHOWN_KINDS];
-    int n_kinds;
+    struct ggn_shown_request request;
+    int task;
 };
 
 static int set_kinds(void *into, const char *value, struct base_err *err)
 {
-    struct options *o = into;
+    struct ggn_shown_request *q = &((struct options *)into)->request;
     unsigned seen = 0;
-    o->n_kinds = 0;
+    q->n_kinds = 0;
     for (const char *at = value; at; at = strchr(at, ',') ? strchr(at, ',') + 1 : NULL) {
         int k = GGN_SHOWN_KINDS - 1;
         while (k > 0 && (strncmp(at, ggn_shown_kind_names[k], strlen(ggn_shown_kind_names[k])) != 0 ||
@@ -31,7 +27,7 @@ static int set_kinds(void *into, const char *value, struct base_err *err)
         if (k == 0 || (seen & 1u << k))
             return base_fail(err, BASE_EINVAL, "expected some of noisy,denoised,blend, each once");
         seen |= 1u << k;
-        o->kinds[o->n_kinds++] = (enum ggn_shown_kind)k;
+        q->kinds[q->n_kinds++] = (enum ggn_shown_kind)k;
     }
     return 0;
 }
@@ -40,15 +36,16 @@ static const char *const task_words[] = {"adjustment", "2ifc", "validation", NUL
 
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
-    {"output", 'o', "DIR", TO(dir), .needed = 1, .help = "where a folder v0, v1, … of each view is made (required)"},
+    {"output", 'o', "DIR", TO(request.dir), .needed = 1, .help = "where a folder v0, v1, … of each view is made (required)"},
     {"task", 0, NULL, TO(task), .words = task_words,
      .help = "what people are asked: validation takes whole pictures, 2ifc alone clips and kinds (2ifc)"},
     {"kinds", 0, "LIST", .set = set_kinds,
      .help = "of pictures rendered with --denoise, what is shown: some of noisy,denoised,blend, a view of each"},
-    {"spacing", 0, "OCTAVES", TO(spacing), 0.01, 4, .help = "leave out levels that are nearer than that (0.15)"},
-    {"spp-min", 0, "N", TO(spp_min), 1, 1e9, .help = "leave out levels below (1)"},
-    {"spp-max", 0, "N", TO(spp_max), 1, 1e9, .help = "leave out levels above (1000000)"},
-    {"block", 0, "PIXELS", TO(block), 8, 4096, .help = "side of a block when the view is a folder of pictures (200)"},
+    {"spacing", 0, "OCTAVES", TO(request.spacing), 0.01, 4, .help = "leave out levels that are nearer than that (0.15)"},
+    {"spp-min", 0, "N", TO(request.spp_min), 1, 1e9, .help = "leave out levels below (1)"},
+    {"spp-max", 0, "N", TO(request.spp_max), 1, 1e9, .help = "leave out levels above (1000000)"},
+    {"block", 0, "PIXELS", TO(request.block), 8, 4096,
+     .help = "side of a block when the view is a folder of pictures (200)"},
     {0}};
 #undef TO
 
@@ -95,22 +92,14 @@ static int print_shown(const struct ggn_shown *s, enum ggn_shown_task task, stru
     return rc;
 }
 
-static int make(const struct options *o, struct ggn_shown *shown, struct base_err *err)
+static int make(struct options *o, struct ggn_shown *shown, struct base_err *err)
 {
-    struct ggn_shown_request q = {.dir = o->dir,
-                                  .task = (enum ggn_shown_task)o->task,
-                                  .views = o->views,
-                                  .n_views = o->n_views,
-                                  .n_kinds = o->n_kinds,
-                                  .block = o->block,
-                                  .spacing = o->spacing,
-                                  .spp_min = o->spp_min,
-                                  .spp_max = o->spp_max};
-    memcpy(q.kinds, o->kinds, sizeof q.kinds);
-    if (o->n_kinds && o->task != GGN_SHOWN_TWO_INTERVAL)
+    o->request.task = (enum ggn_shown_task)o->task;
+    o->request.views = o->views;
+    if (o->request.n_kinds && o->task != GGN_SHOWN_TWO_INTERVAL)
         return base_fail(err, BASE_EINVAL, "--kinds does nothing in this task (%s)", task_words[o->task]);
     struct base_threads *threads = base_threads_create(base_threads_available(), err);
-    int rc = threads ? ggn_shown_make(&q, shown, threads, err) : err->code;
+    int rc = threads ? ggn_shown_make(&o->request, shown, threads, err) : err->code;
     base_threads_destroy(threads);
     return rc;
 }
@@ -123,7 +112,7 @@ int ggn_cmd_stimuli(int argc, char **argv)
         .args_min = 1,
         .args_max = GGN_SHOWN_MAX_VIEWS,
         .args = offsetof(struct options, views),
-        .arg_count = offsetof(struct options, n_views),
+        .arg_count = offsetof(struct options, request.n_views),
         .doc =
             "Writes what people are shown of recorded sequences or folders of pictures, each picture of a block a PNG, and "
             "prints as JSON which views, blocks and levels there are. `lull-study init` runs it."};
@@ -132,8 +121,8 @@ int ggn_cmd_stimuli(int argc, char **argv)
     struct base_err err = {0};
     int rc = o ? 0 : base_fail_nomem(&err, "options");
     if (!rc) {
-        *o = (struct options){
-            .task = GGN_SHOWN_TWO_INTERVAL, .block = 200, .spp_min = 1, .spp_max = 1000000, .spacing = 0.15};
+        *o = (struct options){.task = GGN_SHOWN_TWO_INTERVAL,
+                              .request = {.block = 200, .spp_min = 1, .spp_max = 1000000, .spacing = 0.15}};
         rc = base_options_parse(&options, argc, argv, o, &err);
     }
     if (!rc)
