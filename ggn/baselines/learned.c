@@ -18,15 +18,17 @@ void ggn_feature_set_release(struct ggn_feature_set *t)
     *t = (struct ggn_feature_set){0};
 }
 
-struct extraction {
-    const struct ggn_baseline *baseline;
+/* A baseline at work on the blocks of a set. */
+struct work {
     const struct ggn_eval_set *set;
+    const struct ggn_baseline *baseline;
     const struct ggn_feature_set *features;
+    struct ggn_method *method; /* gets the scores, once there are features */
 };
 
 static int extract_block(void *data, long index, int worker, struct base_err *err)
 {
-    const struct extraction *j = data;
+    const struct work *j = data;
     const struct ggn_level_series *c = &j->set->images.series[j->set->blocks[index].series];
     int w = j->set->images.width, h = j->set->images.height;
     struct ggn_baseline_reader *r = ggn_baseline_reader_create(j->baseline, err);
@@ -43,7 +45,7 @@ static int extract_block(void *data, long index, int worker, struct base_err *er
 int ggn_feature_set_make(struct ggn_feature_set *t, const struct ggn_baseline *b, const struct ggn_eval_set *s,
                          struct base_threads *threads, struct base_err *err)
 {
-    struct extraction j = {b, s, t};
+    struct work j = {s, b, t, NULL};
     size_t rows = 0;
     *t = (struct ggn_feature_set){.size = ggn_baseline_feature_count(b, s->images.width, s->images.height),
                                   .first = malloc(((size_t)s->n_blocks + 1) * sizeof *t->first)};
@@ -183,15 +185,8 @@ int ggn_baseline_train(struct ggn_baseline *b, const struct ggn_feature_set *t, 
 
 /* --- judging --- */
 
-struct replaying {
-    const struct ggn_eval_set *set;
-    const struct ggn_baseline *baseline;
-    const struct ggn_feature_set *features;
-    struct ggn_method *method;
-};
-
 struct one_block {
-    const struct replaying *j;
+    const struct work *j;
     struct ggn_baseline_reader *reader;
     const double *first; /* features of its level 0 */
 };
@@ -207,7 +202,7 @@ static double window_logit(void *data, const int *levels)
 
 static int judge_block(void *data, long index, int worker, struct base_err *err)
 {
-    const struct replaying *j = data;
+    const struct work *j = data;
     const struct ggn_eval_block *b = &j->set->blocks[index];
     const struct ggn_level_series *c = &j->set->images.series[b->series];
     const struct ggn_stop_rule rule = {.policy = j->baseline->policy, .window = j->baseline->window};
@@ -228,7 +223,7 @@ static int judge_block(void *data, long index, int worker, struct base_err *err)
 int ggn_method_baseline(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_baseline *b,
                         const struct ggn_feature_set *features, struct base_threads *threads, struct base_err *err)
 {
-    struct replaying j = {s, b, features, m};
+    struct work j = {s, b, features, m};
     int rc = ggn_method_init(m, s, ggn_baseline_titles[b->kind], 0, err);
     if (rc)
         return rc;

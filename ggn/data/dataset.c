@@ -193,21 +193,20 @@ int ggn_dataset_first(const struct ggn_dataset *data, int view)
     return i;
 }
 
-int ggn_dataset_scene(const struct ggn_dataset *data, int view)
+static int scenes_before(const struct ggn_dataset *data, int view)
 {
     int n = 0;
-    for (int i = 0, first = ggn_dataset_first(data, view); i < first; i++)
+    for (int i = 0; i < view; i++)
         n += ggn_dataset_first(data, i) == i;
     return n;
 }
 
-int ggn_dataset_scenes(const struct ggn_dataset *data)
+int ggn_dataset_scene(const struct ggn_dataset *data, int view)
 {
-    int n = 0;
-    for (int i = 0; i < data->n; i++)
-        n += ggn_dataset_first(data, i) == i;
-    return n;
+    return scenes_before(data, ggn_dataset_first(data, view));
 }
+
+int ggn_dataset_scenes(const struct ggn_dataset *data) { return scenes_before(data, data->n); }
 
 uint32_t ggn_dataset_tiles(const struct ggn_dataset_view *view)
 {

@@ -110,16 +110,14 @@ int ggn_stimuli_make(struct ggn_stimuli *s, int level, uint8_t *test, struct bas
         return 0;
     }
     const struct seq_record *r = &b->levels[level];
-    if (s->scale && (seq_has(r, SEQ_PLANE_MEAN_F16) || seq_has(r, SEQ_PLANE_FINE))) {
-        int rc = seq_mean(b, r, s->work, err);
-        if (rc)
-            return rc;
-        for (size_t i = 0; i < 3 * pixels; i++)
-            s->work[i] -= s->base[i];
-        seq_simulate(s->base, s->work, 3 * pixels, seq_reference_scale(b->reference->spp, r->spp), s->work);
-    } else {
+    if (!s->scale || !(seq_has(r, SEQ_PLANE_MEAN_F16) || seq_has(r, SEQ_PLANE_FINE)))
         return seq_display(b, r, test, err);
-    }
+    int rc = seq_mean(b, r, s->work, err);
+    if (rc)
+        return rc;
+    for (size_t i = 0; i < 3 * pixels; i++)
+        s->work[i] -= s->base[i];
+    seq_simulate(s->base, s->work, 3 * pixels, seq_reference_scale(b->reference->spp, r->spp), s->work);
     encode(s->work, pixels, test);
     return 0;
 }
