@@ -18,6 +18,7 @@ static const double CLEAN_END = 0.4;     /* a threshold below this share of the 
 /* One block's source. */
 struct source {
     float *base, *d, *last; /* [3][P] linear: the converged image, the half-buffer difference, the last recorded level */
+    float *noise;           /* [3][P] of the level that is made; `base` owns all four */
     /* n_reference infinite: `base` is the mean of the full level and stands for the converged image */
     double n_full, n_reference;
 };
@@ -38,30 +39,30 @@ static int choose_levels(double *spp, double from, double first, double ratio, d
 
 /* The running mean X_n of independent samples is, backwards, a walk: X_n − X_N has variance σ²·(1/n − 1/N), with independent
  * increments in 1/n. From the reference down to the fewest samples each step adds ±D·√(n_full·Δ(1/n)), the sign drawn per
- * pixel: D² estimates σ²/n_full there and keeps the colour of the noise. `noise` takes one step from `above` to n samples.
+ * pixel: D² estimates σ²/n_full there and keeps the colour of the noise. The noise takes one step from `above` to n samples.
  */
-static void step_down(const struct source *s, size_t pixels, double n, double above, uint32_t seed, float *noise)
+static void step_down(const struct source *s, size_t pixels, double n, double above, uint32_t seed)
 {
     const float step = (float)sqrt(s->n_full * (1 / n - 1 / above)); /* seq_noise_scale, where above is infinite */
 
     for (size_t p = 0; p < pixels; p++) {
         float signed_step = ggn_hash((uint32_t)p, seed) & 1 ? step : -step;
         for (size_t i = p; i < 3 * pixels; i += pixels)
-            noise[i] += signed_step * s->d[i];
+            s->noise[i] += signed_step * s->d[i];
     }
 }
 
 /* Level k of the series, whose mean is (a·(base + noise) + b·last)/(a + b), in display codes, and what is measured of it.
  * The measure's D is that of the full level, whose signs the noise has not kept: noise of its own, as of other samples, but
  * large in the same pixels. */
-static void fill_level(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const struct source *s,
-                       const float *noise, double a, double b)
+static void fill_level(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const struct source *s, double a,
+                       double b)
 {
     const size_t values = ggn_series_set_values(set);
     uint8_t *out = c->noisy + values * (size_t)k;
 
     for (size_t v = 0; v < values; v++)
-        out[v] = ggn_preprocess((b * (double)s->last[v] + a * (double)(s->base[v] + noise[v])) / (a + b), NULL, NULL);
+        out[v] = ggn_preprocess((b * (double)s->last[v] + a * (double)(s->base[v] + s->noise[v])) / (a + b), NULL, NULL);
     if (set->meter.memory)
         ggn_series_measure(set, c, k, s->base, s->d, seq_noise_scale(s->n_full, c->spp[k]), 1);
     else
@@ -76,18 +77,24 @@ static void see_texture(const struct ggn_series_set *set, struct ggn_level_serie
         ggn_series_measure(set, c, k, s->base, s->d, 1, 0);
 }
 
-static void fill_levels(const struct ggn_series_set *set, struct ggn_level_series *c, const struct source *s, float *noise,
-                        uint32_t seed)
+/* Gives the series these levels in the place of those that it has. */
+static int make_levels(const struct ggn_series_set *set, struct ggn_level_series *c, const struct source *s,
+                       const double *spp, int n, uint32_t seed, struct base_err *err)
 {
-    const size_t pixels = ggn_series_set_values(set) / 3;
+    const size_t values = ggn_series_set_values(set);
+    int rc = ggn_series_grow(set, c, n ? n : 1, err);
 
+    if (rc)
+        return rc;
+    c->n_levels = n;
+    memcpy(c->spp, spp, (size_t)n * sizeof *spp);
     see_texture(set, c, 0, s);
-    memset(noise, 0, 3 * pixels * sizeof *noise);
-    for (int k = c->n_levels - 1; k >= 0; k--) {
-        step_down(s, pixels, c->spp[k], k + 1 < c->n_levels ? c->spp[k + 1] : s->n_reference, ggn_hash((uint32_t)k, seed),
-                  noise);
-        fill_level(set, c, k, s, noise, 1, 0);
+    memset(s->noise, 0, values * sizeof *s->noise);
+    for (int k = n - 1; k >= 0; k--) {
+        step_down(s, values / 3, spp[k], k + 1 < n ? spp[k + 1] : s->n_reference, ggn_hash((uint32_t)k, seed));
+        fill_level(set, c, k, s, 1, 0);
     }
+    return 0;
 }
 
 /* An empty series of the same block. */
@@ -106,19 +113,11 @@ static int make_series(struct ggn_series_set *set, const struct ggn_level_series
                        const struct source *s, uint32_t seed, struct base_err *err)
 {
     double spp[MAX_LEVELS];
-    float *noise = malloc(ggn_series_set_values(set) * sizeof *noise);
     const double ratio = set->ratio > 1.01 ? set->ratio : 1.15;
     int n = choose_levels(spp, 0, set->first_spp, ratio, HIGHEST_SHARE * s->n_reference, 1, seed);
 
     begin_copy(c, recorded);
-    c->n_levels = n;
-    int rc = noise ? ggn_series_grow(set, c, n ? n : 1, err) : base_fail_nomem(err, "synthetic images");
-    if (!rc) {
-        memcpy(c->spp, spp, (size_t)n * sizeof *spp);
-        fill_levels(set, c, s, noise, seed);
-    }
-    free(noise);
-    return rc;
+    return make_levels(set, c, s, spp, n, seed, err);
 }
 
 /* with_reference 0: as if none had been recorded. */
@@ -155,11 +154,11 @@ static int read_source(const struct ggn_series_set *set, const struct ggn_level_
 static int source_init(struct source *s, const struct ggn_series_set *set, struct base_err *err)
 {
     size_t values = ggn_series_set_values(set);
-    float *memory = malloc(3 * values * sizeof *memory);
+    float *memory = malloc(4 * values * sizeof *memory);
 
     if (!memory)
         return base_fail_nomem(err, "synthetic images");
-    *s = (struct source){.base = memory, .d = memory + values, .last = memory + 2 * values};
+    *s = (struct source){.base = memory, .d = memory + values, .last = memory + 2 * values, .noise = memory + 3 * values};
     return 0;
 }
 
@@ -192,20 +191,20 @@ static int extend_series(const struct ggn_series_set *set, struct ggn_level_seri
     const double n0 = c->spp[first - 1], ratio = set->ratio > 1.01 ? set->ratio : 1.15;
     double spp[MAX_LEVELS];
     int n = choose_levels(spp, n0, n0 * ratio, ratio, HIGHEST_SHARE * s->n_reference, 0, seed);
-    float *noise = calloc(values, sizeof *noise);
-    int rc = noise ? ggn_series_grow(set, c, first + n, err) : base_fail_nomem(err, "synthetic images");
-    if (!rc && n)
+    int rc = ggn_series_grow(set, c, first + n, err);
+    if (rc)
+        return rc;
+    if (n)
         see_texture(set, c, first + n - 1, s);
-    for (int k = n - 1; !rc && k >= 0; k--) {
+    memset(s->noise, 0, values * sizeof *s->noise);
+    for (int k = n - 1; k >= 0; k--) {
         double m = spp[k] - n0;
-        step_down(s, values / 3, m, k + 1 < n ? spp[k + 1] - n0 : s->n_reference, ggn_hash((uint32_t)k, seed), noise);
+        step_down(s, values / 3, m, k + 1 < n ? spp[k + 1] - n0 : s->n_reference, ggn_hash((uint32_t)k, seed));
         c->spp[first + k] = spp[k];
-        fill_level(set, c, first + k, s, noise, m, n0);
+        fill_level(set, c, first + k, s, m, n0);
     }
-    free(noise);
-    if (!rc)
-        c->n_levels += n;
-    return rc;
+    c->n_levels += n;
+    return 0;
 }
 
 /* Without a reference: levels up to SEQ_SIMULATED_CAP in place of the recorded ones. */
@@ -217,15 +216,8 @@ static int simulate_series(const struct ggn_series_set *set, struct ggn_level_se
         choose_levels(spp, 0, set->first_spp < 16 ? set->first_spp : 16, ratio, SEQ_SIMULATED_CAP / ratio, jittered, seed);
 
     spp[n++] = SEQ_SIMULATED_CAP;
-    float *noise = malloc(ggn_series_set_values(set) * sizeof *noise);
-    int rc = !noise ? base_fail_nomem(err, "simulated images") : n > c->n_levels ? ggn_series_grow(set, c, n, err) : 0;
-    if (!rc) {
-        c->n_levels = n;
-        c->simulated = 1;
-        memcpy(c->spp, spp, (size_t)n * sizeof *spp);
-        fill_levels(set, c, s, noise, seed);
-    }
-    free(noise);
+    int rc = make_levels(set, c, s, spp, n, seed, err);
+    c->simulated |= !rc;
     return rc;
 }
 
