@@ -15,7 +15,7 @@
 
 struct options {
     const char *dir, *thresholds, *out;
-    int block, allow_gaps;
+    struct ggn_import_options how;
 };
 
 #define TO(member) BASE_TO(struct options, member)
@@ -24,8 +24,8 @@ static const struct base_option list[] = {
      .help = "data set to write, one folder per view (needed)"},
     {"thresholds", 't', "CSV", TO(thresholds), .input = BASE_FILE,
      .help = "human thresholds, name;t0;…;t15; (written as labels)"},
-    {"block", 'b', "PIXELS", TO(block), 1, 4096, .help = "side of a block (200)"},
-    {"allow-gaps", 'g', NULL, TO(allow_gaps), .help = "take evenly spaced levels of which some are missing"},
+    {"block", 'b', "PIXELS", TO(how.block), 1, 4096, .help = "side of a block (200)"},
+    {"allow-gaps", 'g', NULL, TO(how.allow_gaps), .help = "take evenly spaced levels of which some are missing"},
     {0}};
 
 static void show_progress(void *data, const char *view, int done, int of)
@@ -34,7 +34,7 @@ static void show_progress(void *data, const char *view, int done, int of)
     fprintf(stderr, "\r%s: %d of %d images%s", view, done, of, done == of ? "\n" : "");
 }
 
-static int import_one(const struct options *o, const struct ggn_import_options *so, const char *dir, struct base_err *err)
+static int import_one(const struct options *o, const char *dir, struct base_err *err)
 {
     char copy[4096], out[4096];
     int labelled = 0;
@@ -45,7 +45,7 @@ static int import_one(const struct options *o, const struct ggn_import_options *
     if (!rc && base_file_is_same(out, copy))
         rc = base_fail(err, BASE_EINVAL, "%s: this is the view itself; --output names another folder", out);
     if (!rc)
-        rc = ggn_import_view(copy, out, so, &labelled, err);
+        rc = ggn_import_view(copy, out, &o->how, &labelled, err);
     if (!rc)
         printf("%s: %s\n", out, labelled ? "imported with thresholds" : "imported, no thresholds for it");
     return rc;
@@ -54,7 +54,7 @@ static int import_one(const struct options *o, const struct ggn_import_options *
 static int is_visible(const struct dirent *e) { return e->d_name[0] != '.'; }
 
 /* Every view folder in the root, in order of name. */
-static int import_all(const struct options *o, const struct ggn_import_options *so, struct base_err *err)
+static int import_all(const struct options *o, struct base_err *err)
 {
     struct dirent **entries;
     int rc = 0, found = 0, n = scandir(o->dir, &entries, is_visible, alphasort);
@@ -69,7 +69,7 @@ static int import_all(const struct options *o, const struct ggn_import_options *
             !S_ISDIR(st.st_mode) || !ggn_import_is_view(path))
             continue;
         found++;
-        rc = import_one(o, so, path, err);
+        rc = import_one(o, path, err);
     }
     free(entries);
     if (!rc && !found)
@@ -88,7 +88,7 @@ int ggn_cmd_import(int argc, char **argv)
         .doc = "Reads pictures of rising sample counts (VIEW/NAME_00020.png …, .jpg, .exr or .rawls; DIR is one view or the "
                "folder of all) into block sequences, with the halves of their samples where there are any "
                "(NAME_half_00020.exr …, or the layer half). Running it again continues where it stopped."};
-    struct options o = {.block = 200};
+    struct options o = {.how = {.block = 200, .progress = isatty(2) ? show_progress : NULL}};
     struct ggn_thresholds thresholds = {0};
     struct base_err err = {0};
 
@@ -96,17 +96,15 @@ int ggn_cmd_import(int argc, char **argv)
     if (rc)
         return ggn_cmd_fail(argv[0], &err);
     base_interrupt_catch();
-    struct ggn_import_options so = {
-        .block = o.block, .allow_gaps = o.allow_gaps, .progress = isatty(2) ? show_progress : NULL};
     if (o.thresholds) {
-        rc = ggn_thresholds_read(o.thresholds, o.block, &thresholds, &err);
-        so.thresholds = &thresholds;
+        rc = ggn_thresholds_read(o.thresholds, o.how.block, &thresholds, &err);
+        o.how.thresholds = &thresholds;
     }
     int made = 0;
     if (!rc)
         rc = base_make_folder(o.out, &made, &err);
     if (!rc)
-        rc = ggn_import_is_view(o.dir) ? import_one(&o, &so, o.dir, &err) : import_all(&o, &so, &err);
+        rc = ggn_import_is_view(o.dir) ? import_one(&o, o.dir, &err) : import_all(&o, &err);
     ggn_thresholds_release(&thresholds);
     if (rc && made)
         rmdir(o.out); /* goes only if nothing was imported */

@@ -113,37 +113,6 @@ static int human_labels(const struct options *o, const struct ggn_thresholds *t,
     return rc;
 }
 
-static int label_human(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v,
-                       struct base_err *err)
-{
-    struct ggn_labels l;
-    int rc = human_labels(o, t, v, &l, err);
-    if (rc)
-        return rc;
-    rc = ggn_labels_write(v->dir, &l, o->replace_human, err);
-    if (!rc)
-        printf("%s: %u blocks labelled with human thresholds\n", v->dir, l.n);
-    ggn_labels_release(&l);
-    return rc;
-}
-
-static int label_observer(const struct options *o, const struct ggn_observer *observer, struct base_threads *threads,
-                          const struct ggn_dataset_view *v, struct base_err *err)
-{
-    struct ggn_labels l;
-    uint32_t censored = 0;
-    int rc = ggn_view_label(observer, v, (enum ggn_curve_source)o->source, threads, &l, err);
-    if (rc)
-        return rc;
-    for (uint32_t i = 0; i < l.n; i++)
-        censored += l.labels[i].censored != 0;
-    rc = ggn_labels_write(v->dir, &l, o->replace_human, err);
-    if (!rc)
-        printf("%s: %u blocks labelled by the model observer, %u censored at %.0f spp\n", v->dir, l.n, censored, l.cap);
-    ggn_labels_release(&l);
-    return rc;
-}
-
 /* --- checking labels from halves --- */
 
 /* curves: room for the view's blocks from *count on. */
@@ -201,6 +170,27 @@ struct labelling {
     struct base_threads *threads;
 };
 
+static int label_view(const struct labelling *l, const struct ggn_dataset_view *v, struct base_err *err)
+{
+    const struct options *o = l->o;
+    struct ggn_labels labels;
+    uint32_t censored = 0;
+    int rc = o->human ? human_labels(o, l->human, v, &labels, err)
+                      : ggn_view_label(l->observer, v, (enum ggn_curve_source)o->source, l->threads, &labels, err);
+    if (rc)
+        return rc;
+    for (uint32_t i = 0; i < labels.n; i++)
+        censored += labels.labels[i].censored != 0;
+    rc = ggn_labels_write(v->dir, &labels, o->replace_human, err);
+    if (!rc && o->human)
+        printf("%s: %u blocks labelled with human thresholds\n", v->dir, labels.n);
+    else if (!rc)
+        printf("%s: %u blocks labelled by the model observer, %u censored at %.0f spp\n", v->dir, labels.n, censored,
+               labels.cap);
+    ggn_labels_release(&labels);
+    return rc;
+}
+
 static int label_views(void *data, uint32_t first, uint32_t n, int thread, struct base_err *err)
 {
     const struct labelling *l = data;
@@ -208,7 +198,7 @@ static int label_views(void *data, uint32_t first, uint32_t n, int thread, struc
     for (uint32_t i = first; i < first + n && !rc && !base_interrupted; i++) {
         const struct ggn_dataset_view *v = &l->d->views[i];
         if (has_blocks(v))
-            rc = l->o->human ? label_human(l->o, l->human, v, err) : label_observer(l->o, l->observer, l->threads, v, err);
+            rc = label_view(l, v, err);
     }
     (void)thread;
     return rc;
