@@ -164,13 +164,15 @@ static double grad_l2(const struct ggn_trainer *t, int net, size_t n)
 
 static void zero_grad(struct ggn_trainer *t, int net) { memset(t->grad[net], 0, t->graph[net].n_params * sizeof(real)); }
 
-/* After a divergence: back to the last good state, and say which tensor went wrong first. */
-static int diverged(struct ggn_trainer *t, int net, double value, const char *what, struct base_err *err)
+/* Back to the last good state when a value is beyond what training can have, and says which tensor went wrong first. */
+static int check(struct ggn_trainer *t, int net, double value, const char *what, struct base_err *err)
 {
     const struct ggn_graph *g = &t->graph[net];
     const char *name = "none";
     double worst = -1;
 
+    if (value <= t->options.explode)
+        return 0;
     for (int i = g->n_tensors - 1; i >= 0; i--) {
         const struct ggn_tensor *p = &g->tensor[i];
         double sum = 0;
@@ -186,13 +188,6 @@ static int diverged(struct ggn_trainer *t, int net, double value, const char *wh
     roll_back(t);
     return base_fail(err, GGN_EDIVERGED, "training diverged: %s of the %s is %g, worst in %s; returned to step %llu", what,
                      g->name, value, name, (unsigned long long)t->steps);
-}
-
-static int check(struct ggn_trainer *t, int net, double value, const char *what, struct base_err *err)
-{
-    if (value <= t->options.explode)
-        return 0;
-    return diverged(t, net, value, what, err);
 }
 
 /* Clips, takes one Adam step of the first n parameters (Kingma & Ba 2015, algorithm 1) and packs. */
@@ -249,7 +244,6 @@ static double denoiser_loss(struct ggn_trainer *t, const real *const *reference,
 static int denoiser_forward(struct ggn_trainer *t, const real *const *x, int x_stride, const real *const *reference,
                             int count, double *loss, struct base_err *err)
 {
-
     for (int i = 0; i < count; i++)
         set_input(t->r, i, x + (size_t)i * (size_t)x_stride, 3);
     ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_TRAIN);

@@ -39,14 +39,11 @@ static long cut_conv(struct ggn_task *t, int c_in, int c_out, const real *wino)
     t->wino = wino_weights(t, c_in, c_out, wino);
     if (t->wino) {
         ggn_wino_cut(ggn_wino_tiles(v->h, v->w), c_out, &t->px_blocks, &t->oc_group);
-        t->oc_groups = (c_out + t->oc_group - 1) / t->oc_group;
-        return (long)t->e->batch * t->px_blocks * t->oc_groups;
+    } else {
+        t->px_block = 16L * t->e->kernels->tile_px;
+        t->px_blocks = (int)(((long)v->h * v->row + t->px_block - 1) / t->px_block);
+        t->oc_group = t->px_blocks >= 8 ? c_out : 32;
     }
-    long px = (long)v->h * v->row, tile = t->e->kernels->tile_px;
-
-    t->px_block = 16 * tile;
-    t->px_blocks = (int)((px + t->px_block - 1) / t->px_block);
-    t->oc_group = t->px_blocks >= 8 ? c_out : 32;
     t->oc_groups = (c_out + t->oc_group - 1) / t->oc_group;
     return (long)t->e->batch * t->px_blocks * t->oc_groups;
 }
