@@ -18,7 +18,6 @@ int ggn_shown_source_has(const struct ggn_shown_source *source, uint32_t id);
 int ggn_shown_source_check(const struct ggn_shown_source *source, const struct ggn_shown_view *view, struct base_err *err);
 
 /* These make the view that is the index-th of those that are shown, from the source: its blocks, levels and files. */
-struct ggn_shown_request;
 struct base_threads;
 int ggn_shown_sequence(const struct ggn_shown_request *q, const struct ggn_shown_source *source, int index,
                        struct ggn_shown_view *view, struct base_threads *threads, struct base_err *err);

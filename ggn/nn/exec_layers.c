@@ -8,7 +8,7 @@
 
 /* --- batch norm ------------------------------------------------------------------------------------------------------- */
 
-/* The two sums of image n of this process and channel c. */
+/* The two sums of image n and channel c. */
 static double *bn_sums_of(const struct ggn_task *t, int n, int c)
 {
     return t->e->sums + 2 * ((size_t)(n + 1) * (size_t)ggn_task_out(t)->c + (size_t)c);

@@ -169,21 +169,14 @@ static void scalars_of(struct gp_block_view *seen, float scalars[GGN_SCALARS])
     ggn_measure_scalars(window, spp, (int)s->used, law(seen), scalars);
 }
 
-/* Of the visible noise, already measured; NULL: the model takes none. */
-static const uint8_t *noise_map_of(const struct gp_block_view *seen)
-{
-    const struct ggn_model *model = seen->in->model;
-    const struct worker *worker = seen->worker;
-
-    return model->hyper.noise_map && seen->in->rule.reach > 0 ? worker->noise_map : NULL;
-}
-
-/* Denoises the images that have not been denoised yet. */
+/* Denoises the images that have not been denoised yet. The noise map is that of the visible noise, already measured. */
 static double window_logit(void *data)
 {
     struct gp_block_view *seen = data;
     const struct gp_history *history = &seen->in->history;
+    const struct ggn_model *model = seen->in->model;
     const struct worker *worker = seen->worker;
+    const uint8_t *noise_map = model->hyper.noise_map && model->hyper.reach > 0 ? worker->noise_map : NULL;
     const uint8_t *noisy[GGN_WINDOW_MAX];
     const uint16_t *denoised[GGN_WINDOW_MAX];
     const struct lull_block *b = seen->block;
@@ -201,7 +194,7 @@ static double window_logit(void *data)
             ggn_inference_denoise(worker->inference, noisy[i], to, w, h);
         seen->head->made |= UINT32_C(1) << slot;
     }
-    return ggn_inference_logit(worker->inference, noisy, denoised, noise_map_of(seen), scalars, w, h);
+    return ggn_inference_logit(worker->inference, noisy, denoised, noise_map, scalars, w, h);
 }
 
 /* --- instance ---------------------------------------------------------------------------------------------------------- */

@@ -9,8 +9,7 @@ extern const char *const ggn_log_phases[]; /* "denoiser", "judge" (generator and
 struct ggn_log_row {
     int phase;                                                                             /* of ggn_log_phases */
     double step, loss, accuracy, validation_loss, validation_accuracy, validation_auc, lr; /* NaN = not measured */
-    /* Since the phase began, on this machine; only here two runs may differ. Of all processes: */
-    double seconds, processor_s;
+    double seconds, processor_s; /* since the phase began, on this machine; only here two runs may differ */
 };
 
 struct ggn_log {
