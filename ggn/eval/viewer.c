@@ -1,14 +1,12 @@
 #include "eval/viewer.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 void ggn_viewer_release(struct ggn_viewer *v)
 {
     ggn_inference_destroy(v->inference);
     ggn_exact_destroy(v->exact);
     free(v->denoised[0]);
-    free(v->known);
     *v = (struct ggn_viewer){0};
 }
 
@@ -34,18 +32,14 @@ int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum gg
                     const struct ggn_series_set *set, struct base_err *err)
 {
     size_t values = ggn_series_set_values(set);
-    int levels = 1;
 
     *v = (struct ggn_viewer){.set = set,
                              .window = model->hyper.window,
                              .noise_maps = set->noise_maps && model->hyper.noise_map && model->hyper.reach > 0};
-    for (int i = 0; i < set->n; i++)
-        levels = set->series[i].n_levels > levels ? set->series[i].n_levels : levels;
     if (make_networks(v, model, precision, err))
         return err->code;
     v->denoised[0] = malloc((size_t)v->window * values * sizeof *v->denoised[0]);
-    v->known = malloc((size_t)levels * sizeof *v->known);
-    if (!v->denoised[0] || !v->known) {
+    if (!v->denoised[0]) {
         ggn_viewer_release(v);
         return base_fail_nomem(err, "evaluation");
     }
@@ -59,8 +53,6 @@ void ggn_viewer_turn(struct ggn_viewer *v, const struct ggn_level_series *series
     v->series = series;
     for (int i = 0; i < v->window; i++)
         v->holds[i] = -1;
-    for (int i = 0; i < series->n_levels; i++)
-        v->known[i].level[0] = -1;
 }
 
 static int is_in(int level, const int *levels, int n)
@@ -107,18 +99,13 @@ static void fill_scalars(const struct ggn_viewer *v, const int *levels, float sc
 double ggn_viewer_logit(void *viewer, const int *levels)
 {
     struct ggn_viewer *v = viewer;
-    struct ggn_viewed *known = &v->known[levels[v->window - 1]];
-    const size_t bytes = (size_t)v->window * sizeof *levels;
     const uint8_t *noisy[GGN_WINDOW_MAX];
     const uint16_t *clean[GGN_WINDOW_MAX];
 
-    if (!memcmp(known->level, levels, bytes))
-        return known->logit;
     for (int i = 0; i < v->window; i++) {
         noisy[i] = v->series->noisy + ggn_series_set_values(v->set) * (size_t)levels[i];
         clean[i] = denoised(v, levels[i], levels, v->window);
     }
-    memcpy(known->level, levels, bytes);
     const int last = levels[v->window - 1];
     const size_t pixels = ggn_series_set_values(v->set) / 3;
     const uint8_t *noise_map =
@@ -126,8 +113,7 @@ double ggn_viewer_logit(void *viewer, const int *levels)
     float scalars[GGN_SCALARS] = {0};
     if (v->law)
         fill_scalars(v, levels, scalars);
-    known->logit = v->exact
-                       ? ggn_exact_logit(v->exact, noisy, clean, noise_map, scalars)
-                       : ggn_inference_logit(v->inference, noisy, clean, noise_map, scalars, v->set->width, v->set->height);
-    return known->logit;
+    if (v->exact)
+        return ggn_exact_logit(v->exact, noisy, clean, noise_map, scalars);
+    return ggn_inference_logit(v->inference, noisy, clean, noise_map, scalars, v->set->width, v->set->height);
 }

@@ -7,11 +7,6 @@
 #include "model/inference.h"
 #include "model/stopper.h"
 
-struct ggn_viewed {
-    int level[GGN_WINDOW_MAX];
-    double logit;
-};
-
 struct ggn_viewer {
     struct ggn_inference *inference;       /* owns; NULL: exact networks instead */
     struct ggn_exact *exact;               /* owns; of GGN_PRECISION_F64 */
@@ -21,14 +16,13 @@ struct ggn_viewer {
     int window, noise_maps;                /* images of a window; whether the model takes the noise maps of the set */
     uint16_t *denoised[GGN_WINDOW_MAX];    /* [3][H][W] each; one allocation, owned */
     int holds[GGN_WINDOW_MAX];             /* the level that is in it, -1: none */
-    struct ggn_viewed *known;              /* owns; [levels]: the last window that ended there */
 };
 
 int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision,
                     const struct ggn_series_set *set, struct base_err *err);
 void ggn_viewer_release(struct ggn_viewer *v);
 
-/* Turns to a block; what was known of the one before is forgotten. */
+/* Turns to a block; images of the one before are forgotten. */
 void ggn_viewer_turn(struct ggn_viewer *v, const struct ggn_level_series *series);
 /* viewer: a struct ggn_viewer. Logit of the window of these levels, noisiest first. */
 double ggn_viewer_logit(void *viewer, const int *levels);
