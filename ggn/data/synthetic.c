@@ -97,26 +97,30 @@ static int make_levels(const struct ggn_series_set *set, struct ggn_level_series
     return 0;
 }
 
-/* An empty series of the same block. */
-static void begin_copy(struct ggn_level_series *c, const struct ggn_level_series *recorded)
+/* An empty series of the block of series `of`; NULL: out of memory. */
+static struct ggn_level_series *append_copy(struct ggn_series_set *set, int of, struct base_err *err)
 {
-    *c = *recorded;
+    struct ggn_level_series *c = ggn_series_set_append(set, err);
+
+    if (!c)
+        return NULL;
+    *c = set->series[of];
     c->synthetic = 1;
     c->n_levels = 0;
     c->spp = NULL;
     c->noisy = c->noise_map = c->has_noise_map = NULL;
     c->denoised = NULL;
     c->measure = NULL;
+    return c;
 }
 
-static int make_series(struct ggn_series_set *set, const struct ggn_level_series *recorded, struct ggn_level_series *c,
-                       const struct source *s, uint32_t seed, struct base_err *err)
+static int make_series(const struct ggn_series_set *set, struct ggn_level_series *c, const struct source *s, uint32_t seed,
+                       struct base_err *err)
 {
     double spp[MAX_LEVELS];
     const double ratio = set->ratio > 1.01 ? set->ratio : 1.15;
     int n = choose_levels(spp, 0, set->first_spp, ratio, HIGHEST_SHARE * s->n_reference, 1, seed);
 
-    begin_copy(c, recorded);
     return make_levels(set, c, s, spp, n, seed, err);
 }
 
@@ -173,8 +177,8 @@ int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uin
             continue;
         rc = read_source(set, &set->series[i], 1, &s, &usable, err);
         for (int k = 0; !rc && usable && isfinite(s.n_reference) && k < per_series; k++) {
-            struct ggn_level_series *c = ggn_series_set_append(set, err);
-            rc = c ? make_series(set, &set->series[i], c, &s, ggn_hash((uint32_t)(i * 64 + k), seed), err) : BASE_ENOMEM;
+            struct ggn_level_series *c = append_copy(set, i, err);
+            rc = c ? make_series(set, c, &s, ggn_hash((uint32_t)(i * 64 + k), seed), err) : BASE_ENOMEM;
         }
     }
     free(s.base);
@@ -221,15 +225,6 @@ static int simulate_series(const struct ggn_series_set *set, struct ggn_level_se
     return rc;
 }
 
-static struct ggn_level_series *append_copy(struct ggn_series_set *set, int of, struct base_err *err)
-{
-    struct ggn_level_series *c = ggn_series_set_append(set, err);
-
-    if (c)
-        begin_copy(c, &set->series[of]);
-    return c;
-}
-
 int ggn_series_set_extend(struct ggn_series_set *set, uint32_t seed, struct base_err *err)
 {
     const double ratio = set->ratio > 1.01 && set->ratio < 2 ? set->ratio : 1.2565; /* a third of an octave */
@@ -245,12 +240,16 @@ int ggn_series_set_extend(struct ggn_series_set *set, uint32_t seed, struct base
             (c->label.censored && c->label.threshold <= last))
             continue;
         rc = read_source(set, c, 1, &s, &usable, err);
-        if (!rc && usable && isfinite(s.n_reference))
-            rc = extend_series(set, c, &s, ggn_hash((uint32_t)i, seed + 1), err);
-        else if (!rc && usable && (c = set->keep_recorded ? append_copy(set, i, err) : c))
-            rc = simulate_series(set, c, &s, ratio, 1, ggn_hash((uint32_t)i, seed + 1), err);
-        else if (!rc && usable)
-            rc = BASE_ENOMEM;
+        if (rc || !usable)
+            continue;
+        const uint32_t own_seed = ggn_hash((uint32_t)i, seed + 1);
+        if (isfinite(s.n_reference)) {
+            rc = extend_series(set, c, &s, own_seed, err);
+            continue;
+        }
+        if (set->keep_recorded)
+            c = append_copy(set, i, err);
+        rc = c ? simulate_series(set, c, &s, ratio, 1, own_seed, err) : BASE_ENOMEM;
     }
     free(s.base);
     return rc;
