@@ -2,7 +2,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "model/visibility.h"
 #include "sequence/simulate.h"
@@ -19,7 +18,7 @@ struct planes {
     int width, height;
     size_t pixels;
     float *mean, *difference, *work; /* [3][P], linear; one allocation with the others, `mean` owns it */
-    float *lightness[3];             /* [P] */
+    float *lightness[2];             /* [P] */
     double *texture, *scratch;       /* [patches]; one allocation, `texture` owns it */
 };
 
@@ -38,7 +37,7 @@ static int planes_init(struct planes *p, const struct seq_block *block, struct b
                          .width = width,
                          .height = height,
                          .pixels = n,
-                         .mean = malloc(12 * n * sizeof *p->mean),
+                         .mean = malloc(11 * n * sizeof *p->mean),
                          .texture = malloc((patches + ggn_visibility_scratch(width)) * sizeof *p->texture)};
     if (!p->mean || !p->texture) {
         planes_release(p);
@@ -47,7 +46,7 @@ static int planes_init(struct planes *p, const struct seq_block *block, struct b
     p->scratch = p->texture + patches;
     p->difference = p->mean + 3 * n;
     p->work = p->mean + 6 * n;
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 2; i++)
         p->lightness[i] = p->mean + (9 + (size_t)i) * n;
     return 0;
 }
@@ -145,9 +144,8 @@ static int add_levels(struct ggn_curve *c, struct planes *p, int independent, st
         rc = seq_mean(b, last, p->difference, err);
     if (rc)
         return rc;
-    ggn_visible_lightness(p->mean, p->pixels, p->lightness[2]);
+    ggn_visible_lightness(p->mean, p->pixels, p->lightness[1]);
     ggn_visible_lightness(independent ? p->difference : p->mean, p->pixels, p->lightness[0]);
-    memcpy(p->lightness[1], p->lightness[2], p->pixels * sizeof(float));
     see_texture(p);
     for (const struct seq_record *r = b->levels; r <= last; r++) {
         rc = seq_mean(b, r, p->difference, err);
@@ -156,7 +154,6 @@ static int add_levels(struct ggn_curve *c, struct planes *p, int independent, st
         for (size_t i = 0; i < 3 * p->pixels; i++)
             p->difference[i] -= p->mean[i];
         lightness_at(p, independent ? seq_reference_scale(n_r, r->spp) : 1.0, p->lightness[0]);
-        memcpy(p->lightness[1], p->lightness[2], p->pixels * sizeof(float));
         append(c, r->spp, visible(p, 1.0f));
     }
     c->recorded = c->n;
