@@ -62,11 +62,10 @@ static int import_all(const struct options *o, struct base_err *err)
         return base_fail(err, BASE_EIO, "%s: %s", o->dir, strerror(errno));
     for (int i = 0; i < n; i++) {
         char path[4096];
-        int length = snprintf(path, sizeof path, "%s/%s", o->dir, entries[i]->d_name);
         struct stat st;
+        const int too_long = base_file_join(path, o->dir, entries[i]->d_name, NULL);
         free(entries[i]);
-        if (rc || base_interrupted || length < 0 || (size_t)length >= sizeof path || stat(path, &st) != 0 ||
-            !S_ISDIR(st.st_mode) || !ggn_import_is_view(path))
+        if (rc || base_interrupted || too_long || stat(path, &st) != 0 || !S_ISDIR(st.st_mode) || !ggn_import_is_view(path))
             continue;
         found++;
         rc = import_one(o, path, err);

@@ -70,9 +70,9 @@ static int scan(const char *path, enum ggn_split split, struct ggn_dataset *d, s
         return base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
     for (int i = 0; i < n; i++) {
         char sub[4096];
-        int length = snprintf(sub, sizeof sub, "%s/%s", path, entries[i]->d_name);
+        const int too_long = base_file_join(sub, path, entries[i]->d_name, NULL);
         free(entries[i]);
-        if (rc || length < 0 || (size_t)length >= sizeof sub || !exists(sub, "manifest.json"))
+        if (rc || too_long || !exists(sub, "manifest.json"))
             continue;
         rc = add_view(d, sub, err);
         if (!rc)
@@ -87,8 +87,7 @@ static int scan_all(const char *path, struct ggn_dataset *d, struct base_err *er
     int rc = scan(path, GGN_SPLIT_NONE, d, err);
     for (int s = 0; s < GGN_SPLIT_NONE && !rc; s++) {
         char sub[4096];
-        int n = snprintf(sub, sizeof sub, "%s/%s", path, ggn_split_names[s]);
-        if (n > 0 && (size_t)n < sizeof sub && exists(path, ggn_split_names[s]))
+        if (!base_file_join(sub, path, ggn_split_names[s], NULL) && exists(path, ggn_split_names[s]))
             rc = scan(sub, (enum ggn_split)s, d, err);
     }
     for (int i = 0; i < d->n && !rc; i++)
@@ -155,8 +154,7 @@ static int read_split(const char *dir, struct ggn_dataset *d, struct base_err *e
 {
     char path[4096], *text;
     size_t size;
-    int n = snprintf(path, sizeof path, "%s/split.json", dir);
-    if (n < 0 || (size_t)n >= sizeof path || !exists(dir, "split.json"))
+    if (base_file_join(path, dir, "split.json", NULL) || !exists(dir, "split.json"))
         return 0;
     int rc = base_file_read(path, 1 << 24, &text, &size, err);
     if (rc)
