@@ -392,6 +392,7 @@ int ggn_phase_classifier(struct ggn_session *s, const char *checkpoint, struct b
                                     .net = GGN_NET_M,
                                     .step = train_step,
                                     .validate = validate};
+    /* The checkpoint first: it holds the denoiser that all images are denoised with. */
     int rc = begin(s, err);
 
     if (!rc && checkpoint)

@@ -83,6 +83,7 @@ static int check_plan(const struct ggn_session *s, struct base_err *err)
 
 int ggn_session_init(struct ggn_session *s, struct base_err *err)
 {
+    /* The data first: they say how large networks and crops are, and what of the plan can be done. */
     const struct ggn_train_plan *p = s->plan;
     const int paper = p->preset == GGN_PRESET_PAPER;
 

@@ -37,6 +37,7 @@ static int find_checkpoint(const struct ggn_train_plan *plan, const char **path,
 
 int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
 {
+    /* A checkpoint says in which phase to go on, and that phase reads it once it has its trainer. */
     struct ggn_session s = {.plan = plan};
     char path[4096];
     const char *checkpoint = path;
