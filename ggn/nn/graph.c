@@ -38,11 +38,10 @@ static int add_value(struct ggn_graph *g, int c, int h, int w, int flat)
 
 static struct ggn_layer *add_layer(struct ggn_graph *g, enum ggn_op op, int in, int in2)
 {
-    if (g->err.code || g->n_layers >= GGN_MAX_LAYERS) {
-        if (!g->err.code)
-            base_fail(&g->err, BASE_EINVAL, "network %s: more than %d layers", g->name, GGN_MAX_LAYERS);
-        return NULL;
-    }
+    if (!g->err.code && g->n_layers >= GGN_MAX_LAYERS)
+        base_fail(&g->err, BASE_EINVAL, "network %s: more than %d layers", g->name, GGN_MAX_LAYERS);
+    if (g->err.code)
+        return &g->layer[GGN_MAX_LAYERS];
     struct ggn_layer *l = &g->layer[g->n_layers++];
     *l = (struct ggn_layer){.op = op, .in = in, .in2 = in2, .slope = 1, .stage = g->stage};
     g->value[in].uses++;
@@ -53,11 +52,10 @@ static struct ggn_layer *add_layer(struct ggn_graph *g, enum ggn_op op, int in, 
 
 static size_t add_tensor(struct ggn_graph *g, const char *suffix, int is_bias, int is_bn, const int dim[4], int ndim)
 {
-    if (g->err.code || g->n_tensors >= GGN_MAX_TENSORS) {
-        if (!g->err.code)
-            base_fail(&g->err, BASE_EINVAL, "network %s: more than %d tensors", g->name, GGN_MAX_TENSORS);
+    if (!g->err.code && g->n_tensors >= GGN_MAX_TENSORS)
+        base_fail(&g->err, BASE_EINVAL, "network %s: more than %d tensors", g->name, GGN_MAX_TENSORS);
+    if (g->err.code)
         return 0;
-    }
     struct ggn_tensor *t = &g->tensor[g->n_tensors++];
     *t = (struct ggn_tensor){
         .ndim = ndim, .offset = g->n_params, .count = 1, .layer = g->n_layers - 1, .is_bias = is_bias, .is_bn = is_bn};
@@ -89,12 +87,10 @@ void ggn_graph_stage(struct ggn_graph *g, const char *stage)
 int ggn_graph_conv(struct ggn_graph *g, int in, int in2, int c_out, int kernel, int transposed, double slope)
 {
     struct ggn_layer *l = add_layer(g, GGN_OP_CONV, in, in2);
-    if (!l)
-        return 0;
     const struct ggn_value *a = &g->value[in];
     int c_in = a->c + (in2 >= 0 ? g->value[in2].c : 0);
 
-    if (in2 >= 0 && (g->value[in2].h != a->h || g->value[in2].w != a->w))
+    if (!g->err.code && in2 >= 0 && (g->value[in2].h != a->h || g->value[in2].w != a->w))
         base_fail(&g->err, BASE_EINVAL, "network %s, stage %s: joined tensors differ in size", g->name, g->stage);
     l->kernel = kernel;
     l->transposed = transposed;
@@ -111,8 +107,6 @@ int ggn_graph_conv(struct ggn_graph *g, int in, int in2, int c_out, int kernel, 
 int ggn_graph_conv_strided(struct ggn_graph *g, int in, int c_out, int stride, int pad)
 {
     struct ggn_layer *l = add_layer(g, GGN_OP_IM2COL, in, -1);
-    if (!l)
-        return 0;
     const struct ggn_value *a = &g->value[in];
     l->stride = stride;
     l->pad = pad;
@@ -124,8 +118,6 @@ int ggn_graph_conv_strided(struct ggn_graph *g, int in, int c_out, int stride, i
 int ggn_graph_bn(struct ggn_graph *g, int in)
 {
     struct ggn_layer *l = add_layer(g, GGN_OP_BN, in, -1);
-    if (!l)
-        return 0;
     const struct ggn_value *a = &g->value[in];
     l->stats = g->n_stats;
     g->n_stats += (size_t)a->c;
@@ -138,8 +130,6 @@ int ggn_graph_bn(struct ggn_graph *g, int in)
 static int add_same_shape(struct ggn_graph *g, enum ggn_op op, int in, double slope, double drop)
 {
     struct ggn_layer *l = add_layer(g, op, in, -1);
-    if (!l)
-        return 0;
     l->slope = slope;
     l->drop = drop;
     return l->out = add_value(g, g->value[in].c, g->value[in].h, g->value[in].w, g->value[in].flat);
@@ -159,8 +149,6 @@ int ggn_graph_dropout(struct ggn_graph *g, int in, double p)
 int ggn_graph_maxpool(struct ggn_graph *g, int in, int kernel)
 {
     struct ggn_layer *l = add_layer(g, GGN_OP_MAXPOOL, in, -1);
-    if (!l)
-        return 0;
     const struct ggn_value *a = &g->value[in];
     l->kernel = kernel;
     if (kernel == 2)
@@ -171,8 +159,6 @@ int ggn_graph_maxpool(struct ggn_graph *g, int in, int kernel)
 int ggn_graph_up(struct ggn_graph *g, int in, int pad_y, int pad_x)
 {
     struct ggn_layer *l = add_layer(g, GGN_OP_UP, in, -1);
-    if (!l)
-        return 0;
     const struct ggn_value *a = &g->value[in];
     l->pad_y = pad_y;
     l->pad_x = pad_x;
@@ -182,8 +168,6 @@ int ggn_graph_up(struct ggn_graph *g, int in, int pad_y, int pad_x)
 int ggn_graph_flatten(struct ggn_graph *g, int in)
 {
     struct ggn_layer *l = add_layer(g, GGN_OP_FLATTEN, in, -1);
-    if (!l)
-        return 0;
     const struct ggn_value *a = &g->value[in];
     return l->out = add_value(g, a->c * a->h * a->w, 1, 1, 1);
 }
@@ -191,8 +175,6 @@ int ggn_graph_flatten(struct ggn_graph *g, int in)
 int ggn_graph_linear(struct ggn_graph *g, int in, int in2, int c_out)
 {
     struct ggn_layer *l = add_layer(g, GGN_OP_LINEAR, in, in2);
-    if (!l)
-        return 0;
     l->weight = add_tensor(g, "weight", 0, 0, (int[4]){c_out, ggn_layer_c_in(g, l)}, 2);
     l->bias = add_tensor(g, "bias", 1, 0, (int[4]){c_out}, 1);
     g->n_stage_layers++;

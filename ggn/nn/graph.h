@@ -85,7 +85,7 @@ struct ggn_tensor {
 struct ggn_graph {
     char name[16];
     struct ggn_value value[GGN_MAX_LAYERS + 1]; /* value 0 is the input */
-    struct ggn_layer layer[GGN_MAX_LAYERS];
+    struct ggn_layer layer[GGN_MAX_LAYERS + 1]; /* the last one takes what is added after a failure */
     struct ggn_tensor tensor[GGN_MAX_TENSORS];
     int n_values, n_layers, n_tensors;
     size_t n_params, n_stats, n_pack;
