@@ -1,7 +1,6 @@
 #include "baselines/features.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/colour.h"

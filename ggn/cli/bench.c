@@ -1,5 +1,4 @@
 /* `ggn bench`: how fast the networks run on this machine, per layer and as medians. */
-#include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,4 @@
 /* `ggn stimuli VIEW...`: the pictures of recordings and renders that people are shown. */
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -5,7 +5,6 @@
 #include <string.h>
 #include <zlib.h>
 
-#include "model/window.h"
 #include "sequence/simulate.h"
 
 enum { MAX_CHAINS = 1 << 16 };

@@ -1,6 +1,5 @@
 #include "data/shown_source.h"
 
-#include <stdio.h>
 #include <string.h>
 
 #include "base/list.h"

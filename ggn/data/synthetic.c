@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/colour.h"
 #include "model/preprocess.h"
 #include "nn/hash.h"
 #include "data/series.h"

@@ -1,7 +1,6 @@
 #include "model/window.h"
 
 #include <math.h>
-#include <string.h>
 
 int ggn_tile_count(int size, int tile) { return size <= tile ? 1 : (size + tile - 1) / tile; }
 

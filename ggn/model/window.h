@@ -11,8 +11,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "model/preprocess.h"
-
 /* Of a code of the noise map, on its way into the network: noise at the threshold of sight is one to three codes. */
 #define GGN_NOISE_MAP_GAIN (16.0F / 255)
 

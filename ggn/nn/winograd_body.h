@@ -14,7 +14,6 @@
 #ifdef WINO
 #include <string.h>
 
-#include "nn/graph.h"
 #include "nn/kernels.h"
 #include "nn/winograd.h"
 

@@ -7,7 +7,6 @@
 #ifndef GGN_OBSERVER_FLIP_H
 #define GGN_OBSERVER_FLIP_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #include "base/err.h"

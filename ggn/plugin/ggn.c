@@ -8,7 +8,6 @@
  */
 #include "model/inference.h"
 #include "model/measure.h"
-#include "model/window.h"
 #include "observer/observer.h"
 #include "plugin/pair.h"
 #include "plugin/translate.h"

@@ -1,7 +1,6 @@
 #include "train/phase_denoiser.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "nn/hash.h"
