@@ -191,13 +191,11 @@ static int load_block(struct ggn_series_set *set, int view, uint32_t index, cons
         set->height = (int)b.height;
         rc = o->measures ? ggn_meter_init(&set->meter, (size_t)b.width * b.height, err) : 0;
     }
-    struct ggn_level_series *c = NULL;
-    if (rc)
-        ;
-    else if ((int)b.width != set->width || (int)b.height != set->height)
+    if (!rc && ((int)b.width != set->width || (int)b.height != set->height))
         rc = base_fail(err, BASE_EINVAL, "%s/%s: a block of %ux%u pixels among blocks of %dx%d", v->dir,
                        v->manifest.blocks[index].file, b.width, b.height, set->width, set->height);
-    else if (!(c = ggn_series_set_append(set, err)))
+    struct ggn_level_series *c = rc ? NULL : ggn_series_set_append(set, err);
+    if (!rc && !c)
         rc = BASE_ENOMEM;
     if (!rc) {
         const struct ggn_label *label = v->has_labels ? ggn_labels_find(&v->labels, b.id) : NULL;

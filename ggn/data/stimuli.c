@@ -11,8 +11,6 @@ void ggn_stimuli_release(struct ggn_stimuli *s)
 {
     free(s->spp);
     free(s->base);
-    free(s->difference);
-    free(s->work);
     free(s->converged);
     *s = (struct ggn_stimuli){0};
 }
@@ -77,12 +75,12 @@ int ggn_stimuli_init(struct ggn_stimuli *out, const struct seq_block *block, int
     double beyond = s.recorded > 0 ? 1.07 * block->levels[s.recorded - 1].spp : 0.0, simulated[MAX_SIMULATED];
     s.n = s.recorded + (extend || s.recorded == 0 ? simulated_levels(beyond, simulated) : 0);
     s.spp = malloc((size_t)s.n * sizeof *s.spp);
-    s.base = malloc(3 * pixels * sizeof(float));
-    s.difference = malloc(3 * pixels * sizeof(float));
-    s.work = malloc(3 * pixels * sizeof(float));
+    s.base = malloc(9 * pixels * sizeof *s.base);
     s.converged = malloc(3 * pixels);
+    s.difference = s.base ? s.base + 3 * pixels : NULL;
+    s.work = s.base ? s.base + 6 * pixels : NULL;
     int rc = 0;
-    if (!s.spp || !s.base || !s.difference || !s.work || !s.converged)
+    if (!s.spp || !s.base || !s.converged)
         rc = base_fail_nomem(err, "observer");
     else if (!block->reference)
         rc = init_halves(&s, err);

@@ -25,7 +25,7 @@ struct ggn_stimuli {
     double spp0;                   /* of the difference */
     int n;
     double *spp;                     /* owns; [n]; rising */
-    float *base, *difference, *work; /* own; [3][P]; linear */
+    float *base, *difference, *work; /* [3][P]; linear; `base` owns them, one allocation */
     uint8_t *converged;              /* owns; [P][3] */
 };
 int ggn_stimuli_init(struct ggn_stimuli *s, const struct seq_block *block, int reference_independent, struct base_err *err);
