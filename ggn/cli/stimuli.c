@@ -19,10 +19,7 @@ static int set_kinds(void *into, const char *value, struct base_err *err)
     unsigned seen = 0;
     q->n_kinds = 0;
     for (const char *at = value; at; at = strchr(at, ',') ? strchr(at, ',') + 1 : NULL) {
-        int k = GGN_SHOWN_KINDS - 1;
-        while (k > 0 && (strncmp(at, ggn_shown_kind_names[k], strlen(ggn_shown_kind_names[k])) != 0 ||
-                         !strchr(",", at[strlen(ggn_shown_kind_names[k])])))
-            k--;
+        const int k = 1 + base_word_index(ggn_shown_kind_names + 1, at, strcspn(at, ","));
         if (k == 0 || (seen & 1u << k))
             return base_fail(err, BASE_EINVAL, "expected some of noisy,denoised,blend, each once");
         seen |= 1u << k;

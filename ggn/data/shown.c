@@ -20,8 +20,8 @@ static int is_named(const struct ggn_shown *s, int index)
 static int name_view(struct ggn_shown *s, int index, const char *folder, struct base_err *err)
 {
     struct ggn_shown_view *view = &s->views[index];
-    const char *slash = strrchr(folder, '/'), *name = slash && slash[1] ? slash + 1 : folder;
-    int n = snprintf(view->name, sizeof view->name, "%s%s%s", name, view->kind ? "." : "", ggn_shown_kind_names[view->kind]);
+    int n = snprintf(view->name, sizeof view->name, "%s%s%s", base_file_name(folder), view->kind ? "." : "",
+                     ggn_shown_kind_names[view->kind]);
     if (n >= (int)sizeof view->name || !is_named(s, index))
         return base_fail(err, BASE_EINVAL,
                          "%s: a view's folder needs a name of its own of letters, digits, '.', '_' and '-'", folder);

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const ggn_shown_kind_names[GGN_SHOWN_KINDS] = {"", "noisy", "denoised", "blend"};
+const char *const ggn_shown_kind_names[GGN_SHOWN_KINDS + 1] = {"", "noisy", "denoised", "blend", NULL};
 
 void ggn_shown_release(struct ggn_shown *s)
 {

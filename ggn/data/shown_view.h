@@ -57,7 +57,7 @@ struct ggn_shown_request { /* all borrowed */
     uint32_t spp_min, spp_max; /* levels outside are left out */
 };
 
-extern const char *const ggn_shown_kind_names[GGN_SHOWN_KINDS]; /* "", "noisy", "denoised", "blend" */
+extern const char *const ggn_shown_kind_names[GGN_SHOWN_KINDS + 1]; /* "", "noisy", "denoised", "blend", NULL */
 
 void ggn_shown_release(struct ggn_shown *shown);
 /* Letters, digits, '.', '_', '-', not starting with '.': what may stand in a file name or an address. */
