@@ -94,9 +94,7 @@ static void conv_piece(void *data, long i, int worker)
 
 static void conv_forward(struct ggn_task *t)
 {
-    const struct ggn_graph *g = t->e->graph;
-
-    ggn_task_run(t, cut_conv(t, ggn_layer_c_in(g, t->l), ggn_task_out(t)->c, t->w->wino), conv_piece);
+    ggn_task_run(t, cut_conv(t, ggn_task_c_in(t), ggn_task_out(t)->c, t->w->wino), conv_piece);
 }
 
 /* dX = the same convolution with inputs and outputs swapped and taps mirrored. */
@@ -153,7 +151,7 @@ struct weight_part {
 /* Where the taps of an output and an input channel lie among the weights, and in which order. */
 static size_t weight_at(const struct ggn_task *t, int o, int i)
 {
-    const size_t n_in = (size_t)ggn_layer_c_in(t->e->graph, t->l), c_out = (size_t)ggn_task_out(t)->c;
+    const size_t n_in = (size_t)ggn_task_c_in(t), c_out = (size_t)ggn_task_out(t)->c;
     const size_t pair = t->l->transposed ? (size_t)i * c_out + (size_t)o : (size_t)o * n_in + (size_t)i;
     return pair * (size_t)(t->l->kernel * t->l->kernel);
 }
@@ -163,7 +161,7 @@ static long cut_weights(struct ggn_task *t)
 {
     const struct ggn_kernels *k = t->e->kernels;
     const struct ggn_value *v = ggn_task_out(t);
-    const int n_in = ggn_layer_c_in(t->e->graph, t->l);
+    const int n_in = ggn_task_c_in(t);
 
     t->weights_by_wino = k->wino_grad && t->l->kernel == 3 && ggn_wino_grad_suits(n_in, v->c, v->h, v->w, k->lanes);
     t->oc_group = t->weights_by_wino ? GGN_WINO_GRAD : k->tile_oc;
@@ -219,7 +217,7 @@ static void weights_by_wino(const struct ggn_task *t, const struct weight_part *
 static void conv_weight_back(void *data, long i, int worker)
 {
     const struct ggn_task *t = data;
-    const int n_in = ggn_layer_c_in(t->e->graph, t->l), c_out = ggn_task_out(t)->c;
+    const int n_in = ggn_task_c_in(t), c_out = ggn_task_out(t)->c;
     const long n = i / (t->oc_groups * t->ic_groups);
     struct weight_part p = {.oc = (int)(i / t->ic_groups % t->oc_groups) * t->oc_group,
                             .ic0 = (int)(i % t->ic_groups) * t->ic_group};
@@ -253,7 +251,7 @@ static void conv_backward(struct ggn_task *t)
 {
     const struct ggn_graph *g = t->e->graph;
     const int c_out = ggn_task_out(t)->c;
-    const int c_in = ggn_layer_c_in(g, t->l);
+    const int c_in = ggn_task_c_in(t);
 
     ggn_task_run(t, c_out, conv_act_back);
     ggn_task_run(t, cut_weights(t), conv_weight_back);

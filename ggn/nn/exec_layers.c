@@ -293,8 +293,7 @@ PLANE_LAYER(dropout, *p.y = *p.x * dropout_factor(t, i), *p.dx = (t->l->add_in ?
 static void linear_unit(void *data, long o, int worker)
 {
     const struct ggn_task *t = data;
-    const struct ggn_graph *g = t->e->graph;
-    const long c_in = ggn_task_in(t)->c, c_all = ggn_layer_c_in(g, t->l);
+    const long c_in = ggn_task_in(t)->c, c_all = ggn_task_c_in(t);
     const real *w = t->w->params + t->l->weight + (size_t)(o * c_all);
 
     for (int n = 0; n < t->e->batch; n++) {
@@ -312,7 +311,7 @@ static void linear_forward(struct ggn_task *t) { ggn_task_run(t, ggn_task_out(t)
 static void linear_weight_back(void *data, long o, int worker)
 {
     const struct ggn_task *t = data;
-    const long c_in = ggn_task_in(t)->c, c_all = ggn_layer_c_in(t->e->graph, t->l);
+    const long c_in = ggn_task_in(t)->c, c_all = ggn_task_c_in(t);
     real *dw = t->e->params_grad + t->l->weight + (size_t)(o * c_all);
 
     for (int n = 0; n < t->e->batch; n++) {
@@ -329,7 +328,7 @@ static void linear_weight_back(void *data, long o, int worker)
 static void linear_value_back(const struct ggn_task *t, long n, int in, long first, int add)
 {
     const struct ggn_graph *g = t->e->graph;
-    const long c_in = g->value[in].c, c_all = ggn_layer_c_in(g, t->l);
+    const long c_in = g->value[in].c, c_all = ggn_task_c_in(t);
     real *dx = ggn_grad(t, in, n, 0);
 
     if (!add)

@@ -37,6 +37,8 @@ static inline void ggn_task_run(const struct ggn_task *t, long n, void (*fn)(voi
 /* The layer's first input and its output. */
 static inline const struct ggn_value *ggn_task_in(const struct ggn_task *t) { return &t->e->graph->value[t->l->in]; }
 static inline const struct ggn_value *ggn_task_out(const struct ggn_task *t) { return &t->e->graph->value[t->l->out]; }
+/* Channels of both inputs together. */
+static inline int ggn_task_c_in(const struct ggn_task *t) { return ggn_layer_c_in(t->e->graph, t->l); }
 
 /* Element (0,0) of plane c of a value of image n, among the activations or their gradients. */
 static inline real *ggn_plane_in(const struct ggn_exec *e, real *base, int value, long n, int c)
