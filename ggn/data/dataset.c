@@ -141,15 +141,6 @@ static int apply_list(const char *path, const cJSON *list, struct ggn_dataset *d
     return rc;
 }
 
-static int apply_split(const char *path, const cJSON *root, struct ggn_dataset *d, struct base_err *err)
-{
-    const cJSON *list;
-    int rc = cJSON_IsObject(root) ? 0 : base_fail(err, BASE_EINVAL, "%s: not a JSON object", path);
-    for (list = rc ? NULL : root->child; list && !rc; list = list->next)
-        rc = apply_list(path, list, d, err);
-    return rc;
-}
-
 static int read_split(const char *dir, struct ggn_dataset *d, struct base_err *err)
 {
     char path[4096], *text;
@@ -160,7 +151,9 @@ static int read_split(const char *dir, struct ggn_dataset *d, struct base_err *e
     if (rc)
         return rc;
     cJSON *root = cJSON_ParseWithLength(text, size);
-    rc = apply_split(path, root, d, err);
+    rc = cJSON_IsObject(root) ? 0 : base_fail(err, BASE_EINVAL, "%s: not a JSON object", path);
+    for (const cJSON *list = rc ? NULL : root->child; list && !rc; list = list->next)
+        rc = apply_list(path, list, d, err);
     cJSON_Delete(root);
     free(text);
     return rc;
