@@ -106,8 +106,8 @@ void pt_quadric_bounds(const struct pt_quadric *q, pt_vec3 *lower, pt_vec3 *uppe
     *upper = v3_splat(-INFINITY);
     for (int i = 0; i < 8; i++) {
         pt_vec3 p = pt_mat34_point(&q->to_render, v3(i & 1 ? r : -r, i & 2 ? r : -r, i & 4 ? z1 : z0));
-        *lower = v3(fminf(lower->x, p.x), fminf(lower->y, p.y), fminf(lower->z, p.z));
-        *upper = v3(fmaxf(upper->x, p.x), fmaxf(upper->y, p.y), fmaxf(upper->z, p.z));
+        *lower = v3_least(*lower, p);
+        *upper = v3_most(*upper, p);
     }
     const float *l = &lower->x, *u = &upper->x;
     float size = 0.0f;

@@ -117,20 +117,21 @@ static inline void pt_film_store(struct pt_film *f, size_t i, const struct pt_fi
     }
 }
 
+static inline void pt_film_sum(double sums[3], pt_vec3 v)
+{
+    sums[0] += (double)v.x;
+    sums[1] += (double)v.y;
+    sums[2] += (double)v.z;
+}
+
 /* Adds one sample; in_half: pt_film_in_half of its index, worked out once for many pixels. Returns 0 when it was dropped. */
 static inline int pt_film_add(struct pt_film_pixel *p, uint32_t planes, int in_half, const struct pt_path_result *r)
 {
     if (planes & PT_FILM_AUX) {
-        if (v3_is_finite(r->albedo)) {
-            p->albedo[0] += (double)r->albedo.x;
-            p->albedo[1] += (double)r->albedo.y;
-            p->albedo[2] += (double)r->albedo.z;
-        }
-        if (v3_is_finite(r->normal_world)) {
-            p->normal[0] += (double)r->normal_world.x;
-            p->normal[1] += (double)r->normal_world.y;
-            p->normal[2] += (double)r->normal_world.z;
-        }
+        if (v3_is_finite(r->albedo))
+            pt_film_sum(p->albedo, r->albedo);
+        if (v3_is_finite(r->normal_world))
+            pt_film_sum(p->normal, r->normal_world);
         if (isfinite(r->depth))
             p->depth += ((double)r->depth - p->depth) / ++p->depth_hits;
     }
@@ -139,14 +140,11 @@ static inline int pt_film_add(struct pt_film_pixel *p, uint32_t planes, int in_h
         p->dropped_half += in_half && (planes & PT_FILM_HALF);
         return 0;
     }
-    double rgb[3] = {(double)r->radiance.x, (double)r->radiance.y, (double)r->radiance.z};
-    for (int c = 0; c < 3; c++)
-        p->color[c] += rgb[c];
+    pt_film_sum(p->color, r->radiance);
     if (in_half && (planes & PT_FILM_HALF))
-        for (int c = 0; c < 3; c++)
-            p->half[c] += rgb[c];
+        pt_film_sum(p->half, r->radiance);
     if (planes & PT_FILM_MOMENT2) {
-        double luminance = base_luminance(rgb[0], rgb[1], rgb[2]);
+        double luminance = base_luminance((double)r->radiance.x, (double)r->radiance.y, (double)r->radiance.z);
         p->moment2 += luminance * luminance;
     }
     return 1;

@@ -8,17 +8,15 @@
 struct pt_mat34 {
     float m[12];
 };
-static inline pt_vec3 pt_mat34_point(const struct pt_mat34 *t, pt_vec3 p)
-{
-    const float *m = t->m;
-    return v3(m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3], m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
-              m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11]);
-}
 static inline pt_vec3 pt_mat34_vector(const struct pt_mat34 *t, pt_vec3 v)
 {
     const float *m = t->m;
     return v3(m[0] * v.x + m[1] * v.y + m[2] * v.z, m[4] * v.x + m[5] * v.y + m[6] * v.z,
               m[8] * v.x + m[9] * v.y + m[10] * v.z);
+}
+static inline pt_vec3 pt_mat34_point(const struct pt_mat34 *t, pt_vec3 p)
+{
+    return v3_add(pt_mat34_vector(t, p), v3(t->m[3], t->m[7], t->m[11]));
 }
 /* Normal by the inverse transform `inv` (its transpose is applied); not normalised. */
 static inline pt_vec3 pt_mat34_normal(const struct pt_mat34 *inv, pt_vec3 n)

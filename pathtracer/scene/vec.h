@@ -48,6 +48,10 @@ static inline float v3_max(pt_vec3 a)
     float m = a.x > a.y ? a.x : a.y;
     return m > a.z ? m : a.z;
 }
+static inline float v3_mean(pt_vec3 a) { return (a.x + a.y + a.z) * (1.0f / 3.0f); }
+/* The smaller and the larger of each component. */
+static inline pt_vec3 v3_least(pt_vec3 a, pt_vec3 b) { return v3(fminf(a.x, b.x), fminf(a.y, b.y), fminf(a.z, b.z)); }
+static inline pt_vec3 v3_most(pt_vec3 a, pt_vec3 b) { return v3(fmaxf(a.x, b.x), fmaxf(a.y, b.y), fmaxf(a.z, b.z)); }
 static inline int v3_is_black(pt_vec3 a) { return a.x == 0.0f && a.y == 0.0f && a.z == 0.0f; }
 static inline int v3_is_finite(pt_vec3 a) { return isfinite(a.x) && isfinite(a.y) && isfinite(a.z); }
 /* Relative luminance Y of linear sRGB/Rec.709 primaries. */

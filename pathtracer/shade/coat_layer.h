@@ -103,6 +103,27 @@ static inline float pt_layer_mis(float a, float b)
     return a2 > 0.0f && isfinite(a2) ? a2 / (a2 + b2) : a > b ? 1.0f : 0.0f;
 }
 
+/* Roulette on what a walk still carries; 0 when it ends. */
+static inline int pt_layer_survives(pt_vec3 *beta, int depth, struct pt_rng *rng)
+{
+    float strength = v3_max(*beta);
+    if (depth < PT_LAYER_ROULETTE || !(strength < 0.25f))
+        return 1;
+    if (!(strength > 0.0f) || pt_rng_float(rng) >= strength)
+        return 0;
+    *beta = v3_scale(*beta, 1.0f / strength);
+    return 1;
+}
+
+/* Along direction w from height *z to where light meets the layer's medium, 1, or to the boundary, if that comes first. */
+static inline int pt_layer_collides(const struct pt_bsdf *b, pt_vec3 w, float *z, struct pt_rng *rng)
+{
+    float dz = -log1pf(-pt_rng_float(rng)) * fabsf(w.z), next = w.z > 0.0f ? *z + dz : *z - dz;
+    int inside = next > 0.0f && next < b->thickness;
+    *z = inside ? next : w.z > 0.0f ? b->thickness : 0.0f;
+    return inside;
+}
+
 /* State of one walk; the interface lies at z = thickness, the base at 0. */
 struct pt_layer_walk {
     const struct pt_bsdf *top; /* eta and alpha of the interface */
@@ -139,12 +160,8 @@ static inline void pt_layer_escape(struct pt_layer_walk *k, float pdf)
 static inline int pt_layer_medium(struct pt_layer_walk *k, struct pt_rng *rng)
 {
     const struct pt_bsdf *b = k->top;
-    float dz = -log1pf(-pt_rng_float(rng)) * fabsf(k->w.z), z = k->w.z > 0.0f ? k->z + dz : k->z - dz;
-    if (!(z > 0.0f && z < b->thickness)) {
-        k->z = k->w.z > 0.0f ? b->thickness : 0.0f;
+    if (!pt_layer_collides(b, k->w, &k->z, rng))
         return 0;
-    }
-    k->z = z;
     pt_vec3 wo = v3_neg(k->w);
     k->beta = v3_mul(k->beta, b->albedo);
     float p = pt_phase_eval(b->g, wo, v3_neg(k->exit.wi));
@@ -207,13 +224,7 @@ static inline pt_vec3 pt_layer_walk_eval(const struct pt_bsdf *b, pt_vec3 wo, pt
     k.w = enter.wi;
     k.beta = v3_splat(enter.weight / (b->eta * b->eta));
     for (int depth = 0; depth < PT_LAYER_EVENTS; depth++) {
-        float strength = v3_max(k.beta);
-        if (depth >= PT_LAYER_ROULETTE && strength < 0.25f) {
-            if (!(strength > 0.0f) || pt_rng_float(rng) >= strength)
-                break;
-            k.beta = v3_scale(k.beta, 1.0f / strength);
-        }
-        if (k.w.z == 0.0f)
+        if (!pt_layer_survives(&k.beta, depth, rng) || k.w.z == 0.0f)
             break;
         if (scatters) {
             if (pt_layer_medium(&k, rng))
@@ -247,12 +258,8 @@ static inline int pt_layer_cross(const struct pt_bsdf *b, pt_vec3 wo, float u_lo
 /* Distance to the next scattering inside the layer: 1 and a new direction, or 0 and *z on the boundary that was reached. */
 static inline int pt_layer_scatter(const struct pt_bsdf *b, pt_vec3 *w, pt_vec3 *beta, float *z, struct pt_rng *rng)
 {
-    float dz = -log1pf(-pt_rng_float(rng)) * fabsf(w->z), next = w->z > 0.0f ? *z + dz : *z - dz;
-    if (!(next > 0.0f && next < b->thickness)) {
-        *z = w->z > 0.0f ? b->thickness : 0.0f;
+    if (!pt_layer_collides(b, *w, z, rng))
         return 0;
-    }
-    *z = next;
     *beta = v3_mul(*beta, b->albedo);
     float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng);
     pt_phase_sample(b->g, v3_neg(*w), u0, u1, w);
@@ -280,13 +287,7 @@ static inline int pt_layer_walk_sample(const struct pt_bsdf *b, pt_vec3 wo, floa
         return 1;
     }
     for (int depth = 0; depth < PT_LAYER_EVENTS; depth++) {
-        float strength = v3_max(beta);
-        if (depth >= PT_LAYER_ROULETTE && strength < 0.25f) {
-            if (!(strength > 0.0f) || pt_rng_float(rng) >= strength)
-                return 0;
-            beta = v3_scale(beta, 1.0f / strength);
-        }
-        if (w.z == 0.0f)
+        if (!pt_layer_survives(&beta, depth, rng) || w.z == 0.0f)
             return 0;
         if (scatters) {
             if (pt_layer_scatter(b, &w, &beta, &z, rng))

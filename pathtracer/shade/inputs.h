@@ -18,10 +18,7 @@ struct pt_surface {
     pt_vec3 dpdu, dpdv; /* need only be set when pt_material_needs_tangents */
 };
 
-static inline pt_vec3 pt_clamp_unit(pt_vec3 c)
-{
-    return v3(fminf(fmaxf(c.x, 0.0f), 1.0f), fminf(fmaxf(c.y, 0.0f), 1.0f), fminf(fmaxf(c.z, 0.0f), 1.0f));
-}
+static inline pt_vec3 pt_clamp_unit(pt_vec3 c) { return v3_least(v3_most(c, v3_splat(0.0f)), v3_splat(1.0f)); }
 
 /* Reflectance-like input; constants were clamped by pt_materials_build. */
 static inline pt_vec3 pt_material_colour(pt_effects fx, const struct pt_scene *scene, const struct pt_input *in,

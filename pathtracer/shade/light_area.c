@@ -173,9 +173,7 @@ float pt_light_quadric_pdf(const struct pt_scene *scene, const struct pt_shape *
     if (one_minus_cos > 0.0f)
         return 1.0f / (2.0f * PT_PI * one_minus_cos);
     /* n_quadric ∝ Mᵀ n */
-    const float *m = q->to_render.m;
-    pt_vec3 n_quadric = v3_norm(v3(m[0] * n.x + m[4] * n.y + m[8] * n.z, m[1] * n.x + m[5] * n.y + m[9] * n.z,
-                                   m[2] * n.x + m[6] * n.y + m[10] * n.z));
+    pt_vec3 n_quadric = v3_norm(pt_mat34_normal(&q->to_render, n));
     pt_vec3 d = v3_sub(p, p_ref);
     float cosine = fabsf(v3_dot(n, wi));
     return cosine > 0.0f ? v3_dot(d, d) / (cosine * area_of(q) * area_scale(q, n_quadric)) : 0.0f;

@@ -181,9 +181,6 @@ static int make_table(struct pt_scene *scene, double *weights, struct pt_arena *
 
 /* --- hierarchy -------------------------------------------------------------------------------------------------------- */
 
-static pt_vec3 least(pt_vec3 a, pt_vec3 b) { return v3(fminf(a.x, b.x), fminf(a.y, b.y), fminf(a.z, b.z)); }
-static pt_vec3 most(pt_vec3 a, pt_vec3 b) { return v3(fmaxf(a.x, b.x), fmaxf(a.y, b.y), fmaxf(a.z, b.z)); }
-
 static void bound_quadric(const struct pt_shape *shape, const struct pt_quadric *q, struct pt_light_bounds *out)
 {
     pt_quadric_bounds(q, &out->lower, &out->upper);
@@ -205,8 +202,8 @@ static int bound_emitter(const struct pt_scene *scene, const struct pt_emitter *
         light->position, light->position, {0.0f, 0.0f, 1.0f}, PT_PI, 0.5f * PT_PI, light->two_sided, 0.0};
     if (e->primitive >= 0) {
         pt_vec3 b = v3_add(e->p0, e->e1), c = v3_add(e->p0, e->e2);
-        out->lower = least(e->p0, least(b, c));
-        out->upper = most(e->p0, most(b, c));
+        out->lower = v3_least(e->p0, v3_least(b, c));
+        out->upper = v3_most(e->p0, v3_most(b, c));
         out->axis = e->n;
         out->normals_rad = 0.0f;
     } else if (shape) {

@@ -47,8 +47,8 @@ static void unite_cones(struct pt_light_bounds *a, const struct pt_light_bounds 
 
 static void unite(struct cluster *a, const struct cluster *b)
 {
-    a->b.lower = v3(fminf(a->b.lower.x, b->b.lower.x), fminf(a->b.lower.y, b->b.lower.y), fminf(a->b.lower.z, b->b.lower.z));
-    a->b.upper = v3(fmaxf(a->b.upper.x, b->b.upper.x), fmaxf(a->b.upper.y, b->b.upper.y), fmaxf(a->b.upper.z, b->b.upper.z));
+    a->b.lower = v3_least(a->b.lower, b->b.lower);
+    a->b.upper = v3_most(a->b.upper, b->b.upper);
     unite_cones(&a->b, &b->b);
     a->b.two_sided |= b->b.two_sided;
     a->b.intensity += b->b.intensity;
@@ -67,6 +67,16 @@ static struct cluster single(const struct build *build, int32_t i)
     c.net[1] = (b->intensity - c.any) * (double)b->axis.y;
     c.net[2] = (b->intensity - c.any) * (double)b->axis.z;
     return c;
+}
+
+/* *sum, which is empty unless *any, with what c has. */
+static void join(struct cluster *sum, int *any, const struct cluster *c)
+{
+    if (*any)
+        unite(sum, c);
+    else
+        *sum = *c;
+    *any = 1;
 }
 
 static struct cluster gather(const struct build *build, int32_t begin, int32_t end)
@@ -130,26 +140,19 @@ static double best_on_axis(const struct build *build, const struct cluster *c, i
     for (int32_t i = c->begin; i < c->end; i++) {
         int k = bucket_of(&build->bounds[build->order[i]], axis, low, high);
         struct cluster one = single(build, i);
-        if (used[k]++)
-            unite(&buckets[k], &one);
-        else
-            buckets[k] = one;
+        join(&buckets[k], &used[k], &one);
     }
     struct cluster sum = {0};
     int any = 0;
     for (int k = BUCKETS - 1; k > 0; k--) {
-        if (used[k] && any++)
-            unite(&sum, &buckets[k]);
-        else if (used[k])
-            sum = buckets[k];
+        if (used[k])
+            join(&sum, &any, &buckets[k]);
         right_cost[k] = any ? cost(&sum) : INFINITY;
     }
     any = 0;
     for (int k = 0; k + 1 < BUCKETS; k++) {
-        if (used[k] && any++)
-            unite(&sum, &buckets[k]);
-        else if (used[k])
-            sum = buckets[k];
+        if (used[k])
+            join(&sum, &any, &buckets[k]);
         double total = any ? cost(&sum) + right_cost[k + 1] : INFINITY;
         if (total < best) {
             best = total;

@@ -7,8 +7,6 @@ static float beer(float sigma, float t) { return sigma > 0.0f ? expf(-sigma * t)
 
 static pt_vec3 beer_rgb(pt_vec3 sigma, float t) { return v3(beer(sigma.x, t), beer(sigma.y, t), beer(sigma.z, t)); }
 
-static float mean(pt_vec3 a) { return (a.x + a.y + a.z) * (1.0f / 3.0f); }
-
 /* ∫ exp(-σ t) dt over [0, t] */
 static float optical_mean(float sigma, float t) { return sigma > 0.0f ? -expm1f(-sigma * t) / sigma : t; }
 
@@ -45,13 +43,13 @@ static void homogeneous_sample(const struct pt_medium *m, float t_max, struct pt
     float t = sigma > 0.0f ? -log1pf(-pt_rng_float(rng)) / sigma : INFINITY;
     if (t < t_max) {
         pt_vec3 tr = beer_rgb(sigma_t, t);
-        float pdf = mean(v3_mul(sigma_t, tr));
+        float pdf = v3_mean(v3_mul(sigma_t, tr));
         event->scattered = 1;
         event->t = t;
         event->weight = pdf > 0.0f ? v3_scale(v3_mul(m->sigma_s, tr), 1.0f / pdf) : v3_splat(0.0f);
     } else {
         pt_vec3 tr = beer_rgb(sigma_t, t_max);
-        float p = mean(tr);
+        float p = v3_mean(tr);
         event->weight = p > 0.0f ? v3_scale(tr, 1.0f / p) : v3_splat(0.0f);
     }
 }

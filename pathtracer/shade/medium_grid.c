@@ -10,8 +10,6 @@ enum { MAJORANT_CELLS = 16 /* largest number per axis */ };
 /* Below this weight a path or transmittance is ended at random. */
 static const float roulette_below = 0.05f;
 
-static float mean(pt_vec3 a) { return (a.x + a.y + a.z) * (1.0f / 3.0f); }
-
 static float cell(const struct pt_medium *m, int x, int y, int z)
 {
     if (x < 0 || y < 0 || z < 0 || x >= m->nx || y >= m->ny || z >= m->nz)
@@ -60,19 +58,17 @@ static float largest(const struct pt_medium *m, int x, int y, int z)
 
 int pt_medium_grid_build(struct pt_medium *m, struct pt_arena *arena, struct base_err *err)
 {
-    int mx = m->nx < MAJORANT_CELLS ? m->nx : MAJORANT_CELLS, my = m->ny < MAJORANT_CELLS ? m->ny : MAJORANT_CELLS;
-    int mz = m->nz < MAJORANT_CELLS ? m->nz : MAJORANT_CELLS;
-    float *majorant = pt_arena_alloc(arena, (size_t)mx * (size_t)my * (size_t)mz, sizeof(float));
+    m->mx = m->nx < MAJORANT_CELLS ? m->nx : MAJORANT_CELLS;
+    m->my = m->ny < MAJORANT_CELLS ? m->ny : MAJORANT_CELLS;
+    m->mz = m->nz < MAJORANT_CELLS ? m->nz : MAJORANT_CELLS;
+    float *majorant = pt_arena_alloc(arena, (size_t)m->mx * (size_t)m->my * (size_t)m->mz, sizeof(float));
     if (!majorant)
         return base_fail_nomem(err, "the majorants of a grid medium");
-    m->mx = mx;
-    m->my = my;
-    m->mz = mz;
     m->majorant = majorant;
-    for (int z = 0; z < mz; z++)
-        for (int y = 0; y < my; y++)
-            for (int x = 0; x < mx; x++)
-                majorant[(z * my + y) * mx + x] = largest(m, x, y, z);
+    for (int z = 0; z < m->mz; z++)
+        for (int y = 0; y < m->my; y++)
+            for (int x = 0; x < m->mx; x++)
+                majorant[(z * m->my + y) * m->mx + x] = largest(m, x, y, z);
     return 0;
 }
 
@@ -177,8 +173,8 @@ void pt_medium_grid_sample(const struct pt_medium *m, pt_vec3 origin, pt_vec3 di
             float share = pt_medium_density(m, v3_madd(w.origin, w.t, w.direction)) / w.majorant;
             emitted = v3_madd(emitted, share, v3_mul(weight, m->emission));
             pt_vec3 scatter = v3_scale(m->sigma_s, share), null = v3_sub(v3_splat(1.0f), v3_scale(sigma_t, share));
-            null = v3(fmaxf(null.x, 0.0f), fmaxf(null.y, 0.0f), fmaxf(null.z, 0.0f));
-            float ps = mean(v3_mul(weight, scatter)), pn = mean(v3_mul(weight, null));
+            null = v3_most(null, v3_splat(0.0f));
+            float ps = v3_mean(v3_mul(weight, scatter)), pn = v3_mean(v3_mul(weight, null));
             if (!(ps + pn > 0.0f)) {
                 weight = v3_splat(0.0f);
                 break;
@@ -209,7 +205,7 @@ pt_vec3 pt_medium_grid_transmittance(const struct pt_medium *m, pt_vec3 origin, 
     while (walk_next(&w, m, rng)) {
         float share = pt_medium_density(m, v3_madd(w.origin, w.t, w.direction)) / w.majorant;
         weight = v3_mul(weight, v3_sub(v3_splat(1.0f), v3_scale(sigma_t, share)));
-        weight = v3(fmaxf(weight.x, 0.0f), fmaxf(weight.y, 0.0f), fmaxf(weight.z, 0.0f));
+        weight = v3_most(weight, v3_splat(0.0f));
         if (!survive(&weight, rng))
             break;
     }

@@ -97,7 +97,7 @@ static pt_vec3 eval_image(const struct pt_scene *scene, const struct pt_texture 
     pt_vec3 value = v3_scale(pt_image_bilinear(&scene->images[t->image], t->wrap, t->channel, s, 1.0f - v), t->scale);
     if (t->invert)
         value = v3_sub(v3_splat(1.0f), value);
-    return v3(fmaxf(value.x, 0.0f), fmaxf(value.y, 0.0f), fmaxf(value.z, 0.0f));
+    return v3_most(value, v3_splat(0.0f));
 }
 
 /* Recursion ends: inputs of a texture have smaller numbers. The loader bounds the depth. */
@@ -124,12 +124,9 @@ pt_vec3 pt_texture_eval(const struct pt_scene *scene, int32_t number, float u, f
         float sum = floorf(s) + floorf(w);
         return eval_input(scene, &t->in[sum - 2.0f * floorf(0.5f * sum) != 0.0f], u, v);
     }
-    case PT_TEXTURE_BILERP: {
-        pt_vec3 low = v3_madd(v3_scale(eval_input(scene, &t->in[0], u, v), 1.0f - w), w, eval_input(scene, &t->in[1], u, v));
-        pt_vec3 high =
-            v3_madd(v3_scale(eval_input(scene, &t->in[2], u, v), 1.0f - w), w, eval_input(scene, &t->in[3], u, v));
-        return v3_madd(v3_scale(low, 1.0f - s), s, high);
-    }
+    case PT_TEXTURE_BILERP:
+        return blend4(eval_input(scene, &t->in[0], u, v), eval_input(scene, &t->in[1], u, v),
+                      eval_input(scene, &t->in[2], u, v), eval_input(scene, &t->in[3], u, v), w, s);
     default: return t->in[0].value;
     }
 }

@@ -37,9 +37,7 @@ static inline pt_vec3 pt_input_rgb(pt_effects fx, const struct pt_scene *scene, 
 
 static inline float pt_input_float(pt_effects fx, const struct pt_scene *scene, const struct pt_input *in, float u, float v)
 {
-    if ((fx & PT_FX_TEXTURE) && in->texture)
-        return pt_texture_eval(scene, in->texture, u, v).x;
-    return in->value.x;
+    return pt_input_rgb(fx, scene, in, u, v).x;
 }
 
 /* Fetches into the cache what texture `number` will read at (u, v), if it is an image. */
