@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/options.h"
 #include "pbrt/number.h"
 #include "pbrt/pbrt_parser.h"
 #include "pbrt/spectra.h"
@@ -54,11 +55,11 @@ int pt_parser_read_numbers(struct parser *p, const char *directive_name, double 
 }
 
 /* Kind and parameter list into p->params, with those of Attribute `target` added (-1: none). */
-static int read_entity(struct parser *p, struct pt_loc loc, int target)
+static int read_entity(struct parser *p, int target)
 {
     char kind[NAME_MAX_BYTES];
     struct pt_params *params = &p->params;
-    pt_params_clear(params, &p->b->diag, loc);
+    pt_params_clear(params, &p->b->diag, p->loc);
     int rc = pt_parser_read_string(p, "name of what follows", kind, sizeof kind);
     if (rc)
         return rc;
@@ -71,11 +72,11 @@ static int read_entity(struct parser *p, struct pt_loc loc, int target)
 
 /* --- blocks ----------------------------------------------------------------------------------------------------------- */
 
-static int push(struct parser *p, char kind, struct pt_loc loc)
+static int push(struct parser *p, char kind)
 {
-    struct frame f = {p->state, kind, loc};
+    struct frame f = {p->state, kind, p->loc};
     if (p->frames.count >= STATE_DEPTH)
-        return pt_diag_fail(&p->b->diag, loc, "blocks nested more than %d deep", STATE_DEPTH);
+        return pt_diag_fail(&p->b->diag, p->loc, "blocks nested more than %d deep", STATE_DEPTH);
     return pt_list_add(p->b, &p->frames, &f) < 0 ? p->b->diag.rc : 0;
 }
 
@@ -90,21 +91,21 @@ static const struct frame *innermost(const struct parser *p)
     return p->frames.count > 0 ? (const struct frame *)p->frames.items + p->frames.count - 1 : NULL;
 }
 
-static int fail_open(struct parser *p, struct pt_loc loc, const char *name)
+static int fail_open(struct parser *p, const char *name)
 {
     const struct frame *top = innermost(p);
-    const int elsewhere = strcmp(top->loc.file, loc.file) != 0;
-    return pt_diag_fail(&p->b->diag, loc, "%s where the %s of %s%s%d is still open", name, begin_name(top->kind),
+    const int elsewhere = strcmp(top->loc.file, p->loc.file) != 0;
+    return pt_diag_fail(&p->b->diag, p->loc, "%s where the %s of %s%s%d is still open", name, begin_name(top->kind),
                         elsewhere ? top->loc.file : "line ", elsewhere ? ":" : "", top->loc.line);
 }
 
-static int pop(struct parser *p, char kind, struct pt_loc loc, const char *end_name)
+static int pop(struct parser *p, char kind, const char *end_name)
 {
     const struct frame *top = innermost(p);
     if (!top || top->kind == 'I')
-        return pt_diag_fail(&p->b->diag, loc, "%s without %s", end_name, begin_name(kind));
+        return pt_diag_fail(&p->b->diag, p->loc, "%s without %s", end_name, begin_name(kind));
     if (top->kind != kind)
-        return fail_open(p, loc, end_name);
+        return fail_open(p, end_name);
     if (kind == 'T') {
         memcpy(p->state.ctm, top->state.ctm, sizeof p->state.ctm);
         p->state.active = top->state.active;
@@ -115,50 +116,51 @@ static int pop(struct parser *p, char kind, struct pt_loc loc, const char *end_n
     return 0;
 }
 
-static int do_attribute_begin(struct parser *p, struct pt_loc loc) { return push(p, 'A', loc); }
+static int do_attribute_begin(struct parser *p) { return push(p, 'A'); }
 
-static int do_attribute_end(struct parser *p, struct pt_loc loc) { return pop(p, 'A', loc, "AttributeEnd"); }
+static int do_attribute_end(struct parser *p) { return pop(p, 'A', "AttributeEnd"); }
 
-static int do_transform_begin(struct parser *p, struct pt_loc loc) { return push(p, 'T', loc); }
+static int do_transform_begin(struct parser *p) { return push(p, 'T'); }
 
-static int do_transform_end(struct parser *p, struct pt_loc loc) { return pop(p, 'T', loc, "TransformEnd"); }
+static int do_transform_end(struct parser *p) { return pop(p, 'T', "TransformEnd"); }
 
-static int do_object_begin(struct parser *p, struct pt_loc loc)
+static int do_object_begin(struct parser *p)
 {
     char name[NAME_MAX_BYTES];
     int rc = pt_parser_read_string(p, "object name", name, sizeof name);
     if (!rc)
-        rc = pt_build_object_begin(p->b, name, loc);
-    return rc ? rc : push(p, 'O', loc);
+        rc = pt_build_object_begin(p->b, name, p->loc);
+    return rc ? rc : push(p, 'O');
 }
 
-static int do_object_end(struct parser *p, struct pt_loc loc)
+static int do_object_end(struct parser *p)
 {
-    int rc = pop(p, 'O', loc, "ObjectEnd");
-    return rc ? rc : pt_build_object_end(p->b);
+    int rc = pop(p, 'O', "ObjectEnd");
+    if (!rc)
+        p->b->open_object = -1;
+    return rc;
 }
 
-static int do_object_instance(struct parser *p, struct pt_loc loc)
+static int do_object_instance(struct parser *p)
 {
     char name[NAME_MAX_BYTES];
     int rc = pt_parser_read_string(p, "object name", name, sizeof name);
-    return rc ? rc : pt_build_instance(p->b, &p->state, name, loc);
+    return rc ? rc : pt_build_instance(p->b, &p->state, name, p->loc);
 }
 
-static int do_reverse_orientation(struct parser *p, struct pt_loc loc)
+static int do_reverse_orientation(struct parser *p)
 {
-    (void)loc;
     p->state.reverse_orientation = !p->state.reverse_orientation;
     return 0;
 }
 
 /* --- header ----------------------------------------------------------------------------------------------------------- */
 
-static int read_header(struct parser *p, struct pt_loc loc, enum pt_header which, const char *name)
+static int read_header(struct parser *p, enum pt_header which, const char *name)
 {
     if (p->in_world)
-        return pt_diag_fail(&p->b->diag, loc, "%s after WorldBegin", name);
-    int rc = read_entity(p, loc, -1);
+        return pt_diag_fail(&p->b->diag, p->loc, "%s after WorldBegin", name);
+    int rc = read_entity(p, -1);
     if (rc)
         return rc;
     struct pt_params old = p->b->header[which];
@@ -167,53 +169,47 @@ static int read_header(struct parser *p, struct pt_loc loc, enum pt_header which
     return 0;
 }
 
-static int do_film(struct parser *p, struct pt_loc loc)
+static int do_film(struct parser *p)
 {
-    int rc = read_header(p, loc, PT_HEADER_FILM, "Film");
+    int rc = read_header(p, PT_HEADER_FILM, "Film");
     if (!rc && strcmp(pt_params_kind(&p->b->header[PT_HEADER_FILM]), "image") == 0)
         p->b->is_v3 = 1;
     return rc;
 }
 
-static int do_camera(struct parser *p, struct pt_loc loc)
+static int do_camera(struct parser *p)
 {
     struct pt_xform inverse[2];
-    int rc = read_header(p, loc, PT_HEADER_CAMERA, "Camera");
+    int rc = read_header(p, PT_HEADER_CAMERA, "Camera");
     if (rc)
         return rc;
     memcpy(p->b->camera_ctm, p->state.ctm, sizeof p->state.ctm);
     p->b->camera_medium = p->state.medium_out;
     for (int i = 0; i < 2; i++)
         if (!pt_xform_invert(&p->state.ctm[i], &inverse[i]))
-            return pt_diag_fail(&p->b->diag, loc, "the camera's transform is singular");
+            return pt_diag_fail(&p->b->diag, p->loc, "the camera's transform is singular");
     return pt_parser_save_system(p, "camera", inverse);
 }
 
-static int do_sampler(struct parser *p, struct pt_loc loc) { return read_header(p, loc, PT_HEADER_SAMPLER, "Sampler"); }
+static int do_sampler(struct parser *p) { return read_header(p, PT_HEADER_SAMPLER, "Sampler"); }
 
-static int do_integrator(struct parser *p, struct pt_loc loc)
-{
-    return read_header(p, loc, PT_HEADER_INTEGRATOR, "Integrator");
-}
+static int do_integrator(struct parser *p) { return read_header(p, PT_HEADER_INTEGRATOR, "Integrator"); }
 
-static int do_pixel_filter(struct parser *p, struct pt_loc loc)
-{
-    return read_header(p, loc, PT_HEADER_FILTER, "PixelFilter");
-}
+static int do_pixel_filter(struct parser *p) { return read_header(p, PT_HEADER_FILTER, "PixelFilter"); }
 
 /* The choice is ours. */
-static int do_accelerator(struct parser *p, struct pt_loc loc)
+static int do_accelerator(struct parser *p)
 {
-    (void)p, (void)loc;
+    (void)p;
     return 0;
 }
 
-static int do_world_begin(struct parser *p, struct pt_loc loc)
+static int do_world_begin(struct parser *p)
 {
     if (p->in_world)
-        return pt_diag_fail(&p->b->diag, loc, "WorldBegin occurs twice");
+        return pt_diag_fail(&p->b->diag, p->loc, "WorldBegin occurs twice");
     if (innermost(p))
-        return fail_open(p, loc, "WorldBegin");
+        return fail_open(p, "WorldBegin");
     p->in_world = 1;
     p->state.ctm[0] = p->state.ctm[1] = pt_xform_identity();
     p->state.active = 3;
@@ -221,45 +217,35 @@ static int do_world_begin(struct parser *p, struct pt_loc loc)
     return rc ? rc : pt_build_header(p->b);
 }
 
-static int do_world_end(struct parser *p, struct pt_loc loc)
+static int do_world_end(struct parser *p)
 {
     p->ended = 1;
-    return innermost(p) ? fail_open(p, loc, "WorldEnd") : 0;
+    return innermost(p) ? fail_open(p, "WorldEnd") : 0;
 }
 
 /* --- world ------------------------------------------------------------------------------------------------------------ */
 
-static int do_shape(struct parser *p, struct pt_loc loc)
-{
-    (void)loc;
-    return pt_build_shape(p->b, &p->state, &p->params);
-}
+static int do_shape(struct parser *p) { return pt_build_shape(p->b, &p->state, &p->params); }
 
-static int do_light_source(struct parser *p, struct pt_loc loc)
-{
-    (void)loc;
-    return pt_build_light(p->b, &p->state, &p->params);
-}
+static int do_light_source(struct parser *p) { return pt_build_light(p->b, &p->state, &p->params); }
 
-static int do_area_light_source(struct parser *p, struct pt_loc loc)
+static int do_area_light_source(struct parser *p)
 {
-    (void)loc;
     return pt_build_area_light(p->b, &p->state, &p->params, &p->state.area);
 }
 
-static int do_material(struct parser *p, struct pt_loc loc)
+static int do_material(struct parser *p)
 {
-    (void)loc;
     p->state.material = pt_build_material(p->b, &p->state, pt_params_kind(&p->params), &p->params);
     return p->b->diag.rc;
 }
 
-static int do_make_named_material(struct parser *p, struct pt_loc loc)
+static int do_make_named_material(struct parser *p)
 {
     char kind[NAME_MAX_BYTES], name[NAME_MAX_BYTES];
     const char *type = pt_params_string(&p->params, "type", NULL);
     if (!type)
-        return pt_diag_fail(&p->b->diag, loc, "MakeNamedMaterial \"%s\" without \"string type\"",
+        return pt_diag_fail(&p->b->diag, p->loc, "MakeNamedMaterial \"%s\" without \"string type\"",
                             pt_params_kind(&p->params));
     strncpy(kind, type, sizeof kind - 1);
     kind[sizeof kind - 1] = '\0';
@@ -270,36 +256,35 @@ static int do_make_named_material(struct parser *p, struct pt_loc loc)
     return p->b->diag.rc;
 }
 
-static int do_named_material(struct parser *p, struct pt_loc loc)
+static int do_named_material(struct parser *p)
 {
     char name[NAME_MAX_BYTES];
     int rc = pt_parser_read_string(p, "material name", name, sizeof name);
     if (rc)
         return rc;
-    p->state.material = pt_build_material_named(p->b, loc, name);
+    p->state.material = pt_build_material_named(p->b, p->loc, name);
     return p->b->diag.rc;
 }
 
-static int do_texture(struct parser *p, struct pt_loc loc)
+static int do_texture(struct parser *p)
 {
     char name[NAME_MAX_BYTES], type[64];
     int rc = pt_parser_read_string(p, "texture name", name, sizeof name);
     if (!rc)
         rc = pt_parser_read_string(p, "texture type", type, sizeof type);
     if (!rc)
-        rc = read_entity(p, loc, PT_ATTR_TEXTURE);
+        rc = read_entity(p, PT_ATTR_TEXTURE);
     return rc ? rc : pt_build_texture(p->b, &p->state, name, type, &p->params);
 }
 
-static int do_make_named_medium(struct parser *p, struct pt_loc loc)
+static int do_make_named_medium(struct parser *p)
 {
     char name[NAME_MAX_BYTES];
-    (void)loc;
     strcpy(name, pt_params_kind(&p->params));
     return pt_build_medium(p->b, &p->state, name, &p->params);
 }
 
-static int do_medium_interface(struct parser *p, struct pt_loc loc)
+static int do_medium_interface(struct parser *p)
 {
     char inside[NAME_MAX_BYTES], outside[NAME_MAX_BYTES];
     int rc = pt_parser_read_string(p, "medium name", inside, sizeof inside);
@@ -309,21 +294,20 @@ static int do_medium_interface(struct parser *p, struct pt_loc loc)
     if (pt_lexer_peek(&p->lexer).kind == PT_TOKEN_STRING &&
         (rc = pt_parser_read_string(p, "medium name", outside, sizeof outside)) != 0)
         return rc;
-    p->state.medium_in = pt_build_medium_ref(p->b, inside, loc);
-    p->state.medium_out = pt_build_medium_ref(p->b, outside, loc);
+    p->state.medium_in = pt_build_medium_ref(p->b, inside, p->loc);
+    p->state.medium_out = pt_build_medium_ref(p->b, outside, p->loc);
     return p->b->diag.rc;
 }
 
-static int do_attribute(struct parser *p, struct pt_loc loc)
+static int do_attribute(struct parser *p)
 {
-    static const char *const targets[] = {"shape", "light", "material", "medium", "texture"};
-    int rc, target = -1;
-    for (int i = 0; i < PT_ATTR_COUNT; i++)
-        if (strcmp(pt_params_kind(&p->params), targets[i]) == 0)
-            target = i;
+    /* in the order of enum pt_attribute */
+    static const char *const targets[] = {"shape", "light", "material", "medium", "texture", NULL};
+    const char *kind = pt_params_kind(&p->params);
+    int rc, target = base_word_index(targets, kind, strlen(kind));
     if (target < 0)
-        return pt_diag_fail(&p->b->diag, loc, "Attribute \"%s\" (expected shape, light, material, medium or texture)",
-                            pt_params_kind(&p->params));
+        return pt_diag_fail(&p->b->diag, p->loc, "Attribute \"%s\" (expected shape, light, material, medium or texture)",
+                            kind);
     /* New values win over those set before. */
     if (p->state.attributes[target] && (rc = pt_params_append(&p->params, p->state.attributes[target])) != 0)
         return rc;
@@ -332,12 +316,12 @@ static int do_attribute(struct parser *p, struct pt_loc loc)
         free(copy);
         return pt_diag_nomem(&p->b->diag, "attributes");
     }
-    pt_params_clear(copy, &p->b->diag, loc);
+    pt_params_clear(copy, &p->b->diag, p->loc);
     p->state.attributes[target] = copy;
     return pt_params_append(copy, &p->params);
 }
 
-static int do_color_space(struct parser *p, struct pt_loc loc)
+static int do_color_space(struct parser *p)
 {
     char name[64];
     int rc = pt_parser_read_string(p, "colour space", name, sizeof name);
@@ -345,15 +329,15 @@ static int do_color_space(struct parser *p, struct pt_loc loc)
         return rc;
     int space = pt_colour_space_named(name);
     if (space < 0)
-        return pt_diag_fail(&p->b->diag, loc, "unknown colour space \"%s\" (expected srgb, dci-p3, rec2020 or aces2065-1)",
-                            name);
+        return pt_diag_fail(&p->b->diag, p->loc,
+                            "unknown colour space \"%s\" (expected srgb, dci-p3, rec2020 or aces2065-1)", name);
     p->state.colour_space = space;
     return 0;
 }
 
-static int do_option(struct parser *p, struct pt_loc loc)
+static int do_option(struct parser *p)
 {
-    pt_params_clear(&p->params, &p->b->diag, loc);
+    pt_params_clear(&p->params, &p->b->diag, p->loc);
     int rc = pt_params_read(&p->params, &p->lexer);
     for (size_t i = 0; i < p->params.count && !rc; i++) {
         const char *name = pt_param_name(&p->params, &p->params.items[i]);
@@ -366,21 +350,21 @@ static int do_option(struct parser *p, struct pt_loc loc)
     return rc;
 }
 
-static int include(struct parser *p, struct pt_loc loc, int scoped)
+static int include(struct parser *p, int scoped)
 {
     char name[NAME_MAX_BYTES], path[2 * NAME_MAX_BYTES];
     int rc = pt_parser_read_string(p, "file name", name, sizeof name);
     if (rc)
         return rc;
     pt_builder_path(p->b, name, path, sizeof path);
-    if (scoped && (rc = push(p, 'I', loc)) != 0)
+    if (scoped && (rc = push(p, 'I')) != 0)
         return rc;
-    return pt_lexer_include(&p->lexer, path, loc, scoped);
+    return pt_lexer_include(&p->lexer, path, p->loc, scoped);
 }
 
-static int do_include(struct parser *p, struct pt_loc loc) { return include(p, loc, 0); }
+static int do_include(struct parser *p) { return include(p, 0); }
 
-static int do_import(struct parser *p, struct pt_loc loc) { return include(p, loc, 1); }
+static int do_import(struct parser *p) { return include(p, 1); }
 
 /* --- the loop --------------------------------------------------------------------------------------------------------- */
 
@@ -436,6 +420,7 @@ static int is_directive(const struct pt_token *t)
 
 static int run_directive(struct parser *p, const struct pt_token *t)
 {
+    p->loc = t->loc;
     const struct directive *d = find_directive(directives, t);
     if (!d)
         d = find_directive(pt_transform_directives, t);
@@ -444,8 +429,8 @@ static int run_directive(struct parser *p, const struct pt_token *t)
                             t->length < 40 ? (int)t->length : 40, t->text);
     if (d->in_world && !p->in_world)
         return pt_diag_fail(&p->b->diag, t->loc, "%s before WorldBegin", d->name);
-    int rc = d->reads == READ_NOTHING ? 0 : read_entity(p, t->loc, (int)d->reads - READ_FOR_SHAPE);
-    return rc ? rc : d->run(p, t->loc);
+    int rc = d->reads == READ_NOTHING ? 0 : read_entity(p, (int)d->reads - READ_FOR_SHAPE);
+    return rc ? rc : d->run(p);
 }
 
 static int finish(struct parser *p, struct pt_loc loc)

@@ -21,7 +21,8 @@ struct parser {
     struct pt_list frames;  /* struct frame */
     struct pt_list systems; /* struct pt_xform[2]: named coordinate systems */
     struct pt_names system_names;
-    struct pt_params params;   /* of the current directive */
+    struct pt_loc loc;         /* of the current directive */
+    struct pt_params params;   /* what it reads */
     struct pt_list attributes; /* struct pt_params *: owns what states point to */
     int in_world, ended;
 };
@@ -38,7 +39,7 @@ enum directive_reads {
 
 struct directive {
     const char *name;
-    int (*run)(struct parser *p, struct pt_loc loc);
+    int (*run)(struct parser *p);
     int in_world; /* refused before WorldBegin */
     enum directive_reads reads;
 };

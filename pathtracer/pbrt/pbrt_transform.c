@@ -3,7 +3,7 @@
 
 #include "pbrt/pbrt_parser.h"
 
-static int concat(struct parser *p, struct pt_loc loc, const struct pt_xform *t, int replace)
+static int concat(struct parser *p, const struct pt_xform *t, int replace)
 {
     struct pt_xform inverse;
     for (int i = 0; i < 2; i++) {
@@ -11,47 +11,47 @@ static int concat(struct parser *p, struct pt_loc loc, const struct pt_xform *t,
             continue;
         struct pt_xform next = replace ? *t : pt_xform_mul(&p->state.ctm[i], t);
         if (!pt_xform_invert(&next, &inverse))
-            return pt_diag_fail(&p->b->diag, loc, "singular transform (expected one that can be inverted)");
+            return pt_diag_fail(&p->b->diag, p->loc, "singular transform (expected one that can be inverted)");
         p->state.ctm[i] = next;
     }
     return 0;
 }
 
-static int do_identity(struct parser *p, struct pt_loc loc)
+static int do_identity(struct parser *p)
 {
     struct pt_xform t = pt_xform_identity();
-    return concat(p, loc, &t, 1);
+    return concat(p, &t, 1);
 }
 
-static int do_translate(struct parser *p, struct pt_loc loc)
+static int do_translate(struct parser *p)
 {
     double v[3] = {0};
     int rc = pt_parser_read_numbers(p, "Translate", v, 3);
     struct pt_xform t = pt_xform_translate(v[0], v[1], v[2]);
-    return rc ? rc : concat(p, loc, &t, 0);
+    return rc ? rc : concat(p, &t, 0);
 }
 
-static int do_scale(struct parser *p, struct pt_loc loc)
+static int do_scale(struct parser *p)
 {
     double v[3] = {0};
     int rc = pt_parser_read_numbers(p, "Scale", v, 3);
     struct pt_xform t = pt_xform_scale(v[0], v[1], v[2]);
-    return rc ? rc : concat(p, loc, &t, 0);
+    return rc ? rc : concat(p, &t, 0);
 }
 
-static int do_rotate(struct parser *p, struct pt_loc loc)
+static int do_rotate(struct parser *p)
 {
     double v[4] = {0};
     int rc = pt_parser_read_numbers(p, "Rotate", v, 4);
     if (rc)
         return rc;
     if (v[1] == 0 && v[2] == 0 && v[3] == 0)
-        return pt_diag_fail(&p->b->diag, loc, "Rotate about the axis 0 0 0 (expected a direction)");
+        return pt_diag_fail(&p->b->diag, p->loc, "Rotate about the axis 0 0 0 (expected a direction)");
     struct pt_xform t = pt_xform_rotate(v[0], v[1], v[2], v[3]);
-    return concat(p, loc, &t, 0);
+    return concat(p, &t, 0);
 }
 
-static int do_look_at(struct parser *p, struct pt_loc loc)
+static int do_look_at(struct parser *p)
 {
     double v[9] = {0};
     struct pt_xform t;
@@ -59,11 +59,12 @@ static int do_look_at(struct parser *p, struct pt_loc loc)
     if (rc)
         return rc;
     if (!pt_xform_look_at(v, v + 3, v + 6, &t))
-        return pt_diag_fail(&p->b->diag, loc, "LookAt is degenerate (expected eye and target apart, up not along the view)");
-    return concat(p, loc, &t, 0);
+        return pt_diag_fail(&p->b->diag, p->loc,
+                            "LookAt is degenerate (expected eye and target apart, up not along the view)");
+    return concat(p, &t, 0);
 }
 
-static int do_matrix(struct parser *p, struct pt_loc loc, const char *name, int replace)
+static int do_matrix(struct parser *p, const char *name, int replace)
 {
     double v[16] = {0};
     struct pt_xform t;
@@ -71,13 +72,13 @@ static int do_matrix(struct parser *p, struct pt_loc loc, const char *name, int 
     if (rc)
         return rc;
     if (!pt_xform_from16(v, &t))
-        return pt_diag_fail(&p->b->diag, loc, "%s is not affine (expected 0 0 0 1 as every fourth number)", name);
-    return concat(p, loc, &t, replace);
+        return pt_diag_fail(&p->b->diag, p->loc, "%s is not affine (expected 0 0 0 1 as every fourth number)", name);
+    return concat(p, &t, replace);
 }
 
-static int do_transform(struct parser *p, struct pt_loc loc) { return do_matrix(p, loc, "Transform", 1); }
+static int do_transform(struct parser *p) { return do_matrix(p, "Transform", 1); }
 
-static int do_concat_transform(struct parser *p, struct pt_loc loc) { return do_matrix(p, loc, "ConcatTransform", 0); }
+static int do_concat_transform(struct parser *p) { return do_matrix(p, "ConcatTransform", 0); }
 
 int pt_parser_save_system(struct parser *p, const char *name, const struct pt_xform ctm[2])
 {
@@ -87,15 +88,14 @@ int pt_parser_save_system(struct parser *p, const char *name, const struct pt_xf
     return 0;
 }
 
-static int do_coordinate_system(struct parser *p, struct pt_loc loc)
+static int do_coordinate_system(struct parser *p)
 {
     char name[NAME_MAX_BYTES];
-    (void)loc;
     int rc = pt_parser_read_string(p, "name", name, sizeof name);
     return rc ? rc : pt_parser_save_system(p, name, p->state.ctm);
 }
 
-static int do_coord_sys_transform(struct parser *p, struct pt_loc loc)
+static int do_coord_sys_transform(struct parser *p)
 {
     char name[NAME_MAX_BYTES];
     int rc = pt_parser_read_string(p, "name", name, sizeof name);
@@ -103,7 +103,7 @@ static int do_coord_sys_transform(struct parser *p, struct pt_loc loc)
         return rc;
     int32_t id = pt_names_get(&p->system_names, name);
     if (id < 0)
-        return pt_diag_fail(&p->b->diag, loc, "unknown coordinate system \"%s\"", name);
+        return pt_diag_fail(&p->b->diag, p->loc, "unknown coordinate system \"%s\"", name);
     const struct pt_xform(*systems)[2] = p->systems.items;
     for (int i = 0; i < 2; i++)
         if (p->state.active >> i & 1)
@@ -111,10 +111,9 @@ static int do_coord_sys_transform(struct parser *p, struct pt_loc loc)
     return 0;
 }
 
-static int do_active_transform(struct parser *p, struct pt_loc loc)
+static int do_active_transform(struct parser *p)
 {
     struct pt_token t = pt_lexer_next(&p->lexer);
-    (void)loc;
     if (t.length == 9 && memcmp(t.text, "StartTime", 9) == 0)
         p->state.active = 1;
     else if (t.length == 7 && memcmp(t.text, "EndTime", 7) == 0)
@@ -126,14 +125,14 @@ static int do_active_transform(struct parser *p, struct pt_loc loc)
     return 0;
 }
 
-static int do_transform_times(struct parser *p, struct pt_loc loc)
+static int do_transform_times(struct parser *p)
 {
     double v[2] = {0, 1};
     int rc = pt_parser_read_numbers(p, "TransformTimes", v, 2);
     if (rc)
         return rc;
     if (p->in_world || !(v[1] >= v[0]))
-        return pt_diag_fail(&p->b->diag, loc, "TransformTimes must come before WorldBegin, start before end");
+        return pt_diag_fail(&p->b->diag, p->loc, "TransformTimes must come before WorldBegin, start before end");
     p->b->transform_times[0] = v[0];
     p->b->transform_times[1] = v[1];
     return 0;
