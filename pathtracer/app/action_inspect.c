@@ -41,7 +41,6 @@ void pt_action_explain(const struct pt_scene *scene, const struct pt_render_conf
 {
     pt_effects effects = scene->effects, covers = 0;
     const char *name = "";
-    const struct pt_scene_stats *stats = &scene->stats;
     pt_kernel *kernel = pt_kernel_select(effects, &covers, &name);
     printf("effects of %s:\n  %-13s %-3s %-6s  %-32s  %s\n", scene_name, "effect", "on", "kernel", "first asked for by",
            "costs, where it is compiled in");
@@ -58,9 +57,9 @@ void pt_action_explain(const struct pt_scene *scene, const struct pt_render_conf
     printf("kernel: %s\n", name);
     print_times(scene, config, kernel);
     printf("light selection: %s, %d emitters\n", scene->light_tree ? "hierarchy" : "power", (int)scene->emitter_count);
-    printf("scene: %lld triangles, %lld quadrics, %lld instances, %lld lights, %lld materials, %lld textures, %.1f MB\n",
-           stats->triangles, stats->quadrics, stats->instances, stats->lights, stats->materials, stats->textures,
-           (double)stats->bytes * 1e-6);
+    printf("scene: %lld triangles, %d quadrics, %d instances, %d lights, %d materials, %d textures, %.1f MB\n",
+           scene->stats.triangles, scene->quadric_count, scene->instance_count, scene->light_count, scene->material_count,
+           scene->texture_count, (double)scene->stats.bytes * 1e-6);
 }
 
 int pt_action_debug_path(const struct pt_scene *scene, const struct pt_render_config *config, const int at[3],

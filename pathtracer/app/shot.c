@@ -11,6 +11,7 @@
 #include "base/options.h"
 #include "render/checkpoint.h"
 #include "render/output.h"
+#include "scene/arena.h"
 
 enum { FRAMES_MAX = 1000000, PATH_BYTES_MAX = 1 << 26, NAME_ROOM = 4096, LINE_ROOM = 512 };
 
@@ -18,14 +19,8 @@ enum { FRAMES_MAX = 1000000, PATH_BYTES_MAX = 1 << 26, NAME_ROOM = 4096, LINE_RO
 
 static int add_frame(struct pt_shot *s, long frame, size_t *room, struct base_err *err)
 {
-    if (s->count == *room) {
-        size_t more = *room > 0 ? 2 * *room : 64;
-        int *frames = realloc(s->frames, more * sizeof *frames);
-        if (!frames)
-            return base_fail_nomem(err, "frames");
-        s->frames = frames;
-        *room = more;
-    }
+    if (!pt_grow((void **)&s->frames, room, s->count, sizeof *s->frames))
+        return base_fail_nomem(err, "frames");
     s->frames[s->count++] = (int)frame;
     return 0;
 }
@@ -173,7 +168,9 @@ static int check_names(const struct pt_cli *cli, const struct pt_shot *s, struct
     return 0;
 }
 
-int pt_shot_init(const struct pt_cli *cli, struct pt_shot *s, struct base_err *err)
+/* By --frames and --camera-path. BASE_EINVAL when these, or names in the command line, do not fit together or a scene is not
+ * there. *s is released by pt_shot_release, after a failure too. */
+static int find_frames(const struct pt_cli *cli, struct pt_shot *s, struct base_err *err)
 {
     *s = (struct pt_shot){0};
     int rc = cli->shot.camera_path ? read_path(&cli->shot, s, err) : pt_shot_parse_frames(cli->shot.frames, s, err);
@@ -251,7 +248,7 @@ int pt_shot_run(const struct pt_cli *cli, struct job *job, struct base_log *log,
 {
     struct pt_shot s;
     struct pt_open open = {0};
-    int rc = pt_shot_init(cli, &s, err);
+    int rc = find_frames(cli, &s, err);
     if (!rc && cli->shot.plan && job)
         rc = base_fail(err, BASE_EINVAL, "--plan-shot is the work of one process: leave out mpirun");
     if (!rc)

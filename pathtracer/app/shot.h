@@ -11,12 +11,9 @@ struct pt_shot {
     size_t count;
 };
 
-/* By --frames and --camera-path. BASE_EINVAL when these, or names in the command line, do not fit together or a scene is not
- * there. Released by pt_shot_release, after a failure too. */
-int pt_shot_init(const struct pt_cli *cli, struct pt_shot *shot, struct base_err *err);
 void pt_shot_release(struct pt_shot *shot);
 
-/* The parts. A list like 1-24, 1,5,9 or 1-24:2; rising. */
+/* A list of frames like 1-24, 1,5,9 or 1-24:2; rising. */
 int pt_shot_parse_frames(const char *text, struct pt_shot *shot, struct base_err *err);
 /* Lines "frame;eye;at;up;fov" below one that says so; the first four as for --look-at, fov as for --fov or nothing. name: of
  * the file. */

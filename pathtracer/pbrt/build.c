@@ -12,8 +12,8 @@
 #include "shade/material.h"
 #include "shade/medium.h"
 
-int pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_scene_defaults *defaults,
-                    const struct pt_load_options *options, const struct pt_source *source, struct base_err *err)
+void pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_scene_defaults *defaults,
+                     const struct pt_load_options *options, const struct pt_source *source, struct base_err *err)
 {
     *b = (struct pt_builder){.scene = scene, .defaults = defaults, .options = options, .source = source};
     b->diag = (struct pt_diag){.err = err, .strict = options->strict, .log = options->log};
@@ -32,7 +32,6 @@ int pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_scen
     b->lights.size = sizeof(struct pt_light);
     b->media.size = sizeof(struct pt_medium);
     b->medium_infos.size = sizeof(struct pt_medium_info);
-    return 0;
 }
 
 void pt_builder_release(struct pt_builder *b)
@@ -62,16 +61,6 @@ int32_t pt_list_add(struct pt_builder *b, struct pt_list *list, const void *item
     return (int32_t)list->count++;
 }
 
-void *pt_builder_keep(struct pt_builder *b, const void *data, size_t count, size_t size)
-{
-    void *copy = pt_arena_alloc(&b->scene->arena, count, size);
-    if (!copy)
-        pt_diag_nomem(&b->diag, "the scene");
-    else
-        memcpy(copy, data, count * size);
-    return copy;
-}
-
 void pt_builder_path(struct pt_builder *b, const char *name, char *path, size_t room)
 {
     snprintf(path, room, "%s%s", name[0] == '/' ? "" : b->directory, name);
@@ -83,7 +72,6 @@ void pt_builder_effect(struct pt_builder *b, pt_effects bits, struct pt_loc loc)
         struct pt_effect_reason *r = &b->scene->effect_reasons[i];
         if ((bits >> i & 1u) == 0 || r->line > 0)
             continue;
-        r->on = 1;
         r->line = loc.line;
         snprintf(r->file, sizeof r->file, "%s", loc.file ? loc.file : "");
     }
@@ -119,7 +107,11 @@ struct pt_xform pt_builder_to_render(const struct pt_builder *b, const struct pt
 static void *move(struct pt_builder *b, struct pt_list *list, int32_t *count)
 {
     *count = (int32_t)list->count;
-    void *kept = list->count > 0 ? pt_builder_keep(b, list->items, list->count, list->size) : NULL;
+    void *kept = pt_arena_alloc(&b->scene->arena, list->count, list->size);
+    if (kept)
+        memcpy(kept, list->items, list->count * list->size);
+    else if (list->count > 0)
+        pt_diag_nomem(&b->diag, "the scene");
     free(list->items);
     *list = (struct pt_list){.size = list->size};
     return kept;
@@ -184,11 +176,6 @@ static void add_stats(struct pt_scene *scene)
     struct pt_scene_stats *stats = &scene->stats;
     for (int32_t i = 0; i < scene->mesh_count; i++)
         stats->triangles += scene->meshes[i].triangle_count;
-    stats->quadrics = scene->quadric_count;
-    stats->instances = scene->instance_count;
-    stats->lights = scene->light_count;
-    stats->materials = scene->material_count;
-    stats->textures = scene->texture_count;
     stats->bytes = (long long)scene->arena.bytes + pt_accel_bytes(scene);
 }
 
@@ -216,8 +203,6 @@ int pt_builder_finish(struct pt_builder *b)
     add_shape_effects(b);
     scene->effects |= b->options->forced;
     scene->light_selection = b->options->light_selection;
-    for (int i = 0; i < PT_FX_COUNT; i++)
-        scene->effect_reasons[i].on = scene->effects >> i & 1;
     pt_camera_init(&scene->camera);
     double start_s = base_clock_wall_s();
     rc = pt_accel_build(scene, err);

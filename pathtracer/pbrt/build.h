@@ -88,19 +88,16 @@ struct pt_builder {
     double (*object_offsets)[3]; /* owns: origin of each object's space in the space it was defined in */
     size_t object_offset_room;
     int32_t default_material; /* grey diffuse, made on first use; -1 before */
-    int32_t mix_depth;
 };
 
-int pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_scene_defaults *defaults,
-                    const struct pt_load_options *options, const struct pt_source *source, struct base_err *err);
+void pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_scene_defaults *defaults,
+                     const struct pt_load_options *options, const struct pt_source *source, struct base_err *err);
 void pt_builder_release(struct pt_builder *b);
 /* Moves the arrays into the scene's arena and derives everything: effects, camera, acceleration structure, lights. */
 int pt_builder_finish(struct pt_builder *b);
 
 /* Appends a copy of *item; index, or -1 (the diag has failed). */
 int32_t pt_list_add(struct pt_builder *b, struct pt_list *list, const void *item);
-/* Copies into the scene's arena; NULL only after a failure. */
-void *pt_builder_keep(struct pt_builder *b, const void *data, size_t count, size_t size);
 /* Joins a scene-relative file name to the main file's folder. */
 void pt_builder_path(struct pt_builder *b, const char *name, char *path, size_t room);
 /* Turns on an effect; the first caller's place is the reason. */
@@ -132,7 +129,7 @@ int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char 
 struct pt_input pt_build_float_input(struct pt_builder *b, struct pt_params *p, const char *name, double fallback);
 struct pt_input pt_build_colour_input(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name,
                                       enum pt_colour_use use, pt_vec3 fallback);
-struct pt_input pt_input_constant(double r, double g, double b);
+struct pt_input pt_input_grey(double value);
 /* Image map by file name; encoding: NULL = by file kind, "sRGB", "linear", "gamma X". -1 on failure. */
 int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding);
 /* A colour image as texture (normal maps): its number, or 0 after a failure. */
@@ -178,7 +175,6 @@ int pt_build_media_check(struct pt_builder *b);
 /* build_shape.c */
 int pt_build_shape(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
 int pt_build_object_begin(struct pt_builder *b, const char *name, struct pt_loc loc);
-int pt_build_object_end(struct pt_builder *b);
 int pt_build_instance(struct pt_builder *b, const struct pt_state *s, const char *name, struct pt_loc loc);
 
 /* Triangles before they are placed. Positions: pd or pf; the rest may be NULL. */
@@ -191,6 +187,8 @@ struct pt_soup {
     const uint32_t *indices;
 };
 int pt_build_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const struct pt_soup *soup);
+/* Fails unless v, of the parameter "indices", is one of so many vertices. */
+int pt_build_check_index(struct pt_builder *b, const struct pt_params *p, double v, size_t vertex_count);
 /* build_tessellate.c: shapes that become triangles. */
 int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
 int pt_build_curve(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);

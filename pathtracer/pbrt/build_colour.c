@@ -102,9 +102,9 @@ static int check_colour(struct pt_builder *b, const struct pt_param *param, enum
         param->type == PT_PARAM_RGB)
         pt_diag_warn(&b->diag, param->loc, "reflectances beyond 0 … 1 are clamped");
     if (use == PT_USE_REFLECTANCE)
-        *rgb = v3(fminf(rgb->x, 1), fminf(rgb->y, 1), fminf(rgb->z, 1));
+        *rgb = v3_least(*rgb, v3_splat(1));
     /* Spectral colours may leave Rec.709; negative light does not exist. */
-    *rgb = v3(fmaxf(rgb->x, 0), fmaxf(rgb->y, 0), fmaxf(rgb->z, 0));
+    *rgb = v3_most(*rgb, v3_splat(0));
     return 0;
 }
 
@@ -121,18 +121,14 @@ int pt_build_colour(struct pt_builder *b, const struct pt_state *s, struct pt_pa
     switch (param->type) {
     case PT_PARAM_RGB:
     case PT_PARAM_XYZ:
-        if (param->count != 3) {
-            pt_diag_fail(&b->diag, param->loc, "parameter \"%s\" has %zu values (expected 3)", name, param->count);
+        if (!pt_param_has(p, param, 3))
             return 0;
-        }
         rgb = param->type == PT_PARAM_XYZ ? pt_xyz_to_rgb(v[0], v[1], v[2])
                                           : pt_colour_to_rec709(s->colour_space, v3((float)v[0], (float)v[1], (float)v[2]));
         break;
     case PT_PARAM_FLOAT: /* a grey, as v2 files and quick tests have it */
-        if (param->count != 1) {
-            pt_diag_fail(&b->diag, param->loc, "parameter \"%s\" has %zu values (expected 1)", name, param->count);
+        if (!pt_param_has(p, param, 1))
             return 0;
-        }
         rgb = v3_splat((float)v[0]);
         break;
     case PT_PARAM_SPECTRUM:
@@ -182,7 +178,7 @@ void pt_build_conductor(struct pt_builder *b, const struct pt_state *s, struct p
     if (k && !is_spectrum(k))
         pt_build_colour(b, s, p, k_name, PT_USE_UNBOUNDED, k_rgb);
     /* An index of 0 divides by zero in Fresnel's equations. */
-    *eta_rgb = v3(fmaxf(eta_rgb->x, 1e-3f), fmaxf(eta_rgb->y, 1e-3f), fmaxf(eta_rgb->z, 1e-3f));
+    *eta_rgb = v3_most(*eta_rgb, v3_splat(1e-3f));
 }
 
 double pt_build_index(struct pt_builder *b, struct pt_params *p, const char *name, double fallback)

@@ -3,18 +3,13 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/options.h"
 #include "pbrt/build.h"
 
 enum { MAX_SIDE = 65536 };
 static const double max_pixels = 268435456.0; /* 2^28: 200 bytes a pixel are 50 GiB */
 
-static int is_one_of(const char *kind, const char *const *names)
-{
-    for (; *names != NULL; names++)
-        if (strcmp(kind, *names) == 0)
-            return 1;
-    return 0;
-}
+static int is_one_of(const char *kind, const char *const *names) { return base_word_index(names, kind, strlen(kind)) >= 0; }
 
 static struct pt_params *begin(struct pt_builder *b, enum pt_header which, const char *fallback)
 {

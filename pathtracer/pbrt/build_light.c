@@ -22,27 +22,6 @@ static pt_vec3 scaled_colour(struct pt_builder *b, const struct pt_state *s, str
 /* Luminance of a colour, never 0. */
 static double luminance(pt_vec3 c) { return fmax((double)v3_luminance(c), 1e-30); }
 
-static void place(struct pt_builder *b, const struct pt_xform *ctm, const double p[3], pt_vec3 *out)
-{
-    double q[3];
-    struct pt_xform t = pt_builder_to_render(b, ctm);
-    pt_xform_point(&t, p, q);
-    *out = v3((float)q[0], (float)q[1], (float)q[2]);
-}
-
-/* ctm · (to - from), unit. */
-static int aim(struct pt_builder *b, struct pt_loc loc, const struct pt_xform *ctm, const double from[3], const double to[3],
-               pt_vec3 *out)
-{
-    double d[3] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]}, w[3];
-    pt_xform_vector(ctm, d, w);
-    double len = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-    if (!(len > 0) || !isfinite(len))
-        return pt_diag_fail(&b->diag, loc, "the light points nowhere (expected \"from\" and \"to\" apart)");
-    *out = v3((float)(w[0] / len), (float)(w[1] / len), (float)(w[2] / len));
-    return 0;
-}
-
 /* --- kinds ------------------------------------------------------------------------------------------------------------ */
 
 struct context {
@@ -53,21 +32,51 @@ struct context {
     struct pt_light *light;
 };
 
+static void place(const struct context *c, const double p[3], pt_vec3 *out)
+{
+    double q[3];
+    struct pt_xform t = pt_builder_to_render(c->b, &c->ctm);
+    pt_xform_point(&t, p, q);
+    *out = v3((float)q[0], (float)q[1], (float)q[2]);
+}
+
+static void read_position(struct context *c)
+{
+    double from[3] = {0, 0, 0};
+    pt_params_point(c->p, "from", from);
+    place(c, from, &c->light->position);
+}
+
+/* ctm · (to - from), unit. */
+static void read_direction(struct context *c)
+{
+    double from[3] = {0, 0, 0}, to[3] = {0, 0, 1}, w[3];
+    pt_params_point(c->p, "from", from);
+    pt_params_point(c->p, "to", to);
+    const double d[3] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
+    pt_xform_vector(&c->ctm, d, w);
+    double len = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+    if (!(len > 0) || !isfinite(len))
+        pt_diag_fail(&c->b->diag, pt_params_loc(c->p, pt_params_find(c->p, "to") ? "to" : "from"),
+                     "the light points nowhere (expected \"from\" and \"to\" apart)");
+    else
+        c->light->direction = v3((float)(w[0] / len), (float)(w[1] / len), (float)(w[2] / len));
+}
+
 static void make_point(struct context *c)
 {
-    double from[3] = {0, 0, 0}, power = pt_params_float(c->p, "power", -1);
+    double power = pt_params_float(c->p, "power", -1);
     c->light->kind = PT_LIGHT_POINT;
     c->light->emission = scaled_colour(c->b, c->s, c->p, "I");
     if (power > 0)
         c->light->emission = v3_scale(c->light->emission, (float)(power / (4 * BASE_PI)));
-    pt_params_point(c->p, "from", from);
-    place(c->b, &c->ctm, from, &c->light->position);
+    read_position(c);
     pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
 }
 
 static void make_spot(struct context *c)
 {
-    double from[3] = {0, 0, 0}, to[3] = {0, 0, 1}, power = pt_params_float(c->p, "power", -1);
+    double power = pt_params_float(c->p, "power", -1);
     double cone = pt_params_float_in(c->p, "coneangle", 30, 1e-3, 180),
            delta = pt_params_float_in(c->p, "conedeltaangle", 5, 0, 180);
     double cos_total = cos(cone * BASE_PI / 180), cos_start = cos(fmax(cone - delta, 0) * BASE_PI / 180);
@@ -76,10 +85,8 @@ static void make_spot(struct context *c)
     if (power > 0) /* flux of the smooth fall-off: 2π ((1 - cos start) + (cos start - cos total) / 2) */
         c->light->emission =
             v3_scale(c->light->emission, (float)(power / (2 * BASE_PI * ((1 - cos_start) + (cos_start - cos_total) / 2))));
-    pt_params_point(c->p, "from", from);
-    pt_params_point(c->p, "to", to);
-    place(c->b, &c->ctm, from, &c->light->position);
-    aim(c->b, pt_params_loc(c->p, pt_params_find(c->p, "to") ? "to" : "from"), &c->ctm, from, to, &c->light->direction);
+    read_position(c);
+    read_direction(c);
     c->light->cos_total = (float)cos_total;
     c->light->cos_start = (float)cos_start;
     pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
@@ -87,14 +94,12 @@ static void make_spot(struct context *c)
 
 static void make_distant(struct context *c)
 {
-    double from[3] = {0, 0, 0}, to[3] = {0, 0, 1}, illuminance = pt_params_float(c->p, "illuminance", -1);
+    double illuminance = pt_params_float(c->p, "illuminance", -1);
     c->light->kind = PT_LIGHT_DISTANT;
     c->light->emission = scaled_colour(c->b, c->s, c->p, "L");
     if (illuminance > 0)
         c->light->emission = v3_scale(c->light->emission, (float)illuminance);
-    pt_params_point(c->p, "from", from);
-    pt_params_point(c->p, "to", to);
-    aim(c->b, pt_params_loc(c->p, pt_params_find(c->p, "to") ? "to" : "from"), &c->ctm, from, to, &c->light->direction);
+    read_direction(c);
     pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
 }
 
@@ -153,16 +158,17 @@ static void make_portal(struct context *c)
     if (!given)
         return;
     pt_vec3 corner[4];
-    for (size_t i = 0; i < 4 && n == 4; i++)
-        place(c->b, &c->ctm, xyz + 3 * i, &corner[i]);
+    float area = 0.0f, off = 0.0f;
     if (n == 4) {
+        for (size_t i = 0; i < 4; i++)
+            place(c, xyz + 3 * i, &corner[i]);
         light->portal = corner[0];
         light->portal_u = v3_sub(corner[1], corner[0]);
         light->portal_v = v3_sub(corner[3], corner[0]);
+        area = v3_len(v3_cross(light->portal_u, light->portal_v));
+        off = v3_len(v3_sub(v3_sub(corner[2], corner[1]), light->portal_v));
     }
-    float area = n == 4 ? v3_len(v3_cross(light->portal_u, light->portal_v)) : 0.0f;
-    pt_vec3 off = n == 4 ? v3_sub(v3_sub(corner[2], corner[1]), light->portal_v) : v3_splat(0.0f);
-    if (!(area > 0.0f) || !isfinite(area) || !(v3_len(off) < 0.01f * sqrtf(area))) {
+    if (!(area > 0.0f) || !isfinite(area) || !(off < 0.01f * sqrtf(area))) {
         pt_diag_fail(&c->b->diag, given->loc, "a portal is the 4 corners of a rectangle, in order around it");
         return;
     }

@@ -49,8 +49,8 @@ void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallba
     double u = (double)m->roughness_u.value.x, v = (double)m->roughness_v.value.x;
     u = u > 0 ? v3_alpha(u) : 0;
     v = v > 0 ? v3_alpha(v) : 0;
-    m->roughness_u = pt_input_constant(u, u, u);
-    m->roughness_v = pt_input_constant(v, v, v);
+    m->roughness_u = pt_input_grey(u);
+    m->roughness_v = pt_input_grey(v);
     m->remap_roughness = 0;
 }
 
@@ -93,7 +93,7 @@ static void scale_colours(struct pt_making *c, const struct pt_bsdf_read *reads,
     for (const struct pt_bsdf_read *r = reads; r->kind != PT_READ_END; r++) {
         struct pt_input *in = (struct pt_input *)((char *)c->m + r->field);
         if (r->kind == PT_READ_COLOUR)
-            *in = pt_input_product(c->b, *in, pt_input_constant(scale, scale, scale));
+            *in = pt_input_product(c->b, *in, pt_input_grey(scale));
     }
 }
 
@@ -152,7 +152,7 @@ static void make_subsurface(struct pt_making *c)
     pt_build_roughness(c->b, c->p, 0, 0, c->m);
     c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.33);
     pt_params_ignore(c->p, "mfp sigma_a sigma_s scale g name filename");
-    c->m->thickness = pt_input_constant(0.01, 0.01, 0.01);
+    c->m->thickness = pt_input_grey(0.01);
 }
 
 static void make_hair(struct pt_making *c)
@@ -167,9 +167,9 @@ static void make_hair(struct pt_making *c)
 static void make_measured(struct pt_making *c)
 {
     pt_diag_warn(&c->b->diag, c->p->loc, "material \"measured\" is replaced by a coated diffuse one");
-    c->m->reflectance = pt_input_constant(0.5, 0.5, 0.5);
-    c->m->roughness_u = c->m->roughness_v = pt_input_constant(0.1, 0.1, 0.1);
-    c->m->thickness = pt_input_constant(0.01, 0.01, 0.01);
+    c->m->reflectance = pt_input_grey(0.5);
+    c->m->roughness_u = c->m->roughness_v = pt_input_grey(0.1);
+    c->m->thickness = pt_input_grey(0.01);
     pt_params_ignore(c->p, "filename");
 }
 
@@ -215,7 +215,7 @@ static int32_t add(struct pt_builder *b, const struct pt_material *m, const stru
 int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const char *kind, struct pt_params *p)
 {
     struct pt_material m = {.kind = PT_BSDF_DIFFUSE, .eta = 1.5f};
-    struct pt_material_info info = {.loc = p->loc, .opacity = pt_input_constant(1, 1, 1)};
+    struct pt_material_info info = {.loc = p->loc, .opacity = pt_input_grey(1)};
     struct pt_making c = {b, s, p, kind, &m, &info};
     pt_params_ignore(p, "type");
     if (!build_v4(&c) && !pt_build_material_v3(&c)) {
@@ -240,8 +240,8 @@ int32_t pt_build_default_material(struct pt_builder *b)
 {
     if (b->default_material < 0) {
         struct pt_material m = {.kind = PT_BSDF_DIFFUSE, .eta = 1.5f};
-        struct pt_material_info info = {.opacity = pt_input_constant(1, 1, 1)};
-        m.reflectance = pt_input_constant(0.5, 0.5, 0.5);
+        struct pt_material_info info = {.opacity = pt_input_grey(1)};
+        m.reflectance = pt_input_grey(0.5);
         b->default_material = add(b, &m, &info);
     }
     return b->default_material;

@@ -1,5 +1,4 @@
 /* pbrt-v3's materials in terms of v4's. */
-#include <math.h>
 #include <string.h>
 
 #include "pbrt/build.h"
@@ -9,7 +8,15 @@ static int is_black(struct pt_input in) { return !in.texture && v3_is_black(in.v
 static void clear_coat(struct pt_making *c)
 {
     c->m->kind = PT_BSDF_COATED_DIFFUSE;
-    c->m->thickness = pt_input_constant(0.01, 0.01, 0.01);
+    c->m->thickness = pt_input_grey(0.01);
+}
+
+/* Metal by its colour instead of an index. */
+static void coloured_metal(struct pt_making *c, struct pt_input colour)
+{
+    c->m->kind = PT_BSDF_CONDUCTOR;
+    c->m->conductor_by_colour = 1;
+    c->m->reflectance = colour;
 }
 
 static double index_of(struct pt_making *c, double fallback)
@@ -48,18 +55,14 @@ static void make_uber(struct pt_making *c)
     if (opacity) {
         struct pt_input o = pt_build_reflectance(c, "opacity", 1);
         c->info->has_opacity = o.texture || v3_luminance(o.value) < 1;
-        c->info->opacity = o.texture ? o
-                                     : pt_input_constant((double)v3_luminance(o.value), (double)v3_luminance(o.value),
-                                                         (double)v3_luminance(o.value));
+        c->info->opacity = o.texture ? o : pt_input_grey((double)v3_luminance(o.value));
     }
     if (!is_black(kt) && is_black(kd)) {
         c->m->kind = PT_BSDF_DIELECTRIC;
-        c->m->roughness_u = c->m->roughness_v = pt_input_constant(0, 0, 0);
+        c->m->roughness_u = c->m->roughness_v = pt_input_grey(0);
     } else if (!is_black(kr) && is_black(kd) && is_black(ks)) {
-        c->m->kind = PT_BSDF_CONDUCTOR;
-        c->m->conductor_by_colour = 1;
-        c->m->reflectance = kr;
-        c->m->roughness_u = c->m->roughness_v = pt_input_constant(0, 0, 0);
+        coloured_metal(c, kr);
+        c->m->roughness_u = c->m->roughness_v = pt_input_grey(0);
     } else {
         if (!is_black(kr) || !is_black(kt))
             pt_diag_warn(&c->b->diag, pt_params_loc(c->p, is_black(kr) ? "Kt" : "Kr"),
@@ -79,17 +82,13 @@ static void make_metal(struct pt_making *c)
 
 static void make_mirror(struct pt_making *c)
 {
-    c->m->kind = PT_BSDF_CONDUCTOR;
-    c->m->conductor_by_colour = 1;
-    c->m->reflectance = pt_build_reflectance(c, "Kr", 0.9f);
+    coloured_metal(c, pt_build_reflectance(c, "Kr", 0.9f));
     pt_params_ignore(c->p, "remaproughness roughness");
 }
 
 static void make_shiny_metal(struct pt_making *c)
 {
-    c->m->kind = PT_BSDF_CONDUCTOR;
-    c->m->conductor_by_colour = 1;
-    c->m->reflectance = pt_build_reflectance(c, "Kr", 1);
+    coloured_metal(c, pt_build_reflectance(c, "Kr", 1));
     pt_params_ignore(c->p, "Ks");
     pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
 }
@@ -158,8 +157,8 @@ static void make_disney(struct pt_making *c)
 static void make_fourier(struct pt_making *c)
 {
     pt_diag_warn(&c->b->diag, c->p->loc, "material \"%s\" (a measured table) is replaced by a coated diffuse one", c->kind);
-    c->m->reflectance = pt_input_constant(0.5, 0.5, 0.5);
-    c->m->roughness_u = c->m->roughness_v = pt_input_constant(0.05, 0.05, 0.05);
+    c->m->reflectance = pt_input_grey(0.5);
+    c->m->roughness_u = c->m->roughness_v = pt_input_grey(0.05);
     pt_params_ignore(c->p, "bsdffile");
     clear_coat(c);
 }

@@ -1,5 +1,4 @@
 /* Participating media. */
-#include <math.h>
 #include <string.h>
 
 #include "pbrt/build.h"
@@ -36,7 +35,7 @@ int pt_build_media_check(struct pt_builder *b)
 /* Jensen, Marschner, Levoy and Hanrahan 2001, "A Practical Model for Subsurface Light Transport", table 1; 1/mm. */
 static const struct {
     const char *name;
-    float sigma_s[3], sigma_a[3];
+    pt_vec3 sigma_s, sigma_a;
 } presets[] = {{"Apple", {2.29f, 2.39f, 1.97f}, {0.0030f, 0.0034f, 0.046f}},
                {"Chicken1", {0.15f, 0.21f, 0.38f}, {0.015f, 0.077f, 0.19f}},
                {"Chicken2", {0.19f, 0.25f, 0.32f}, {0.018f, 0.088f, 0.20f}},
@@ -60,9 +59,8 @@ static void read_coefficients(struct pt_builder *b, const struct pt_state *s, st
     int known = preset[0] == '\0';
     for (size_t i = 0; i < sizeof presets / sizeof presets[0] && !known; i++)
         if (strcmp(presets[i].name, preset) == 0) {
-            const float *ss = presets[i].sigma_s, *sa = presets[i].sigma_a;
-            m->sigma_s = v3(ss[0], ss[1], ss[2]);
-            m->sigma_a = v3(sa[0], sa[1], sa[2]);
+            m->sigma_s = presets[i].sigma_s;
+            m->sigma_a = presets[i].sigma_a;
             known = 1;
         }
     if (!known)

@@ -1,6 +1,5 @@
 /* Shapes, objects and instances. */
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -212,6 +211,14 @@ int pt_build_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_para
     return add_shape(b, s, p, &pl, &shape, s->area.on && s->area.power > 0 ? mesh_area(&mesh) : 0);
 }
 
+int pt_build_check_index(struct pt_builder *b, const struct pt_params *p, double v, size_t vertex_count)
+{
+    if (v >= 0 && v < (double)vertex_count)
+        return 0;
+    return pt_diag_fail(&b->diag, pt_params_loc(p, "indices"), "index %.0f out of range (expected 0 to %zu)", v,
+                        vertex_count > 0 ? vertex_count - 1 : 0);
+}
+
 /* Whole numbers of a list as vertex indices in [0, vertex_count); malloc'ed, NULL on failure. */
 static uint32_t *read_indices(struct pt_builder *b, struct pt_params *p, size_t vertex_count, size_t *count)
 {
@@ -234,9 +241,7 @@ static uint32_t *read_indices(struct pt_builder *b, struct pt_params *p, size_t 
     }
     for (size_t i = 0; i < n; i++) {
         double v = given ? given[i] : (double)i;
-        if (!(v >= 0 && v < (double)vertex_count)) {
-            pt_diag_fail(&b->diag, pt_params_find(p, "indices")->loc, "index %.0f out of range (expected 0 to %zu)", v,
-                         vertex_count > 0 ? vertex_count - 1 : 0);
+        if (pt_build_check_index(b, p, v, vertex_count) != 0) {
             free(indices);
             return NULL;
         }
@@ -411,12 +416,6 @@ int pt_build_object_begin(struct pt_builder *b, const char *name, struct pt_loc 
         return pt_diag_nomem(&b->diag, "objects");
     memset(b->object_offsets[id], 0, sizeof b->object_offsets[id]);
     b->open_object = id;
-    return 0;
-}
-
-int pt_build_object_end(struct pt_builder *b)
-{
-    b->open_object = -1;
     return 0;
 }
 

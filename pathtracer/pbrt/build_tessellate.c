@@ -120,11 +120,8 @@ int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_
         const double *c[4], *t[4], *n[4] = {NULL, NULL, NULL, NULL};
         for (size_t k = 0; k < 4; k++) {
             double v = indices[i + k];
-            if (!(v >= 0 && v < (double)vertices)) {
-                pt_diag_fail(&b->diag, pt_params_find(p, "indices")->loc, "index %.0f out of range (expected 0 to %zu)", v,
-                             vertices > 0 ? vertices - 1 : 0);
+            if (pt_build_check_index(b, p, v, vertices) != 0)
                 return finish(&g, 1, b, s, p);
-            }
             c[k] = P + 3 * (size_t)v;
             t[k] = uv ? uv + 2 * (size_t)v : square + 2 * k;
             n[k] = N ? N + 3 * (size_t)v : NULL;

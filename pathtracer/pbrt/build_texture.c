@@ -6,14 +6,12 @@
 
 #include "base/clock.h"
 #include "base/colour.h"
+#include "base/options.h"
 #include "picture/read.h"
 #include "pbrt/build.h"
 #include "pbrt/number.h"
 
-struct pt_input pt_input_constant(double r, double g, double b)
-{
-    return (struct pt_input){0, v3((float)r, (float)g, (float)b)};
-}
+struct pt_input pt_input_grey(double value) { return (struct pt_input){0, v3_splat((float)value)}; }
 
 /* Of the texture with this id; black after a failure (-1). */
 static struct pt_input input_of(int32_t id) { return (struct pt_input){.texture = id + 1}; }
@@ -144,7 +142,7 @@ static struct pt_input named_texture(struct pt_builder *b, struct pt_params *p, 
     param->used = 1;
     if (param->count != 1) {
         pt_diag_fail(&b->diag, param->loc, "\"%s\" names %zu textures (expected 1)", pt_param_name(p, param), param->count);
-        return pt_input_constant(0, 0, 0);
+        return pt_input_grey(0);
     }
     const char *name = pt_params_string_at(p, param, 0);
     int32_t id = pt_names_get(is_float ? &b->float_textures : &b->colour_textures, name);
@@ -152,7 +150,7 @@ static struct pt_input named_texture(struct pt_builder *b, struct pt_params *p, 
         int other = pt_names_get(is_float ? &b->colour_textures : &b->float_textures, name) >= 0;
         pt_diag_fail(&b->diag, param->loc, other ? "texture \"%s\" is a %s texture (expected %s)" : "unknown texture \"%s\"",
                      name, is_float ? "spectrum" : "float", is_float ? "float" : "spectrum");
-        return pt_input_constant(0, 0, 0);
+        return pt_input_grey(0);
     }
     const struct pt_texture *t = &((struct pt_texture *)b->textures.items)[id];
     /* A constant is its value: nothing is looked up while rendering. */
@@ -164,8 +162,7 @@ struct pt_input pt_build_float_input(struct pt_builder *b, struct pt_params *p, 
     struct pt_param *param = pt_params_find(p, name);
     if (param && param->type == PT_PARAM_TEXTURE)
         return named_texture(b, p, param, 1);
-    double v = pt_params_float(p, name, fallback);
-    return pt_input_constant(v, v, v);
+    return pt_input_grey(pt_params_float(p, name, fallback));
 }
 
 struct pt_input pt_build_colour_input(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name,
@@ -178,8 +175,6 @@ struct pt_input pt_build_colour_input(struct pt_builder *b, const struct pt_stat
     return (struct pt_input){0, fallback};
 }
 
-static int32_t add_texture(struct pt_builder *b, const struct pt_texture *t) { return pt_list_add(b, &b->textures, t); }
-
 struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct pt_input y)
 {
     if (!x.texture && !y.texture)
@@ -189,7 +184,7 @@ struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct
     if (!y.texture && y.value.x == 1 && y.value.y == 1 && y.value.z == 1)
         return x;
     struct pt_texture t = {.kind = PT_TEXTURE_SCALE, .scale = 1, .su = 1, .sv = 1, .in = {x, y}};
-    return input_of(add_texture(b, &t));
+    return input_of(pt_list_add(b, &b->textures, &t));
 }
 
 /* --- classes ---------------------------------------------------------------------------------------------------------- */
@@ -213,11 +208,8 @@ static void read_mapping(struct context *c, struct pt_texture *t)
     struct pt_params *p = c->p;
     const char *mapping = pt_params_string(p, "mapping", "uv");
     if (strcmp(mapping, "uv") != 0) {
-        static const char *const known[] = {"spherical", "cylindrical", "planar"};
-        int found = 0;
-        for (int i = 0; i < 3; i++)
-            found |= strcmp(mapping, known[i]) == 0;
-        if (!found)
+        static const char *const known[] = {"spherical", "cylindrical", "planar", NULL};
+        if (base_word_index(known, mapping, strlen(mapping)) < 0)
             pt_diag_fail(&c->b->diag, pt_params_find(p, "mapping")->loc,
                          "unknown mapping \"%.40s\" (expected uv, spherical, cylindrical or planar)", mapping);
         else
@@ -299,6 +291,7 @@ static void make_bilerp(struct context *c, struct pt_texture *t)
 
 static void make_imagemap(struct context *c, struct pt_texture *t)
 {
+    static const char *const wraps[] = {"repeat", "black", "clamp", "octahedralsphere", NULL}; /* by enum pt_wrap */
     struct pt_params *p = c->p;
     const char *file = pt_params_string(p, "filename", ""), *encoding = pt_params_string(p, "encoding", NULL);
     const char *wrap = pt_params_string(p, "wrap", "repeat");
@@ -308,11 +301,7 @@ static void make_imagemap(struct context *c, struct pt_texture *t)
         encoding = pt_params_bool(p, "gamma", 1) ? "sRGB" : "linear";
     else
         pt_params_ignore(p, "gamma");
-    t->wrap = strcmp(wrap, "repeat") == 0             ? PT_WRAP_REPEAT
-              : strcmp(wrap, "black") == 0            ? PT_WRAP_BLACK
-              : strcmp(wrap, "clamp") == 0            ? PT_WRAP_CLAMP
-              : strcmp(wrap, "octahedralsphere") == 0 ? PT_WRAP_OCTAHEDRAL
-                                                      : -1;
+    t->wrap = base_word_index(wraps, wrap, strlen(wrap));
     if (t->wrap < 0)
         pt_diag_fail(&c->b->diag, pt_params_find(p, "wrap")->loc, "unknown wrap \"%.40s\" (expected repeat, black or clamp)",
                      wrap);
@@ -337,7 +326,7 @@ static void make_stand_in(struct context *c, struct pt_texture *t)
     t->kind = PT_TEXTURE_CONSTANT;
     t->in[0] = strcmp(kind, "dots") == 0 && !inside.texture && !outside.texture
                    ? (struct pt_input){0, v3_scale(v3_add(inside.value, outside.value), 0.5f)}
-                   : pt_input_constant(0.5, 0.5, 0.5);
+                   : pt_input_grey(0.5);
     read_mapping(c, t);
     pt_params_ignore(c->p, "octaves roughness scale variation filename encoding gamma invert");
 }
@@ -381,7 +370,7 @@ int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char 
     pt_params_check_used(p);
     if (b->diag.rc)
         return b->diag.rc;
-    int32_t id = add_texture(b, &t);
+    int32_t id = pt_list_add(b, &b->textures, &t);
     if (id < 0 || pt_names_set(is_float ? &b->float_textures : &b->colour_textures, name, id) != 0)
         return pt_diag_nomem(&b->diag, "textures");
     return b->diag.rc;

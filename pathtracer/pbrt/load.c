@@ -1,7 +1,5 @@
 #include "pbrt/load.h"
 
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,13 +25,13 @@ int pt_scene_load_source(const char *path, const struct pt_source *source, const
     struct pt_scene_defaults found = {0};
     struct pt_scene *scene = calloc(1, sizeof *scene);
     struct pt_builder *b = calloc(1, sizeof *b);
-    int rc = 0;
+    int rc;
     double start_s = base_clock_wall_s();
     if (!scene || !b) {
         rc = base_fail_nomem(err, "the scene");
         goto out;
     }
-    rc = pt_builder_init(b, scene, &found, options ? options : &no_options, source, err);
+    pt_builder_init(b, scene, &found, options ? options : &no_options, source, err);
     const char *slash = strrchr(path, '/');
     size_t length = slash ? (size_t)(slash - path) + 1 : 0;
     if (length >= sizeof b->directory) {
@@ -41,8 +39,7 @@ int pt_scene_load_source(const char *path, const struct pt_source *source, const
         goto out;
     }
     memcpy(b->directory, path, length);
-    if (!rc)
-        rc = pt_pbrt_read(b, path);
+    rc = pt_pbrt_read(b, path);
     /* Textures are read while the file is parsed, but their time has a row of its own. */
     scene->stats.parse_s = base_clock_wall_s() - start_s - scene->stats.texture_s;
     start_s = base_clock_wall_s();

@@ -44,21 +44,6 @@ static const char known_names[] =
     "initialsamples savefp16 crease nointerior maxwavelength jitter dichromatic writeframe infinitelights lights shadow "
     "dispersion ";
 
-int pt_grow(void **items, size_t *room, size_t count, size_t size)
-{
-    if (count < *room)
-        return 1;
-    size_t bigger = *room > 0 ? *room * 2 : 16;
-    if (bigger > SIZE_MAX / size)
-        return 0;
-    void *grown = realloc(*items, bigger * size);
-    if (!grown)
-        return 0;
-    *items = grown;
-    *room = bigger;
-    return 1;
-}
-
 void pt_params_clear(struct pt_params *params, struct pt_diag *diag, struct pt_loc loc)
 {
     params->diag = diag;
@@ -96,6 +81,15 @@ const char *pt_params_kind(const struct pt_params *params) { return params->text
 const char *pt_param_name(const struct pt_params *params, const struct pt_param *param)
 {
     return params->text + param->name;
+}
+
+int pt_param_has(const struct pt_params *params, const struct pt_param *param, size_t count)
+{
+    if (param->count == count)
+        return 1;
+    pt_diag_fail(params->diag, param->loc, "parameter \"%s\" has %zu values (expected %zu)", pt_param_name(params, param),
+                 param->count, count);
+    return 0;
 }
 
 const char *pt_params_string_at(const struct pt_params *params, const struct pt_param *param, size_t i)
@@ -238,6 +232,14 @@ static int read_values(struct pt_params *params, struct pt_lexer *lexer, struct 
     }
 }
 
+static int add_param(struct pt_params *params, const struct pt_param *p)
+{
+    if (!pt_grow((void **)&params->items, &params->room, params->count, sizeof *params->items))
+        return pt_diag_nomem(params->diag, "parameters");
+    params->items[params->count++] = *p;
+    return 0;
+}
+
 int pt_params_read(struct pt_params *params, struct pt_lexer *lexer)
 {
     while (pt_lexer_peek(lexer).kind == PT_TOKEN_STRING) {
@@ -248,12 +250,10 @@ int pt_params_read(struct pt_params *params, struct pt_lexer *lexer)
             rc = read_values(params, lexer, &p);
         if (rc)
             return rc;
-        struct pt_param *old = pt_params_find(params, pt_param_name(params, &p));
-        if (old)
+        if (pt_params_find(params, pt_param_name(params, &p)))
             return pt_diag_fail(params->diag, p.loc, "parameter \"%s\" is given twice", pt_param_name(params, &p));
-        if (!pt_grow((void **)&params->items, &params->room, params->count, sizeof *params->items))
-            return pt_diag_nomem(params->diag, "parameters");
-        params->items[params->count++] = p;
+        if (add_param(params, &p) != 0)
+            return params->diag->rc;
     }
     return params->diag->rc;
 }
@@ -280,9 +280,7 @@ int pt_params_append(struct pt_params *params, const struct pt_params *from)
                 add_number(params, &p, from->numbers[src->first + k]);
             }
         }
-        if (!pt_grow((void **)&params->items, &params->room, params->count, sizeof *params->items))
-            return pt_diag_nomem(params->diag, "parameters");
-        params->items[params->count++] = p;
+        add_param(params, &p);
     }
     return params->diag->rc;
 }
@@ -358,11 +356,7 @@ static struct pt_param *take(struct pt_params *params, const char *name, unsigne
 static struct pt_param *take_one(struct pt_params *params, const char *name, unsigned types, const char *expected)
 {
     struct pt_param *p = take(params, name, types, expected);
-    if (p && p->count != 1) {
-        pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has %zu values (expected 1)", name, p->count);
-        return NULL;
-    }
-    return p;
+    return p && pt_param_has(params, p, 1) ? p : NULL;
 }
 
 enum {
@@ -434,12 +428,8 @@ const char *pt_params_string(struct pt_params *params, const char *name, const c
 int pt_params_point(struct pt_params *params, const char *name, double xyz[3])
 {
     const struct pt_param *p = take(params, name, TRIPLES, "point3 or vector3");
-    if (!p)
+    if (!p || !pt_param_has(params, p, 3))
         return 0;
-    if (p->count != 3) {
-        pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has %zu values (expected 3)", name, p->count);
-        return 0;
-    }
     for (int i = 0; i < 3; i++) {
         xyz[i] = params->numbers[p->first + (size_t)i];
         fits_float(params, p, xyz[i]);

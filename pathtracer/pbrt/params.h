@@ -9,7 +9,6 @@
 #define PT_PBRT_PARAMS_H
 
 #include <stddef.h>
-#include <stdint.h>
 
 #include "pbrt/lexer.h"
 
@@ -54,9 +53,6 @@ struct pt_params {
     size_t text_count, text_room;
 };
 
-/* Makes room for one more item in a malloc'ed array; 0 when out of memory, *items then as before. */
-int pt_grow(void **items, size_t *room, size_t count, size_t size);
-
 /* Empties, keeps the memory, and starts a list for the directive at `loc`. */
 void pt_params_clear(struct pt_params *params, struct pt_diag *diag, struct pt_loc loc);
 void pt_params_release(struct pt_params *params);
@@ -75,6 +71,8 @@ struct pt_param *pt_params_find(const struct pt_params *params, const char *name
 /* Its place; that of the directive when absent. */
 struct pt_loc pt_params_loc(const struct pt_params *params, const char *name);
 const char *pt_param_name(const struct pt_params *params, const struct pt_param *param);
+/* 1 when it has so many values; else fails. */
+int pt_param_has(const struct pt_params *params, const struct pt_param *param, size_t count);
 /* Marks as used what is known and has no effect here. Names are separated by blanks. */
 void pt_params_ignore(struct pt_params *params, const char *names);
 

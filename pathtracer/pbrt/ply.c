@@ -6,7 +6,7 @@
 #include <strings.h>
 
 #include "pbrt/number.h"
-#include "pbrt/params.h"
+#include "scene/arena.h"
 
 enum ply_type { T_NONE, T_I8, T_U8, T_I16, T_U16, T_I32, T_U32, T_F32, T_F64 };
 static const uint8_t type_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
@@ -292,8 +292,6 @@ static int read_list(struct reader *r, const struct property *p)
         return rc;
     if (count < 0 || count > MAX_CORNERS || count != floor(count))
         return base_fail(r->err, BASE_EINVAL, "%s: PLY list of %g values", r->name, count);
-    if (p->role == R_INDICES && count > 4)
-        r->ply->polygons++;
     for (int k = 0; k < (int)count; k++) {
         rc = read_value(r, p->type, &value);
         if (rc)
@@ -333,14 +331,12 @@ static int begin_vertices(struct reader *r, const struct element *e)
         return base_fail(r->err, BASE_EINVAL, "%s: PLY vertices without x, y and z", r->name);
     if (e->count > INT32_MAX)
         return base_fail(r->err, BASE_EINVAL, "%s: %llu vertices are too many", r->name, (unsigned long long)e->count);
-    size_t n = e->count > 0 ? (size_t)e->count : 1;
+    const size_t n = e->count > 0 ? (size_t)e->count : 1;
+    const int has_normals = r->has[R_NX] && r->has[R_NY] && r->has[R_NZ], has_uvs = r->has[R_U] && r->has[R_V];
     p->positions = calloc(n, 3 * sizeof(float));
-    if (r->has[R_NX] && r->has[R_NY] && r->has[R_NZ])
-        p->normals = calloc(n, 3 * sizeof(float));
-    if (r->has[R_U] && r->has[R_V])
-        p->uvs = calloc(n, 2 * sizeof(float));
-    if (!p->positions || (r->has[R_NX] && r->has[R_NY] && r->has[R_NZ] && !p->normals) ||
-        (r->has[R_U] && r->has[R_V] && !p->uvs))
+    p->normals = has_normals ? calloc(n, 3 * sizeof(float)) : NULL;
+    p->uvs = has_uvs ? calloc(n, 2 * sizeof(float)) : NULL;
+    if (!p->positions || (has_normals && !p->normals) || (has_uvs && !p->uvs))
         return base_fail_nomem(r->err, r->name);
     p->vertex_count = (uint32_t)e->count;
     return 0;

@@ -15,7 +15,6 @@ struct pt_ply {
     float *normals;    /* owns: [vertex_count][3] as they stand in the file, finite or not; or NULL */
     float *uvs;        /* owns: [vertex_count][2] or NULL */
     uint32_t *indices; /* owns: [triangle_count][3], each < vertex_count */
-    uint32_t polygons; /* faces of more than four corners, cut into fans */
     int corner_uvs;    /* the file has texture coordinates per face corner, which are not read */
 };
 

@@ -1,8 +1,9 @@
 #include "pbrt/spectra.h"
 
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
+
+#include "base/options.h"
 
 /* CIE 1931 2° colour-matching functions, analytic fit: Wyman, Sloan and Shirley 2013, "Simple Analytic Approximations to the
  * CIE XYZ Color Matching Functions", JCGT 2(2), eq. 4. */
@@ -275,11 +276,8 @@ void pt_spd_conductor_rgb(const struct pt_spd *eta, const struct pt_spd *k, pt_v
 
 int pt_colour_space_named(const char *name)
 {
-    static const char *const names[] = {"srgb", "dci-p3", "rec2020", "aces2065-1"};
-    for (int i = 0; i < 4; i++)
-        if (strcmp(names[i], name) == 0)
-            return i;
-    return -1;
+    static const char *const names[] = {"srgb", "dci-p3", "rec2020", "aces2065-1", NULL};
+    return base_word_index(names, name, strlen(name));
 }
 
 pt_vec3 pt_colour_to_rec709(int space, pt_vec3 c)

@@ -225,12 +225,7 @@ static double *to_limit(struct mesh *m)
             weighted_boundary(m, v, ring[0], ring[count - 1], 1.0 / 5, p + 3 * v);
         else
             weighted_ring(m, v, ring, count, 1 / (count + 3 / (8 * (count == 6 ? 1.0 / 16 : loop_beta(count)))), p + 3 * v);
-    }
-    for (size_t v = 0; ok && v < m->vertices; v++) {
-        uint32_t ring[RING_MAX];
-        int boundary, count = ring_of(m, &t, v, ring, &boundary);
-        if (count >= 2)
-            limit_normal(m, ring, count, boundary, v, normals + 3 * v);
+        limit_normal(m, ring, count, boundary, v, normals + 3 * v);
     }
     free(t.twin);
     free(t.start);
@@ -267,11 +262,8 @@ int pt_build_loop_subdiv(struct pt_builder *b, const struct pt_state *s, struct 
     }
     memcpy(m.p, P, vertices * 3 * sizeof *m.p);
     for (size_t i = 0; i < corners; i++) {
-        if (!(indices[i] >= 0 && indices[i] < (double)vertices)) {
-            pt_diag_fail(&b->diag, pt_params_find(p, "indices")->loc, "index %.0f out of range (expected 0 to %zu)",
-                         indices[i], vertices > 0 ? vertices - 1 : 0);
+        if (pt_build_check_index(b, p, indices[i], vertices) != 0)
             goto out;
-        }
         m.v[i] = (uint32_t)indices[i];
     }
     int ok = 1;

@@ -109,20 +109,19 @@ int pt_xform_invert(const struct pt_xform *t, struct pt_xform *out)
     return 1;
 }
 
-void pt_xform_point(const struct pt_xform *t, const double p[3], double out[3])
-{
-    double r[3];
-    for (int i = 0; i < 3; i++)
-        r[i] = t->m[i][0] * p[0] + t->m[i][1] * p[1] + t->m[i][2] * p[2] + t->m[i][3];
-    memcpy(out, r, sizeof r);
-}
-
 void pt_xform_vector(const struct pt_xform *t, const double v[3], double out[3])
 {
     double r[3];
     for (int i = 0; i < 3; i++)
         r[i] = t->m[i][0] * v[0] + t->m[i][1] * v[1] + t->m[i][2] * v[2];
     memcpy(out, r, sizeof r);
+}
+
+void pt_xform_point(const struct pt_xform *t, const double p[3], double out[3])
+{
+    pt_xform_vector(t, p, out);
+    for (int i = 0; i < 3; i++)
+        out[i] += t->m[i][3];
 }
 
 int pt_xform_equal(const struct pt_xform *a, const struct pt_xform *b) { return memcmp(a, b, sizeof *a) == 0; }
@@ -132,6 +131,7 @@ static void polar(const struct pt_xform *t, struct pt_xform *rotation, struct pt
 {
     struct pt_xform r = *t, inverse;
     r.m[0][3] = r.m[1][3] = r.m[2][3] = 0;
+    const struct pt_xform source = r;
     struct pt_xform linear = r;
     for (int step = 0; step < 100; step++) {
         double change = 0;
@@ -148,8 +148,6 @@ static void polar(const struct pt_xform *t, struct pt_xform *rotation, struct pt
             break;
     }
     *rotation = r;
-    struct pt_xform source = *t;
-    source.m[0][3] = source.m[1][3] = source.m[2][3] = 0;
     if (pt_xform_invert(&r, &inverse))
         *stretch = pt_xform_mul(&inverse, &source);
     else

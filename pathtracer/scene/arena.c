@@ -56,3 +56,18 @@ void pt_arena_release(struct pt_arena *arena)
     }
     *arena = (struct pt_arena){0};
 }
+
+int pt_grow(void **items, size_t *room, size_t count, size_t size)
+{
+    if (count < *room)
+        return 1;
+    size_t bigger = *room > 0 ? *room * 2 : 16;
+    if (bigger > SIZE_MAX / size)
+        return 0;
+    void *grown = realloc(*items, bigger * size);
+    if (!grown)
+        return 0;
+    *items = grown;
+    *room = bigger;
+    return 1;
+}

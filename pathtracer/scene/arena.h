@@ -19,4 +19,7 @@ void *pt_arena_alloc(struct pt_arena *arena, size_t count, size_t size);
 char *pt_arena_strndup(struct pt_arena *arena, const char *text, size_t n);
 void pt_arena_release(struct pt_arena *arena);
 
+/* Makes room for one more item in a malloc'ed array; 0 when out of memory, *items then as before. */
+int pt_grow(void **items, size_t *room, size_t count, size_t size);
+
 #endif

@@ -17,7 +17,6 @@
 #ifndef PT_SCENE_SCENE_H
 #define PT_SCENE_SCENE_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #include "scene/arena.h"
@@ -240,14 +239,13 @@ struct pt_medium {
 
 /* Why an effect is in the scene's set, for --explain. */
 struct pt_effect_reason {
-    int on;   /* in the set */
     int line; /* first scene line that asks for it, 0 if forced or none */
     char file[256];
 };
 
 struct pt_scene_stats {
-    long long triangles, quadrics, instances, lights, materials, textures;
-    long long bytes; /* memory of the scene, acceleration structure included */
+    long long triangles; /* of all meshes */
+    long long bytes;     /* memory of the scene, acceleration structure included */
     double parse_s, build_s, accel_s, texture_s;
 };
 

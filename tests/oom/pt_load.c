@@ -39,9 +39,8 @@ static int read_once(struct base_err *err)
     struct pt_scene_defaults defaults = {0};
     struct pt_scene scene = {0};
     struct pt_builder b;
-    int rc = pt_builder_init(&b, &scene, &defaults, &options, &source, err);
-    if (!rc)
-        rc = pt_pbrt_read(&b, "t.pbrt");
+    pt_builder_init(&b, &scene, &defaults, &options, &source, err);
+    int rc = pt_pbrt_read(&b, "t.pbrt");
     pt_builder_release(&b);
     pt_arena_release(&scene.arena);
     return rc;

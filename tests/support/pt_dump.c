@@ -281,9 +281,8 @@ void pt_dump_world(FILE *out, const struct pt_scene *s)
     dump_media(out, s);
     for (int i = 0; i < PT_FX_COUNT; i++) {
         const struct pt_effect_reason *r = &s->effect_reasons[i];
-        if ((s->effects >> i & 1) || r->on || r->line > 0)
-            fprintf(out, "effect %s%s%s %s:%d\n", pt_effects_name(i), s->effects >> i & 1 ? "" : " off",
-                    r->on ? "" : " without reason", r->file, r->line);
+        if ((s->effects >> i & 1) || r->line > 0)
+            fprintf(out, "effect %s%s %s:%d\n", pt_effects_name(i), s->effects >> i & 1 ? "" : " off", r->file, r->line);
     }
     if (s->shape_count > 0) {
         fprintf(out, "bounds");
@@ -291,7 +290,6 @@ void pt_dump_world(FILE *out, const struct pt_scene *s)
         numbers(out, "to", &s->bounds_max.x, 3);
         fprintf(out, "\n");
     }
-    const struct pt_scene_stats *t = &s->stats;
-    fprintf(out, "counts %lld triangles %lld quadrics %lld instances %lld lights %lld materials %lld textures\n",
-            t->triangles, t->quadrics, t->instances, t->lights, t->materials, t->textures);
+    fprintf(out, "counts %lld triangles %d quadrics %d instances %d lights %d materials %d textures\n", s->stats.triangles,
+            s->quadric_count, s->instance_count, s->light_count, s->material_count, s->texture_count);
 }

@@ -498,10 +498,9 @@ static void counted(void **state)
         "Material \"conductor\" Shape \"trianglemesh\" \"point3 P\" [ 0 0 1  1 0 1  0 1 1 ] Shape \"sphere\" Shape \"disk\" "
         "Shape \"disk\"\n"
         "ObjectBegin \"o\" Shape \"sphere\" ObjectEnd ObjectInstance \"o\" ObjectInstance \"o\" LightSource \"point\"");
-    const struct pt_scene_stats *c = &s->stats;
-    assert_true(c->triangles == 3 && c->quadrics == 4 && c->instances == 2 && c->lights == 1 && c->materials == 2 &&
-                c->textures == 1);
-    assert_true(c->bytes > 1000);
+    assert_true(s->stats.triangles == 3 && s->quadric_count == 4 && s->instance_count == 2 && s->light_count == 1 &&
+                s->material_count == 2 && s->texture_count == 1);
+    assert_true(s->stats.bytes > 1000);
     pt_scene_destroy(s);
 }
 
