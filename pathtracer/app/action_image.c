@@ -10,6 +10,7 @@
 #include "base/files.h"
 #include "render/checkpoint.h"
 #include "render/host_find.h"
+#include "render/host_planes.h"
 #include "render/output.h"
 #include "shot_table.h"
 #include "watch.h"
@@ -21,6 +22,7 @@ static double *judge_noisy(const struct pt_open *o)
     const uint32_t n = r->blocks->count;
     struct lull_host_criterion *observer = NULL;
     const struct lull_criterion *table;
+    struct pt_host_view show;
     struct base_err ignored = {0};
     double *errors = calloc(n, sizeof *errors);
     uint32_t *all = calloc(n, sizeof *all);
@@ -31,7 +33,8 @@ static double *judge_noisy(const struct pt_open *o)
              lull_host_join(r->frame, observer, NULL) != LULL_OK;
     for (uint32_t i = 0; !rc && i < n; i++)
         all[i] = i;
-    rc = rc || pt_criterion_evaluate(observer, r->frame, &r->film, all, n, NULL, decisions, &ignored);
+    rc = rc || lull_host_evaluate(observer, r->frame, pt_host_show(&r->film, r->blocks, &show), all, NULL, n, decisions,
+                                  NULL) != LULL_OK;
     for (uint32_t i = 0; !rc && i < n; i++)
         errors[i] = decisions[i].error;
     lull_host_close(observer);

@@ -1,6 +1,5 @@
 #include "shot_table.h"
 
-#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

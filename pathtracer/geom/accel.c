@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "geom/embree.h"
 #include "geom/quadric.h"
@@ -435,11 +434,6 @@ static void packet_intersect(const struct pt_scene *scene, struct packet *p, int
     pt_embree_intersect(scene->accel->world, n, p->valid, p->lanes, coherent);
 }
 
-static void packet_occluded(const struct pt_scene *scene, struct packet *p, int n)
-{
-    pt_embree_occluded(scene->accel->world, n, p->valid, p->lanes);
-}
-
 /* What ray i of n has met. */
 static inline void take_hit(const struct pt_scene *scene, const struct packet *p, int n, int i, struct pt_hit *hit)
 {
@@ -493,7 +487,7 @@ void pt_accel_occluded_many(const struct pt_scene *scene, const struct pt_ray *c
     int n = scene->accel->packet;
     while (count > 1 && n > 1) {
         int filled = packet_fill(&p, rays, count, n);
-        packet_occluded(scene, &p, n);
+        pt_embree_occluded(scene->accel->world, n, p.valid, p.lanes);
         for (int i = 0; i < filled; i++)
             occluded[i] = p.lanes[TFAR * n + i].f < 0.0f;
         count -= filled;
@@ -510,7 +504,7 @@ void pt_accel_occluded_lanes(const struct pt_scene *scene, const struct pt_ray_l
     int n = scene->accel->packet, done = 0;
     while (count - done > 1 && n > 1) {
         int filled = packet_fill_lanes(&p, rays, done, count, n);
-        packet_occluded(scene, &p, n);
+        pt_embree_occluded(scene->accel->world, n, p.valid, p.lanes);
         for (int i = 0; i < filled; i++)
             occluded[done + i] = p.lanes[TFAR * n + i].f < 0.0f;
         done += filled;

@@ -26,14 +26,10 @@ struct sink {
 /* Write errors stay in the FILE and are found by base_file_commit. */
 static void put(struct sink *s, const void *data, size_t size)
 {
-    const unsigned char *p = data;
-    for (size_t done = 0; done < size;) {
-        size_t n = size - done < (1u << 30) ? size - done : (1u << 30);
-        s->crc = (uint32_t)crc32(s->crc, p + done, (uInt)n);
-        done += n;
-    }
-    if (size > 0)
-        fwrite(data, 1, size, s->file);
+    if (size == 0) /* there may be no data then: zlib would begin anew */
+        return;
+    s->crc = (uint32_t)crc32_z(s->crc, data, size);
+    fwrite(data, 1, size, s->file);
 }
 
 static void put_count(struct sink *s, uint64_t n) { put(s, &n, sizeof n); }

@@ -3,7 +3,6 @@
 #include <stdlib.h>
 
 #include "base/version.h"
-#include "render/host_planes.h"
 
 int pt_host_result(int32_t code, const struct lull_error *why, struct base_err *err)
 {
@@ -47,16 +46,5 @@ int pt_criterion_create(const struct lull_criterion *table, const struct lull_pa
                                           .parallel_for = run_tasks,
                                           .release = free};
     int32_t code = lull_host_create(&services, table, pairs, pair_count, out, &e);
-    return pt_host_result(code, &e, err);
-}
-
-int pt_criterion_evaluate(struct lull_host_criterion *criterion, struct lull_host_frame *frame, const struct pt_film *film,
-                          const uint32_t *due, uint32_t count, const uint8_t *final, struct lull_decision *decisions,
-                          struct base_err *err)
-{
-    struct lull_error e = {.struct_size = sizeof e};
-    struct pt_host_view show;
-    int32_t code = lull_host_evaluate(criterion, frame, pt_host_show(film, lull_host_blocks_of(frame), &show), due, final,
-                                      count, decisions, &e);
     return pt_host_result(code, &e, err);
 }

@@ -10,18 +10,12 @@
 #include "base/err.h"
 #include "base/log.h"
 #include "base/threads.h"
-#include "render/film.h"
 
 /* Makes an instance with parameters; lull_host_close frees it. `threads` is borrowed until then and may be NULL (one
  * worker). Errors and warnings of the criterion are notes in the log, which is borrowed likewise and may be NULL. */
 int pt_criterion_create(const struct lull_criterion *table, const struct lull_pair *pairs, uint32_t pair_count,
                         struct base_threads *threads, struct base_log *log, struct lull_host_criterion **out,
                         struct base_err *err);
-
-/* lull_host_evaluate with the film as the view. Neither the film nor the frame's totals change. */
-int pt_criterion_evaluate(struct lull_host_criterion *criterion, struct lull_host_frame *frame, const struct pt_film *film,
-                          const uint32_t *due, uint32_t count, const uint8_t *final, struct lull_decision *decisions,
-                          struct base_err *err);
 
 /* What the host library returned, in the path tracer's words: 0, BASE_ENOMEM or BASE_EINVAL. */
 int pt_host_result(int32_t code, const struct lull_error *why, struct base_err *err);

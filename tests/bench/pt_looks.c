@@ -19,6 +19,7 @@
 #include "render/checkpoint.h"
 #include "render/denoised.h"
 #include "render/host_find.h"
+#include "render/host_planes.h"
 #include "render/output.h"
 #include "support/pt_identity.h"
 
@@ -76,15 +77,16 @@ static void ask(struct pt_render *r, const char *name, struct lull_decision *d)
     static uint32_t all[BLOCKS_MAX];
     struct lull_host_criterion *c = open_criterion(name);
     struct lull_error e = {.struct_size = sizeof e};
+    struct pt_host_view show;
     struct base_err err = {0};
     for (uint32_t i = 0; i < r->blocks->count; i++)
         all[i] = i;
-    if (lull_host_join(r->frame, c, &e) != LULL_OK) {
+    if (lull_host_join(r->frame, c, &e) != LULL_OK ||
+        lull_host_evaluate(c, r->frame, pt_host_show(&r->film, r->blocks, &show), all, NULL, r->blocks->count, d, &e) !=
+            LULL_OK) {
         base_fail(&err, BASE_EINVAL, "%s", e.message);
         die(&err);
     }
-    if (pt_criterion_evaluate(c, r->frame, &r->film, all, r->blocks->count, NULL, d, &err))
-        die(&err);
     lull_host_close(c);
 }
 
