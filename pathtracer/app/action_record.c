@@ -1,6 +1,15 @@
 #include "actions.h"
-#include "agree.h"
 #include "watch.h"
+
+static int crc_of(const char *path, uint32_t *crc, struct base_err *err)
+{
+    struct base_inputs one = BASE_INPUTS_EMPTY;
+    int rc = base_inputs_add(&one, path, err);
+    if (!rc)
+        rc = base_inputs_crc32(&one, crc, err);
+    base_inputs_release(&one);
+    return rc;
+}
 
 int pt_action_record(struct pt_open *o, int *status, struct base_err *err)
 {
@@ -10,7 +19,7 @@ int pt_action_record(struct pt_open *o, int *status, struct base_err *err)
     config.scene_path = o->frame->paths[PT_SCENE];
     config.view = o->view;
     config.render = o->config;
-    int rc = pt_agree_crc(o->frame->paths[PT_SCENE], &config.scene_crc, err);
+    int rc = crc_of(o->frame->paths[PT_SCENE], &config.scene_crc, err);
     if (!rc)
         rc = base_inputs_crc32(&o->scene_files, &config.inputs_crc, err);
     if (rc)

@@ -5,16 +5,6 @@
 #include "base/version.h"
 #include "render/host.h"
 
-int pt_agree_crc(const char *path, uint32_t *crc, struct base_err *err)
-{
-    struct base_inputs one = BASE_INPUTS_EMPTY;
-    int rc = base_inputs_add(&one, path, err);
-    if (!rc)
-        rc = base_inputs_crc32(&one, crc, err);
-    base_inputs_release(&one);
-    return rc;
-}
-
 static int32_t add_to_crc(const struct lull_writer *to, const void *data, uint64_t size)
 {
     uint32_t *crc = to->context;

@@ -4,8 +4,6 @@
 
 #include "open.h"
 
-/* Of one file. */
-int pt_agree_crc(const char *path, uint32_t *crc, struct base_err *err);
 /* What every process of a job must have alike: the version, the identity, the model that the criterion starts with. */
 int pt_agree_identity(const struct pt_open *open, struct base_identity *to, struct base_err *err);
 /* Every process of a job, ready to begin: rank 0 waits for all and refuses those that differ. Nothing without a job. */

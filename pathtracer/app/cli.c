@@ -4,12 +4,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "job/job.h"
 #include "pbrt/xform.h"
 #include "render/checkpoint.h"
 #include "render/film.h"
-#include "render/output.h"
 
 /* --- values of several parts ------------------------------------------------------------------------------------------ */
 
@@ -180,11 +180,18 @@ static int set_denoise(void *into, const char *value, struct base_err *err)
     return 0;
 }
 
+/* `path` ends in `.ending`, whatever the case. */
+static int has_ending(const char *path, const char *ending)
+{
+    const char *dot = strrchr(path, '.');
+    return dot && strcasecmp(dot + 1, ending) == 0;
+}
+
 static int set_stop_map(void *into, const char *value, struct base_err *err)
 {
     const char **maps = &((struct pt_cli *)into)->paths[PT_STOP_MAPS];
     int count = 0;
-    if (!pt_output_has_ending(value, "png") && !pt_output_has_ending(value, "csv"))
+    if (!has_ending(value, "png") && !has_ending(value, "csv"))
         return expected(err, "a name that ends in .png or .csv");
     while (count < PT_CLI_MAX_STOP_MAPS && maps[count])
         count++;
@@ -277,11 +284,6 @@ static void identify_filter(const void *from, struct base_identity *to)
                       (double)i->filter_sigma);
 }
 
-static void identify_aov(const void *from, struct base_identity *to)
-{
-    base_identity_add(to, "aov", "%u", ((const struct pt_cli *)from)->render.planes);
-}
-
 /* --- options -------------------------------------------------------------------------------------------------------- */
 
 static const char *const frame_seed_words[] = {"fresh", "fixed", NULL};
@@ -370,8 +372,7 @@ const struct base_option pt_cli_options[] = {
          "block, what was run where"},
     {"quoted", 0, "FILE.json", TO(paths[PT_QUOTED]), .input = BASE_FILE, .words = json,
      .help = "What --quote --json printed before: the page compares it with what became of it"},
-    {"aov", 0, "LIST", .set = set_aov, .role = BASE_DECIDES, .identify = identify_aov,
-     .help = "More layers: albedo,normal,depth"},
+    {"aov", 0, "LIST", TO(render.planes), .set = set_aov, .role = BASE_DECIDES, .help = "More layers: albedo,normal,depth"},
     {"denoise", 0, "blend|full", .set = set_denoise, .optional = 1,
      .help =
          "Keep the denoised picture, and stop blocks by what is seen of it (criterion denoised): blend (default) keeps as "

@@ -4,7 +4,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <unistd.h>
 
 #include "base/colour.h"
@@ -14,12 +13,6 @@
 #include "base/version.h"
 #include "image/exr.h"
 #include "render/host.h"
-
-int pt_output_has_ending(const char *path, const char *ending)
-{
-    const char *dot = strrchr(path, '.');
-    return dot && strcasecmp(dot + 1, ending) == 0;
-}
 
 /* The block that a pixel is in. Blocks of the list form a full rectangle of grid cells. */
 static const struct lull_host_block *block_at(const struct lull_host_blocks *b, int x, int y)

@@ -53,7 +53,4 @@ void pt_output_or_keep(pt_output_writer *write, const char *path, const struct p
 /* pt_host_result of what writes a file: BASE_EIO if it could not. */
 int pt_output_result(int32_t code, const struct lull_error *why, struct base_err *err);
 
-/* `path` ends in `.ending`, whatever the case. */
-int pt_output_has_ending(const char *path, const char *ending);
-
 #endif

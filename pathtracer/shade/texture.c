@@ -28,6 +28,18 @@ static float decode(const struct pt_image_map *image, size_t index)
     return image->gamma == 1.0f ? value : powf(value, image->gamma);
 }
 
+/* Colour of the texel whose first channel is value i; linear RGB. */
+static inline pt_vec3 colour_at(const struct pt_image_map *image, size_t i)
+{
+    if (image->channels < 3)
+        return v3_splat(decode(image, i));
+    if (image->type == PT_PIXEL_U8_SRGB) {
+        const uint8_t *p = (const uint8_t *)image->pixels + i;
+        return v3(base_srgb_linear_f32[p[0]], base_srgb_linear_f32[p[1]], base_srgb_linear_f32[p[2]]);
+    }
+    return v3(decode(image, i), decode(image, i + 1), decode(image, i + 2));
+}
+
 pt_vec3 pt_image_texel(const struct pt_image_map *image, int32_t wrap, int32_t channel, int64_t x, int64_t y)
 {
     x = wrap_index(wrap, x, image->width);
@@ -42,25 +54,8 @@ pt_vec3 pt_image_texel(const struct pt_image_map *image, int32_t wrap, int32_t c
             return v3_splat(((const float *)image->pixels)[i + 3]);
         return v3_splat((float)((const uint8_t *)image->pixels)[i + 3] * (1.0f / 255.0f));
     }
-    float r = decode(image, i);
-    if (image->channels < 3)
-        return v3_splat(r);
-    float g = decode(image, i + 1), b = decode(image, i + 2);
-    if (channel == -1)
-        return v3_splat((r + g + b) * (1.0f / 3.0f));
-    return v3(r, g, b);
-}
-
-/* Colour of the texel whose first channel is value i; linear RGB. */
-static inline pt_vec3 colour_at(const struct pt_image_map *image, size_t i)
-{
-    if (image->channels < 3)
-        return v3_splat(decode(image, i));
-    if (image->type == PT_PIXEL_U8_SRGB) {
-        const uint8_t *p = (const uint8_t *)image->pixels + i;
-        return v3(base_srgb_linear_f32[p[0]], base_srgb_linear_f32[p[1]], base_srgb_linear_f32[p[2]]);
-    }
-    return v3(decode(image, i), decode(image, i + 1), decode(image, i + 2));
+    pt_vec3 colour = colour_at(image, i);
+    return channel == -1 && image->channels >= 3 ? v3_splat(v3_mean(colour)) : colour;
 }
 
 static inline pt_vec3 blend4(pt_vec3 a, pt_vec3 b, pt_vec3 c, pt_vec3 d, float dx, float dy)
