@@ -155,6 +155,7 @@ int pt_action_status(enum pt_render_outcome outcome)
     return outcome == PT_RENDER_INTERRUPTED ? PT_EXIT_INTERRUPTED : outcome == PT_RENDER_LOST ? PT_EXIT_BAD_INPUT : 0;
 }
 
+/* An interrupted image is written as it is, but no frame of a shot: a file of its name would say that the frame is done. */
 static int render_image(struct pt_open *o, const char *quote, int *status, struct base_err *err)
 {
     const struct pt_shot_frame *frame = o->frame;

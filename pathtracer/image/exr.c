@@ -59,6 +59,7 @@ static int channel_index(const struct pt_exr_image *image, const char *name)
     return 0;
 }
 
+/* The library asks for channels in its own order; ours are planes over the lines of the chunk. */
 static exr_result_t write_chunk(exr_context_t file, const struct pt_exr_image *image, exr_encode_pipeline_t *pipe, int y,
                                 int lines, float *pixels)
 {

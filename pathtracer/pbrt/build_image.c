@@ -23,6 +23,7 @@ static struct pt_params *begin(struct pt_builder *b, enum pt_header which, const
 
 /* --- film ------------------------------------------------------------------------------------------------------------- */
 
+/* A window in pixels is of the file's own size: as shares it fits the size that the options ask for. */
 static void set_crop(struct pt_builder *b, struct pt_params *p, const int file_size[2])
 {
     struct pt_scene_defaults *d = b->defaults;
@@ -53,6 +54,7 @@ static void set_crop(struct pt_builder *b, struct pt_params *p, const int file_s
                      "the crop window holds no pixel (expected x0 < x1 and y0 < y1 in it)");
 }
 
+/* Whatever the file says of exposure ends in one factor: v3 has a scale, v4 a sensor. */
 static void build_film(struct pt_builder *b)
 {
     static const char *const kinds[] = {"rgb", "image", "gbuffer", "spectral", NULL};
@@ -87,6 +89,7 @@ static void build_film(struct pt_builder *b)
 
 /* --- filter ----------------------------------------------------------------------------------------------------------- */
 
+/* v3 and v4 differ in defaults, in what sigma is, and in the names of the radii. */
 static void build_filter(struct pt_builder *b)
 {
     struct pt_params *p = begin(b, PT_HEADER_FILTER, b->is_v3 ? "box" : "gaussian");
@@ -213,6 +216,7 @@ static void place_camera(struct pt_builder *b, struct pt_params *p, struct pt_ca
     }
 }
 
+/* What the options replace is read all the same: it is checked, and counts as used. */
 static void build_camera(struct pt_builder *b)
 {
     struct pt_params *p = begin(b, PT_HEADER_CAMERA, "perspective");

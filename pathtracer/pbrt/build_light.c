@@ -175,6 +175,7 @@ static void make_portal(struct context *c)
     light->has_portal = 1;
 }
 
+/* Its light is that of an image or even; v3 calls the file mapname. */
 static void make_infinite(struct context *c)
 {
     struct pt_params *p = c->p;

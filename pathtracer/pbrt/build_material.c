@@ -97,6 +97,7 @@ static void scale_colours(struct pt_making *c, const struct pt_bsdf_read *reads,
     }
 }
 
+/* By the table of the model, so that a new model needs no code here. */
 static void read_model(struct pt_making *c, const struct pt_bsdf_model *model)
 {
     for (const struct pt_bsdf_read *r = model->reads; r->kind != PT_READ_END; r++) {
@@ -173,6 +174,7 @@ static void make_measured(struct pt_making *c)
     pt_params_ignore(c->p, "filename");
 }
 
+/* What is simulated goes before what stands in for the rest. 0: perhaps a kind of v3. */
 static int build_v4(struct pt_making *c)
 {
     static const struct {

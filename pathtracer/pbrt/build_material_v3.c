@@ -44,6 +44,7 @@ static void make_plastic(struct pt_making *c)
     clear_coat(c);
 }
 
+/* A sum of four lobes there. Here it is the one that stands alone, or else a coated diffuse surface. */
 static void make_uber(struct pt_making *c)
 {
     struct pt_input kd = pt_build_reflectance(c, "Kd", 0.25f), ks = pt_build_reflectance(c, "Ks", 0.25f),

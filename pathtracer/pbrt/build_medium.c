@@ -100,6 +100,7 @@ static int place_grid(struct pt_builder *b, const struct pt_state *s, struct pt_
     return 0;
 }
 
+/* The number of densities is checked before memory is taken: a file may say anything of nx, ny and nz. */
 static int read_grid(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, struct pt_medium *m)
 {
     size_t n = 0;

@@ -278,6 +278,7 @@ static int make_triangle_mesh(struct pt_builder *b, const struct pt_state *s, st
     return b->diag.rc;
 }
 
+/* The arrays of the file go as soon as the mesh is stored: nothing large is kept twice for long. */
 static int make_ply_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
 {
     char path[2048];

@@ -95,6 +95,7 @@ static int ends_word(char c)
            c == '#';
 }
 
+/* The end of an included file is no token of its own, unless scoped: a parameter list may go on in the including file. */
 static struct pt_token read_token(struct pt_lexer *lexer)
 {
     for (;;) {

@@ -202,6 +202,7 @@ static int values_end(const struct pt_lexer *lexer, const struct pt_param *p, co
     return d.kind >= 0 && d.name < d.name_end;
 }
 
+/* One value, or several in brackets. Names and numbers are stored apart, and a spectrum may have either. */
 static int read_values(struct pt_params *params, struct pt_lexer *lexer, struct pt_param *p)
 {
     struct pt_token t = pt_lexer_next(lexer);

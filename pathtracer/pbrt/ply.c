@@ -135,6 +135,7 @@ static int read_element(struct reader *r, char *words[], int n)
     return 0;
 }
 
+/* All elements and properties are listed, in the order of the data: what means nothing here has to be passed over, too. */
 static int read_header(struct reader *r)
 {
     char line[512], *words[6];
@@ -200,6 +201,7 @@ static int ascii_value(struct reader *r, double *out)
     return 0;
 }
 
+/* By a copy: values of a file are not aligned, and may be of the other byte order. */
 static double decode(const char *at, enum ply_type type, int swap)
 {
     unsigned char b[8];

@@ -40,6 +40,7 @@ static int compare_edges(const void *a, const void *b)
 static int32_t next_half(int32_t h) { return h % 3 == 2 ? h - 2 : h + 1; }
 static int32_t previous_half(int32_t h) { return h % 3 == 0 ? h + 2 : h - 1; }
 
+/* Sorted, the two halves of an edge are neighbours. */
 static int build_topology(const struct mesh *m, struct topology *t)
 {
     size_t n = 3 * m->triangles;

@@ -341,6 +341,7 @@ static int lay_grid(struct recorder *r, struct base_err *err)
     return 0;
 }
 
+/* What can refuse the recording comes before the folder, and its lock before the look at what an earlier run left there. */
 static int prepare(struct recorder *r, struct base_err *err)
 {
     const struct pt_render_config *c = &r->config->render;

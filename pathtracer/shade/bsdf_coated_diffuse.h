@@ -94,6 +94,7 @@ static inline pt_vec3 pt_coat_clear_eval(pt_effects fx, const struct pt_bsdf *b,
     return f;
 }
 
+/* One of the two lobes by chance, weighed by the density of both: they overlap. */
 static inline int pt_coat_clear_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
                                        struct pt_bsdf_sample *out)
 {

@@ -107,6 +107,7 @@ static inline pt_vec3 pt_dielectric_eval(pt_effects fx, const struct pt_bsdf *b,
     return v3_splat(d * g * fabsf(om) * jacobian * (1.0f - fresnel) / (etap * etap));
 }
 
+/* With the density of pt_dielectric_eval: a visible normal, then Fresnel chooses. */
 static inline int pt_dielectric_sample_rough(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
                                              struct pt_bsdf_sample *out)
 {
