@@ -70,6 +70,7 @@ struct pt_builder {
     struct pt_scene_defaults *defaults;
     const struct pt_load_options *options;
     const struct pt_source *source;
+    const struct pt_state *state; /* of the directive in hand; borrows */
     struct pt_diag diag;
     char directory[1024]; /* of the main file, "" or ending in '/' */
     int is_v3;            /* Film "image": v3 meanings of defaults and lights */
@@ -114,21 +115,19 @@ int pt_build_header(struct pt_builder *b);
 enum pt_colour_use { PT_USE_REFLECTANCE, PT_USE_UNBOUNDED, PT_USE_LIGHT };
 /* Colour parameter: 1 when given, 0 and *out untouched when not. LIGHT follows pbrt-v4 (spectra other than rgb have
  * luminance 1) or v3 (absolute). */
-int pt_build_colour(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name,
-                    enum pt_colour_use use, pt_vec3 *out);
+int pt_build_colour(struct pt_builder *b, struct pt_params *p, const char *name, enum pt_colour_use use, pt_vec3 *out);
 /* eta and k of a conductor, each by rgb, name, list or file; what is not given is copper. */
-void pt_build_conductor(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *eta_name,
-                        const char *k_name, pt_vec3 *eta_rgb, pt_vec3 *k_rgb);
+void pt_build_conductor(struct pt_builder *b, struct pt_params *p, const char *eta_name, const char *k_name,
+                        pt_vec3 *eta_rgb, pt_vec3 *k_rgb);
 /* Index of refraction of a dielectric: float, spectrum, or a glass's name. */
 double pt_build_index(struct pt_builder *b, struct pt_params *p, const char *name, double fallback);
 
 /* build_texture.c */
-int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char *name, const char *class_name,
-                     struct pt_params *p);
+int pt_build_texture(struct pt_builder *b, const char *name, const char *class_name, struct pt_params *p);
 /* Float or colour parameter that may be textured; the fallback when absent. */
 struct pt_input pt_build_float_input(struct pt_builder *b, struct pt_params *p, const char *name, double fallback);
-struct pt_input pt_build_colour_input(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name,
-                                      enum pt_colour_use use, pt_vec3 fallback);
+struct pt_input pt_build_colour_input(struct pt_builder *b, struct pt_params *p, const char *name, enum pt_colour_use use,
+                                      pt_vec3 fallback);
 struct pt_input pt_input_grey(double value);
 /* Image map by file name; encoding: NULL = by file kind, "sRGB", "linear", "gamma X". -1 on failure. */
 int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding);
@@ -138,12 +137,11 @@ int32_t pt_build_image_texture(struct pt_builder *b, struct pt_loc loc, const ch
 struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct pt_input y);
 
 /* build_material.c, build_material_v3.c: id, or -1. */
-int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const char *kind, struct pt_params *p);
+int32_t pt_build_material(struct pt_builder *b, const char *kind, struct pt_params *p);
 int32_t pt_build_default_material(struct pt_builder *b);
 /* A material while its parameters are read. */
 struct pt_making {
     struct pt_builder *b;
-    const struct pt_state *s;
     struct pt_params *p;
     const char *kind;
     struct pt_material *m;
@@ -160,22 +158,22 @@ int32_t pt_build_bump(struct pt_builder *b, struct pt_params *p, const char *nam
 int32_t pt_build_material_named(struct pt_builder *b, struct pt_loc loc, const char *name);
 
 /* build_light.c */
-int pt_build_light(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
-int pt_build_area_light(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, struct pt_area_light *out);
+int pt_build_light(struct pt_builder *b, struct pt_params *p);
+int pt_build_area_light(struct pt_builder *b, struct pt_params *p, struct pt_area_light *out);
 /* Light of one shape with `area` scene units² of surface; id. */
 int32_t pt_build_shape_light(struct pt_builder *b, const struct pt_area_light *source, double area);
 
 /* build_medium.c */
-int pt_build_medium(struct pt_builder *b, const struct pt_state *s, const char *name, struct pt_params *p);
+int pt_build_medium(struct pt_builder *b, const char *name, struct pt_params *p);
 /* Id of a medium by name, defined or not yet; -1 for "". */
 int32_t pt_build_medium_ref(struct pt_builder *b, const char *name, struct pt_loc loc);
 /* Fails for names that were used and never defined. */
 int pt_build_media_check(struct pt_builder *b);
 
 /* build_shape.c */
-int pt_build_shape(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
+int pt_build_shape(struct pt_builder *b, struct pt_params *p);
 int pt_build_object_begin(struct pt_builder *b, const char *name, struct pt_loc loc);
-int pt_build_instance(struct pt_builder *b, const struct pt_state *s, const char *name, struct pt_loc loc);
+int pt_build_instance(struct pt_builder *b, const char *name, struct pt_loc loc);
 
 /* Triangles before they are placed. Positions: pd or pf; the rest may be NULL. */
 struct pt_soup {
@@ -186,15 +184,15 @@ struct pt_soup {
     const float *nf, *uvf;
     const uint32_t *indices;
 };
-int pt_build_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const struct pt_soup *soup);
+int pt_build_mesh(struct pt_builder *b, struct pt_params *p, const struct pt_soup *soup);
 /* Fails unless v, of the parameter "indices", is one of so many vertices. */
 int pt_build_check_index(struct pt_builder *b, const struct pt_params *p, double v, size_t vertex_count);
 /* build_tessellate.c: shapes that become triangles. */
-int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
-int pt_build_curve(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
-int pt_build_height_field(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
-int pt_build_revolved(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
+int pt_build_bilinear(struct pt_builder *b, struct pt_params *p);
+int pt_build_curve(struct pt_builder *b, struct pt_params *p);
+int pt_build_height_field(struct pt_builder *b, struct pt_params *p);
+int pt_build_revolved(struct pt_builder *b, struct pt_params *p);
 /* subdiv.c */
-int pt_build_loop_subdiv(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
+int pt_build_loop_subdiv(struct pt_builder *b, struct pt_params *p);
 
 #endif

@@ -108,8 +108,7 @@ static int check_colour(struct pt_builder *b, const struct pt_param *param, enum
     return 0;
 }
 
-int pt_build_colour(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name,
-                    enum pt_colour_use use, pt_vec3 *out)
+int pt_build_colour(struct pt_builder *b, struct pt_params *p, const char *name, enum pt_colour_use use, pt_vec3 *out)
 {
     struct pt_param *param = pt_params_find(p, name);
     struct pt_spd spd;
@@ -123,8 +122,9 @@ int pt_build_colour(struct pt_builder *b, const struct pt_state *s, struct pt_pa
     case PT_PARAM_XYZ:
         if (!pt_param_has(p, param, 3))
             return 0;
-        rgb = param->type == PT_PARAM_XYZ ? pt_xyz_to_rgb(v[0], v[1], v[2])
-                                          : pt_colour_to_rec709(s->colour_space, v3((float)v[0], (float)v[1], (float)v[2]));
+        rgb = param->type == PT_PARAM_XYZ
+                  ? pt_xyz_to_rgb(v[0], v[1], v[2])
+                  : pt_colour_to_rec709(b->state->colour_space, v3((float)v[0], (float)v[1], (float)v[2]));
         break;
     case PT_PARAM_FLOAT: /* a grey, as v2 files and quick tests have it */
         if (!pt_param_has(p, param, 1))
@@ -157,8 +157,8 @@ static int is_spectrum(const struct pt_param *param)
     return param && (param->type == PT_PARAM_SPECTRUM || param->type == PT_PARAM_STRING);
 }
 
-void pt_build_conductor(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *eta_name,
-                        const char *k_name, pt_vec3 *eta_rgb, pt_vec3 *k_rgb)
+void pt_build_conductor(struct pt_builder *b, struct pt_params *p, const char *eta_name, const char *k_name,
+                        pt_vec3 *eta_rgb, pt_vec3 *k_rgb)
 {
     struct pt_param *eta = pt_params_find(p, eta_name), *k = pt_params_find(p, k_name);
     struct pt_spd eta_spd, k_spd;
@@ -174,9 +174,9 @@ void pt_build_conductor(struct pt_builder *b, const struct pt_state *s, struct p
         read_spectrum(b, p, k, 1, &k_spd);
     pt_spd_conductor_rgb(&eta_spd, &k_spd, eta_rgb, k_rgb);
     if (eta && !is_spectrum(eta))
-        pt_build_colour(b, s, p, eta_name, PT_USE_UNBOUNDED, eta_rgb);
+        pt_build_colour(b, p, eta_name, PT_USE_UNBOUNDED, eta_rgb);
     if (k && !is_spectrum(k))
-        pt_build_colour(b, s, p, k_name, PT_USE_UNBOUNDED, k_rgb);
+        pt_build_colour(b, p, k_name, PT_USE_UNBOUNDED, k_rgb);
     /* An index of 0 divides by zero in Fresnel's equations. */
     *eta_rgb = v3_most(*eta_rgb, v3_splat(1e-3f));
 }

@@ -7,13 +7,13 @@
 #include "pbrt/build.h"
 
 /* "L" or "I" with both kinds of scale (v4: float, v3: colour), as RGB. */
-static pt_vec3 scaled_colour(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name)
+static pt_vec3 scaled_colour(struct pt_builder *b, struct pt_params *p, const char *name)
 {
     pt_vec3 value = v3_splat(1), by = v3_splat(1);
     struct pt_param *scale = pt_params_find(p, "scale");
-    pt_build_colour(b, s, p, name, PT_USE_LIGHT, &value);
+    pt_build_colour(b, p, name, PT_USE_LIGHT, &value);
     if (scale && scale->type != PT_PARAM_FLOAT && scale->type != PT_PARAM_INTEGER)
-        pt_build_colour(b, s, p, "scale", PT_USE_UNBOUNDED, &by);
+        pt_build_colour(b, p, "scale", PT_USE_UNBOUNDED, &by);
     else
         by = v3_splat((float)pt_params_float_in(p, "scale", 1, 0, 3e38));
     return v3_mul(value, by);
@@ -26,7 +26,6 @@ static double luminance(pt_vec3 c) { return fmax((double)v3_luminance(c), 1e-30)
 
 struct context {
     struct pt_builder *b;
-    const struct pt_state *s;
     struct pt_params *p;
     struct pt_xform ctm; /* at shutter open */
     struct pt_light *light;
@@ -67,7 +66,7 @@ static void make_point(struct context *c)
 {
     double power = pt_params_float(c->p, "power", -1);
     c->light->kind = PT_LIGHT_POINT;
-    c->light->emission = scaled_colour(c->b, c->s, c->p, "I");
+    c->light->emission = scaled_colour(c->b, c->p, "I");
     if (power > 0)
         c->light->emission = v3_scale(c->light->emission, (float)(power / (4 * BASE_PI)));
     read_position(c);
@@ -81,7 +80,7 @@ static void make_spot(struct context *c)
            delta = pt_params_float_in(c->p, "conedeltaangle", 5, 0, 180);
     double cos_total = cos(cone * BASE_PI / 180), cos_start = cos(fmax(cone - delta, 0) * BASE_PI / 180);
     c->light->kind = PT_LIGHT_SPOT;
-    c->light->emission = scaled_colour(c->b, c->s, c->p, "I");
+    c->light->emission = scaled_colour(c->b, c->p, "I");
     if (power > 0) /* flux of the smooth fall-off: 2π ((1 - cos start) + (cos start - cos total) / 2) */
         c->light->emission =
             v3_scale(c->light->emission, (float)(power / (2 * BASE_PI * ((1 - cos_start) + (cos_start - cos_total) / 2))));
@@ -96,7 +95,7 @@ static void make_distant(struct context *c)
 {
     double illuminance = pt_params_float(c->p, "illuminance", -1);
     c->light->kind = PT_LIGHT_DISTANT;
-    c->light->emission = scaled_colour(c->b, c->s, c->p, "L");
+    c->light->emission = scaled_colour(c->b, c->p, "L");
     if (illuminance > 0)
         c->light->emission = v3_scale(c->light->emission, (float)illuminance);
     read_direction(c);
@@ -181,7 +180,7 @@ static void make_infinite(struct context *c)
     struct pt_params *p = c->p;
     const char *key = pt_params_find(p, "mapname") ? "mapname" : "filename", *file = pt_params_string(p, key, "");
     double illuminance = pt_params_float(p, "illuminance", -1);
-    c->light->emission = scaled_colour(c->b, c->s, p, "L");
+    c->light->emission = scaled_colour(c->b, p, "L");
     c->light->kind = PT_LIGHT_ENV_CONSTANT;
     make_portal(c);
     pt_builder_effect(c->b, PT_FX_ENVIRONMENT, p->loc);
@@ -230,7 +229,7 @@ static int add_light(struct pt_builder *b, const struct pt_light *light, struct 
     return pt_list_add(b, &b->lights, light);
 }
 
-int pt_build_light(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+int pt_build_light(struct pt_builder *b, struct pt_params *p)
 {
     static const struct {
         const char *kind;
@@ -244,10 +243,10 @@ int pt_build_light(struct pt_builder *b, const struct pt_state *s, struct pt_par
                  {"goniometric", make_goniometric}};
     struct pt_light light = {.kind = -1, .shape = -1, .image = -1};
     struct pt_xform at[2];
-    pt_builder_at_shutter(b, s->ctm, at);
+    pt_builder_at_shutter(b, b->state->ctm, at);
     if (!pt_xform_equal(&at[0], &at[1]))
         pt_diag_warn(&b->diag, p->loc, "lights do not move: the transform at shutter open is used");
-    struct context c = {b, s, p, at[0], &light};
+    struct context c = {b, p, at[0], &light};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
         if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
             kinds[i].make(&c);
@@ -261,13 +260,13 @@ int pt_build_light(struct pt_builder *b, const struct pt_state *s, struct pt_par
     return b->diag.rc;
 }
 
-int pt_build_area_light(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, struct pt_area_light *out)
+int pt_build_area_light(struct pt_builder *b, struct pt_params *p, struct pt_area_light *out)
 {
     const char *kind = pt_params_kind(p);
     struct pt_area_light light = {.on = 1, .loc = p->loc};
     if (strcmp(kind, "diffuse") != 0 && strcmp(kind, "area") != 0)
         return pt_diag_fail(&b->diag, p->loc, "unknown area light \"%s\" (expected diffuse)", kind);
-    light.emission = scaled_colour(b, s, p, "L");
+    light.emission = scaled_colour(b, p, "L");
     light.two_sided = pt_params_bool(p, "twosided", 0);
     light.power = pt_params_float(p, "power", -1);
     if (pt_params_find(p, "filename")) {

@@ -73,7 +73,7 @@ int32_t pt_build_material_named(struct pt_builder *b, struct pt_loc loc, const c
 
 struct pt_input pt_build_reflectance(struct pt_making *c, const char *name, float fallback)
 {
-    return pt_build_colour_input(c->b, c->s, c->p, name, PT_USE_REFLECTANCE, v3_splat(fallback));
+    return pt_build_colour_input(c->b, c->p, name, PT_USE_REFLECTANCE, v3_splat(fallback));
 }
 
 static void read_metal(struct pt_making *c, const char *prefix)
@@ -85,7 +85,7 @@ static void read_metal(struct pt_making *c, const char *prefix)
     if (c->m->conductor_by_colour)
         c->m->reflectance = pt_build_reflectance(c, "reflectance", 0.5f);
     else
-        pt_build_conductor(c->b, c->s, c->p, eta, k, &c->m->eta_rgb.value, &c->m->k_rgb.value);
+        pt_build_conductor(c->b, c->p, eta, k, &c->m->eta_rgb.value, &c->m->k_rgb.value);
 }
 
 static void scale_colours(struct pt_making *c, const struct pt_bsdf_read *reads, double scale)
@@ -214,11 +214,11 @@ static int32_t add(struct pt_builder *b, const struct pt_material *m, const stru
     return pt_list_add(b, &b->materials, m);
 }
 
-int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const char *kind, struct pt_params *p)
+int32_t pt_build_material(struct pt_builder *b, const char *kind, struct pt_params *p)
 {
     struct pt_material m = {.kind = PT_BSDF_DIFFUSE, .eta = 1.5f};
     struct pt_material_info info = {.loc = p->loc, .opacity = pt_input_grey(1)};
-    struct pt_making c = {b, s, p, kind, &m, &info};
+    struct pt_making c = {b, p, kind, &m, &info};
     pt_params_ignore(p, "type");
     if (!build_v4(&c) && !pt_build_material_v3(&c)) {
         pt_diag_fail(&b->diag, pt_params_loc(p, "type"),
@@ -231,7 +231,7 @@ int32_t pt_build_material(struct pt_builder *b, const struct pt_state *s, const 
         m.bump = pt_build_bump(b, p, "displacement");
     struct pt_param *map = pt_params_find(p, "normalmap");
     if (map && map->type == PT_PARAM_TEXTURE)
-        m.normal_map = pt_build_colour_input(b, s, p, "normalmap", PT_USE_UNBOUNDED, v3_splat(0)).texture;
+        m.normal_map = pt_build_colour_input(b, p, "normalmap", PT_USE_UNBOUNDED, v3_splat(0)).texture;
     else if (map)
         m.normal_map = pt_build_image_texture(b, map->loc, pt_params_string(p, "normalmap", ""), "linear");
     pt_params_check_used(p);

@@ -78,7 +78,7 @@ static void make_metal(struct pt_making *c)
 {
     c->m->kind = PT_BSDF_CONDUCTOR;
     pt_build_roughness(c->b, c->p, 0.01, 1, c->m);
-    pt_build_conductor(c->b, c->s, c->p, "eta", "k", &c->m->eta_rgb.value, &c->m->k_rgb.value);
+    pt_build_conductor(c->b, c->p, "eta", "k", &c->m->eta_rgb.value, &c->m->k_rgb.value);
 }
 
 static void make_mirror(struct pt_making *c)

@@ -49,8 +49,7 @@ static const struct {
                {"Spectralon", {11.6f, 20.4f, 14.9f}, {0, 0, 0}},
                {"Wholemilk", {2.55f, 3.21f, 3.77f}, {0.0011f, 0.0024f, 0.014f}}};
 
-static void read_coefficients(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, int is_grid,
-                              struct pt_medium *m)
+static void read_coefficients(struct pt_builder *b, struct pt_params *p, int is_grid, struct pt_medium *m)
 {
     const char *preset = pt_params_string(p, "preset", "");
     /* pbrt's defaults: whole milk in a homogeneous medium, 1 in a grid. */
@@ -65,11 +64,11 @@ static void read_coefficients(struct pt_builder *b, const struct pt_state *s, st
         }
     if (!known)
         pt_diag_warn(&b->diag, pt_params_find(p, "preset")->loc, "unknown medium preset \"%s\": whole milk is used", preset);
-    pt_build_colour(b, s, p, "sigma_a", PT_USE_UNBOUNDED, &m->sigma_a);
-    pt_build_colour(b, s, p, "sigma_s", PT_USE_UNBOUNDED, &m->sigma_s);
+    pt_build_colour(b, p, "sigma_a", PT_USE_UNBOUNDED, &m->sigma_a);
+    pt_build_colour(b, p, "sigma_s", PT_USE_UNBOUNDED, &m->sigma_s);
     m->g = (float)pt_params_float_in(p, "g", 0, -0.9999, 0.9999);
     pt_vec3 emission = v3_splat(0);
-    if (pt_build_colour(b, s, p, "Le", PT_USE_LIGHT, &emission))
+    if (pt_build_colour(b, p, "Le", PT_USE_LIGHT, &emission))
         emission = v3_scale(emission, (float)pt_params_float_in(p, "Lescale", 1, 0, 1e12));
     pt_params_ignore(p, "Lescale");
     float scale = (float)pt_params_float_in(p, "scale", 1, 0, 1e12);
@@ -79,13 +78,13 @@ static void read_coefficients(struct pt_builder *b, const struct pt_state *s, st
 }
 
 /* World → unit box of [p0, p1] → render's inverse. */
-static int place_grid(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, struct pt_medium *m)
+static int place_grid(struct pt_builder *b, struct pt_params *p, struct pt_medium *m)
 {
     double p0[3] = {0, 0, 0}, p1[3] = {1, 1, 1};
     struct pt_xform at[2], inverse;
     pt_params_point(p, "p0", p0);
     pt_params_point(p, "p1", p1);
-    pt_builder_at_shutter(b, s->ctm, at);
+    pt_builder_at_shutter(b, b->state->ctm, at);
     if (!(p0[0] != p1[0] && p0[1] != p1[1] && p0[2] != p1[2]))
         return pt_diag_fail(&b->diag, pt_params_loc(p, pt_params_find(p, "p1") ? "p1" : "p0"),
                             "the box of a grid medium is empty (expected p0 and p1 apart in all axes)");
@@ -101,7 +100,7 @@ static int place_grid(struct pt_builder *b, const struct pt_state *s, struct pt_
 }
 
 /* The number of densities is checked before memory is taken: a file may say anything of nx, ny and nz. */
-static int read_grid(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, struct pt_medium *m)
+static int read_grid(struct pt_builder *b, struct pt_params *p, struct pt_medium *m)
 {
     size_t n = 0;
     m->kind = PT_MEDIUM_GRID;
@@ -128,10 +127,10 @@ static int read_grid(struct pt_builder *b, const struct pt_state *s, struct pt_p
     }
     m->density = kept;
     pt_params_ignore(p, "temperature temperaturecutoff temperatureoffset temperaturescale");
-    return place_grid(b, s, p, m);
+    return place_grid(b, p, m);
 }
 
-int pt_build_medium(struct pt_builder *b, const struct pt_state *s, const char *name, struct pt_params *p)
+int pt_build_medium(struct pt_builder *b, const char *name, struct pt_params *p)
 {
     char type[64];
     struct pt_medium m = {.kind = PT_MEDIUM_HOMOGENEOUS};
@@ -150,9 +149,9 @@ int pt_build_medium(struct pt_builder *b, const struct pt_state *s, const char *
         for (size_t i = 0; i < p->count; i++)
             p->items[i].used = 1;
     } else {
-        read_coefficients(b, s, p, is_grid, &m);
+        read_coefficients(b, p, is_grid, &m);
         if (is_grid)
-            read_grid(b, s, p, &m);
+            read_grid(b, p, &m);
     }
     pt_params_check_used(p);
     int32_t id = pt_build_medium_ref(b, name, p->loc);

@@ -19,11 +19,10 @@ struct placement {
 
 /* --- where a shape goes ------------------------------------------------------------------------------------------------ */
 
-static struct placement place(struct pt_builder *b, const struct pt_state *s, const struct pt_params *p,
-                              const double probe[3])
+static struct placement place(struct pt_builder *b, const struct pt_params *p, const double probe[3])
 {
     struct placement pl = {.animated = 0};
-    pt_builder_at_shutter(b, s->ctm, pl.at);
+    pt_builder_at_shutter(b, b->state->ctm, pl.at);
     pl.animated = !pt_xform_equal(&pl.at[0], &pl.at[1]);
     if (b->open_object >= 0) {
         double *offset = b->object_offsets[b->open_object], first[3];
@@ -46,8 +45,9 @@ static struct placement place(struct pt_builder *b, const struct pt_state *s, co
 }
 
 /* What every shape has: material, alpha, media, side, light. */
-static struct pt_shape common(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+static struct pt_shape common(struct pt_builder *b, struct pt_params *p)
 {
+    const struct pt_state *s = b->state;
     struct pt_shape shape = {.light = -1, .medium_in = s->medium_in, .medium_out = s->medium_out};
     shape.material = s->material >= 0 ? s->material : pt_build_default_material(b);
     shape.flip_normal = s->reverse_orientation != 0;
@@ -72,9 +72,10 @@ static int is_interface(const struct pt_builder *b, int32_t material)
 }
 
 /* Stores a finished shape with its light, or as a moving object of its own. */
-static int add_shape(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const struct placement *pl,
-                     struct pt_shape *shape, double area)
+static int add_shape(struct pt_builder *b, struct pt_params *p, const struct placement *pl, struct pt_shape *shape,
+                     double area)
 {
+    const struct pt_state *s = b->state;
     pt_params_check_used(p);
     if (b->diag.rc)
         return b->diag.rc;
@@ -157,8 +158,8 @@ static double mesh_area(const struct pt_mesh *m)
     return area;
 }
 
-static int store_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const struct pt_soup *soup,
-                      const struct pt_xform *t, struct pt_mesh *m)
+static int store_mesh(struct pt_builder *b, struct pt_params *p, const struct pt_soup *soup, const struct pt_xform *t,
+                      struct pt_mesh *m)
 {
     struct pt_arena *arena = &b->scene->arena;
     struct pt_xform inverse;
@@ -175,7 +176,7 @@ static int store_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_
     if (!pt_xform_invert(t, &inverse))
         return pt_diag_fail(&b->diag, p->loc, "singular transform of a shape");
     if (has_n)
-        store_normals(soup, &inverse, s->reverse_orientation, vertices);
+        store_normals(soup, &inverse, b->state->reverse_orientation, vertices);
     for (size_t i = 0; has_uv && i < n; i++) {
         vertices[i].u = (float)value(soup->uvd, soup->uvf, 2 * i);
         vertices[i].v = (float)value(soup->uvd, soup->uvf, 2 * i + 1);
@@ -185,7 +186,7 @@ static int store_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_
     return 0;
 }
 
-int pt_build_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const struct pt_soup *soup)
+int pt_build_mesh(struct pt_builder *b, struct pt_params *p, const struct pt_soup *soup)
 {
     struct pt_mesh mesh;
     double probe[3] = {0, 0, 0};
@@ -199,16 +200,16 @@ int pt_build_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_para
         return pt_diag_fail(&b->diag, p->loc, "a mesh of %zu triangles is too large", soup->triangle_count);
     for (size_t k = 0; k < 3; k++)
         probe[k] = value(soup->pd, soup->pf, k);
-    struct placement pl = place(b, s, p, probe);
-    struct pt_shape shape = common(b, s, p);
-    if (b->diag.rc || store_mesh(b, s, p, soup, &pl.xform, &mesh) != 0)
+    struct placement pl = place(b, p, probe);
+    struct pt_shape shape = common(b, p);
+    if (b->diag.rc || store_mesh(b, p, soup, &pl.xform, &mesh) != 0)
         return b->diag.rc;
     shape.kind = PT_SHAPE_MESH;
     /* corners that a mirroring transform has moved go round the other way; a quadric's normal it carries along */
     if (pt_xform_det(&pl.xform) < 0)
         shape.flip_normal = !shape.flip_normal;
     shape.data = pt_list_add(b, &b->meshes, &mesh);
-    return add_shape(b, s, p, &pl, &shape, s->area.on && s->area.power > 0 ? mesh_area(&mesh) : 0);
+    return add_shape(b, p, &pl, &shape, b->state->area.on && b->state->area.power > 0 ? mesh_area(&mesh) : 0);
 }
 
 int pt_build_check_index(struct pt_builder *b, const struct pt_params *p, double v, size_t vertex_count)
@@ -251,7 +252,7 @@ static uint32_t *read_indices(struct pt_builder *b, struct pt_params *p, size_t 
     return indices;
 }
 
-static int make_triangle_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+static int make_triangle_mesh(struct pt_builder *b, struct pt_params *p)
 {
     struct pt_soup soup = {0};
     size_t n_count, uv_count, index_count;
@@ -273,13 +274,13 @@ static int make_triangle_mesh(struct pt_builder *b, const struct pt_state *s, st
     soup.indices = indices;
     soup.triangle_count = index_count / 3;
     pt_params_ignore(p, "S faceIndices discarddegenerateUVs");
-    pt_build_mesh(b, s, p, &soup);
+    pt_build_mesh(b, p, &soup);
     free(indices);
     return b->diag.rc;
 }
 
 /* The arrays of the file go as soon as the mesh is stored: nothing large is kept twice for long. */
-static int make_ply_mesh(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+static int make_ply_mesh(struct pt_builder *b, struct pt_params *p)
 {
     char path[2048];
     char *bytes = NULL;
@@ -310,19 +311,19 @@ static int make_ply_mesh(struct pt_builder *b, const struct pt_state *s, struct 
                            .nf = ply.normals,
                            .uvf = ply.uvs,
                            .indices = ply.indices};
-    pt_build_mesh(b, s, p, &soup);
+    pt_build_mesh(b, p, &soup);
     pt_ply_release(&ply);
     return b->diag.rc;
 }
 
 /* --- quadrics ---------------------------------------------------------------------------------------------------------- */
 
-static int add_quadric(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, struct pt_quadric *q)
+static int add_quadric(struct pt_builder *b, struct pt_params *p, struct pt_quadric *q)
 {
     const double probe[3] = {0, 0, 0};
     struct pt_xform inverse;
-    struct placement pl = place(b, s, p, probe);
-    struct pt_shape shape = common(b, s, p);
+    struct placement pl = place(b, p, probe);
+    struct pt_shape shape = common(b, p);
     if (!pt_xform_invert(&pl.xform, &inverse))
         return pt_diag_fail(&b->diag, p->loc, "singular transform of a shape");
     q->phi_max = (float)(pt_params_float_in(p, "phimax", 360, 1e-3, 360) * BASE_PI / 180);
@@ -333,10 +334,10 @@ static int add_quadric(struct pt_builder *b, const struct pt_state *s, struct pt
     shape.kind = PT_SHAPE_QUADRIC;
     shape.data = pt_list_add(b, &b->quadrics, q);
     pt_builder_effect(b, PT_FX_QUADRIC, p->loc);
-    return add_shape(b, s, p, &pl, &shape, s->area.on && s->area.power > 0 ? pt_light_quadric_area(q) : 0);
+    return add_shape(b, p, &pl, &shape, b->state->area.on && b->state->area.power > 0 ? pt_light_quadric_area(q) : 0);
 }
 
-static int make_sphere(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+static int make_sphere(struct pt_builder *b, struct pt_params *p)
 {
     double r = pt_params_float_in(p, "radius", 1, 1e-30, 1e30);
     double z0 = fmax(pt_params_float(p, "zmin", -r), -r), z1 = fmin(pt_params_float(p, "zmax", r), r);
@@ -344,10 +345,10 @@ static int make_sphere(struct pt_builder *b, const struct pt_state *s, struct pt
         return pt_diag_fail(&b->diag, pt_params_loc(p, pt_params_find(p, "zmin") ? "zmin" : "zmax"),
                             "zmin %g is not below zmax %g", z0, z1);
     struct pt_quadric q = {.kind = PT_QUADRIC_SPHERE, .radius = (float)r, .z_min = (float)z0, .z_max = (float)z1};
-    return add_quadric(b, s, p, &q);
+    return add_quadric(b, p, &q);
 }
 
-static int make_disk(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+static int make_disk(struct pt_builder *b, struct pt_params *p)
 {
     double r = pt_params_float_in(p, "radius", 1, 1e-30, 1e30), h = pt_params_float(p, "height", 0);
     double inner = pt_params_float_in(p, "innerradius", 0, 0, 1e30);
@@ -355,10 +356,10 @@ static int make_disk(struct pt_builder *b, const struct pt_state *s, struct pt_p
         return pt_diag_fail(&b->diag, pt_params_loc(p, "innerradius"), "innerradius %g is not below radius %g", inner, r);
     struct pt_quadric q = {
         .kind = PT_QUADRIC_DISK, .radius = (float)r, .inner_radius = (float)inner, .z_min = (float)h, .z_max = (float)h};
-    return add_quadric(b, s, p, &q);
+    return add_quadric(b, p, &q);
 }
 
-static int make_cylinder(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+static int make_cylinder(struct pt_builder *b, struct pt_params *p)
 {
     double r = pt_params_float_in(p, "radius", 1, 1e-30, 1e30);
     double z0 = pt_params_float(p, "zmin", -1), z1 = pt_params_float(p, "zmax", 1);
@@ -367,23 +368,22 @@ static int make_cylinder(struct pt_builder *b, const struct pt_state *s, struct 
                             "zmin and zmax are both %g", z0);
     struct pt_quadric q = {
         .kind = PT_QUADRIC_CYLINDER, .radius = (float)r, .z_min = (float)fmin(z0, z1), .z_max = (float)fmax(z0, z1)};
-    return add_quadric(b, s, p, &q);
+    return add_quadric(b, p, &q);
 }
 
 /* --- dispatch, objects ------------------------------------------------------------------------------------------------ */
 
-static int make_nurbs(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+static int make_nurbs(struct pt_builder *b, struct pt_params *p)
 {
-    (void)s;
     pt_diag_warn(&b->diag, p->loc, "shape \"%s\" is left out", pt_params_kind(p));
     return b->diag.rc;
 }
 
-int pt_build_shape(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+int pt_build_shape(struct pt_builder *b, struct pt_params *p)
 {
     static const struct {
         const char *kind;
-        int (*make)(struct pt_builder *b, const struct pt_state *s, struct pt_params *p);
+        int (*make)(struct pt_builder *b, struct pt_params *p);
     } kinds[] = {{"plymesh", make_ply_mesh},
                  {"trianglemesh", make_triangle_mesh},
                  {"sphere", make_sphere},
@@ -399,7 +399,7 @@ int pt_build_shape(struct pt_builder *b, const struct pt_state *s, struct pt_par
                  {"nurbs", make_nurbs}};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
         if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
-            return kinds[i].make(b, s, p);
+            return kinds[i].make(b, p);
     return pt_diag_fail(&b->diag, p->loc, "unknown shape \"%s\" (expected trianglemesh, plymesh, sphere, disk …)",
                         pt_params_kind(p));
 }
@@ -420,7 +420,7 @@ int pt_build_object_begin(struct pt_builder *b, const char *name, struct pt_loc 
     return 0;
 }
 
-int pt_build_instance(struct pt_builder *b, const struct pt_state *s, const char *name, struct pt_loc loc)
+int pt_build_instance(struct pt_builder *b, const char *name, struct pt_loc loc)
 {
     struct pt_instance instance = {.object = pt_names_get(&b->object_names, name)};
     struct pt_xform at[2];
@@ -432,7 +432,7 @@ int pt_build_instance(struct pt_builder *b, const struct pt_state *s, const char
         return 0;
     const double *offset = b->object_offsets[instance.object];
     struct pt_xform shift = pt_xform_translate(offset[0], offset[1], offset[2]);
-    pt_builder_at_shutter(b, s->ctm, at);
+    pt_builder_at_shutter(b, b->state->ctm, at);
     instance.animated = !pt_xform_equal(&at[0], &at[1]);
     for (int i = 0; i < 2; i++) {
         struct pt_xform t = pt_builder_to_render(b, &at[i]);

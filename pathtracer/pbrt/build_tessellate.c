@@ -58,7 +58,7 @@ static int add_grid(struct grower *g, size_t first, size_t nx, size_t ny)
     return 1;
 }
 
-static int finish(struct grower *g, int ok, struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+static int finish(struct grower *g, int ok, struct pt_builder *b, struct pt_params *p)
 {
     struct pt_soup soup = {.vertex_count = g->vertices,
                            .triangle_count = g->corners / 3,
@@ -69,7 +69,7 @@ static int finish(struct grower *g, int ok, struct pt_builder *b, const struct p
     if (!ok)
         pt_diag_nomem(&b->diag, "a shape");
     else
-        pt_build_mesh(b, s, p, &soup);
+        pt_build_mesh(b, p, &soup);
     free(g->p);
     free(g->n);
     free(g->uv);
@@ -98,7 +98,7 @@ static int is_planar(const double *a, const double *b, const double *c, const do
     return fabs(volume) <= 1e-6 * size * size * size;
 }
 
-int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
 {
     static const double identity[4] = {0, 1, 2, 3}, square[8] = {0, 0, 1, 0, 0, 1, 1, 1};
     size_t vertices, count, uv_count, n_count;
@@ -121,7 +121,7 @@ int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_
         for (size_t k = 0; k < 4; k++) {
             double v = indices[i + k];
             if (pt_build_check_index(b, p, v, vertices) != 0)
-                return finish(&g, 1, b, s, p);
+                return finish(&g, 1, b, p);
             c[k] = P + 3 * (size_t)v;
             t[k] = uv ? uv + 2 * (size_t)v : square + 2 * k;
             n[k] = N ? N + 3 * (size_t)v : NULL;
@@ -143,7 +143,7 @@ int pt_build_bilinear(struct pt_builder *b, const struct pt_state *s, struct pt_
     if (pt_params_find(p, "emissionfilename"))
         pt_diag_warn(&b->diag, pt_params_find(p, "emissionfilename")->loc, "the image of an emitting patch is ignored");
     pt_params_ignore(p, "emissionfilename faceIndices");
-    return finish(&g, ok, b, s, p);
+    return finish(&g, ok, b, p);
 }
 
 /* --- curves: tubes of six sides --------------------------------------------------------------------------------------- */
@@ -202,7 +202,7 @@ static int add_ring(struct grower *g, const double p[3], const double d[3], doub
     return 1;
 }
 
-int pt_build_curve(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+int pt_build_curve(struct pt_builder *b, struct pt_params *p)
 {
     size_t count;
     const char *basis = pt_params_string(p, "basis", "bezier");
@@ -241,12 +241,12 @@ int pt_build_curve(struct pt_builder *b, const struct pt_state *s, struct pt_par
             size_t a = ring * CURVE_SIDES + i, next = ring * CURVE_SIDES + (i + 1) % CURVE_SIDES;
             ok = add_quad(&g, a, next, a + CURVE_SIDES, next + CURVE_SIDES);
         }
-    return finish(&g, ok, b, s, p);
+    return finish(&g, ok, b, p);
 }
 
 /* --- height fields and surfaces of revolution (v3) -------------------------------------------------------------------- */
 
-int pt_build_height_field(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+int pt_build_height_field(struct pt_builder *b, struct pt_params *p)
 {
     size_t count;
     int nu = pt_params_int_in(p, "nu", 0, 2, 1 << 14), nv = pt_params_int_in(p, "nv", 0, 2, 1 << 14), ok = 1;
@@ -262,13 +262,13 @@ int pt_build_height_field(struct pt_builder *b, const struct pt_state *s, struct
             ok = add_vertex(&g, q, NULL, q[0], q[1]);
         }
     ok = ok && add_grid(&g, 0, (size_t)nu, (size_t)nv);
-    return finish(&g, ok, b, s, p);
+    return finish(&g, ok, b, p);
 }
 
 enum { AROUND = 64, ALONG = 16 };
 
 /* Cone, paraboloid, hyperboloid: radius and height along v, turned about z. */
-int pt_build_revolved(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+int pt_build_revolved(struct pt_builder *b, struct pt_params *p)
 {
     const char *kind = pt_params_kind(p);
     double radius = pt_params_float_in(p, "radius", 1, 1e-30, 1e30),
@@ -299,5 +299,5 @@ int pt_build_revolved(struct pt_builder *b, const struct pt_state *s, struct pt_
             ok = add_vertex(&g, q, NULL, u, v);
         }
     ok = ok && add_grid(&g, 0, AROUND + 1, ALONG + 1);
-    return finish(&g, ok, b, s, p);
+    return finish(&g, ok, b, p);
 }

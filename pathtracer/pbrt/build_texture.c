@@ -165,13 +165,13 @@ struct pt_input pt_build_float_input(struct pt_builder *b, struct pt_params *p, 
     return pt_input_grey(pt_params_float(p, name, fallback));
 }
 
-struct pt_input pt_build_colour_input(struct pt_builder *b, const struct pt_state *s, struct pt_params *p, const char *name,
-                                      enum pt_colour_use use, pt_vec3 fallback)
+struct pt_input pt_build_colour_input(struct pt_builder *b, struct pt_params *p, const char *name, enum pt_colour_use use,
+                                      pt_vec3 fallback)
 {
     struct pt_param *param = pt_params_find(p, name);
     if (param && param->type == PT_PARAM_TEXTURE)
         return named_texture(b, p, param, 0);
-    pt_build_colour(b, s, p, name, use, &fallback);
+    pt_build_colour(b, p, name, use, &fallback);
     return (struct pt_input){0, fallback};
 }
 
@@ -191,7 +191,6 @@ struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct
 
 struct context {
     struct pt_builder *b;
-    const struct pt_state *s;
     struct pt_params *p;
     int is_float;
 };
@@ -200,7 +199,7 @@ static struct pt_input input(struct context *c, const char *name, double fallbac
 {
     if (c->is_float)
         return pt_build_float_input(c->b, c->p, name, fallback);
-    return pt_build_colour_input(c->b, c->s, c->p, name, PT_USE_UNBOUNDED, v3_splat((float)fallback));
+    return pt_build_colour_input(c->b, c->p, name, PT_USE_UNBOUNDED, v3_splat((float)fallback));
 }
 
 static void read_mapping(struct context *c, struct pt_texture *t)
@@ -331,8 +330,7 @@ static void make_stand_in(struct context *c, struct pt_texture *t)
     pt_params_ignore(c->p, "octaves roughness scale variation filename encoding gamma invert");
 }
 
-int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char *name, const char *class_name,
-                     struct pt_params *p)
+int pt_build_texture(struct pt_builder *b, const char *name, const char *class_name, struct pt_params *p)
 {
     static const struct {
         const char *kind;
@@ -356,7 +354,7 @@ int pt_build_texture(struct pt_builder *b, const struct pt_state *s, const char 
         strcmp(class_name, "rgb") != 0)
         return pt_diag_fail(&b->diag, p->loc, "texture \"%s\" of type \"%s\" (expected float or spectrum)", name,
                             class_name);
-    struct context c = {b, s, p, is_float};
+    struct context c = {b, p, is_float};
     /* What is not rendered has a stand-in, with a warning, so that scenes of other renderers load. */
     struct pt_texture t = {.kind = -1, .scale = 1, .su = 1, .sv = 1, .channel = 0};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)

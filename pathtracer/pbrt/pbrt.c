@@ -145,7 +145,7 @@ static int do_object_instance(struct parser *p)
 {
     char name[NAME_MAX_BYTES];
     int rc = pt_parser_read_string(p, "object name", name, sizeof name);
-    return rc ? rc : pt_build_instance(p->b, &p->state, name, p->loc);
+    return rc ? rc : pt_build_instance(p->b, name, p->loc);
 }
 
 static int do_reverse_orientation(struct parser *p)
@@ -225,18 +225,15 @@ static int do_world_end(struct parser *p)
 
 /* --- world ------------------------------------------------------------------------------------------------------------ */
 
-static int do_shape(struct parser *p) { return pt_build_shape(p->b, &p->state, &p->params); }
+static int do_shape(struct parser *p) { return pt_build_shape(p->b, &p->params); }
 
-static int do_light_source(struct parser *p) { return pt_build_light(p->b, &p->state, &p->params); }
+static int do_light_source(struct parser *p) { return pt_build_light(p->b, &p->params); }
 
-static int do_area_light_source(struct parser *p)
-{
-    return pt_build_area_light(p->b, &p->state, &p->params, &p->state.area);
-}
+static int do_area_light_source(struct parser *p) { return pt_build_area_light(p->b, &p->params, &p->state.area); }
 
 static int do_material(struct parser *p)
 {
-    p->state.material = pt_build_material(p->b, &p->state, pt_params_kind(&p->params), &p->params);
+    p->state.material = pt_build_material(p->b, pt_params_kind(&p->params), &p->params);
     return p->b->diag.rc;
 }
 
@@ -250,7 +247,7 @@ static int do_make_named_material(struct parser *p)
     strncpy(kind, type, sizeof kind - 1);
     kind[sizeof kind - 1] = '\0';
     strcpy(name, pt_params_kind(&p->params));
-    int32_t id = pt_build_material(p->b, &p->state, kind, &p->params);
+    int32_t id = pt_build_material(p->b, kind, &p->params);
     if (id >= 0 && pt_names_set(&p->b->named_materials, name, id) != 0)
         return pt_diag_nomem(&p->b->diag, "materials");
     return p->b->diag.rc;
@@ -274,14 +271,14 @@ static int do_texture(struct parser *p)
         rc = pt_parser_read_string(p, "texture type", type, sizeof type);
     if (!rc)
         rc = read_entity(p, PT_ATTR_TEXTURE);
-    return rc ? rc : pt_build_texture(p->b, &p->state, name, type, &p->params);
+    return rc ? rc : pt_build_texture(p->b, name, type, &p->params);
 }
 
 static int do_make_named_medium(struct parser *p)
 {
     char name[NAME_MAX_BYTES];
     strcpy(name, pt_params_kind(&p->params));
-    return pt_build_medium(p->b, &p->state, name, &p->params);
+    return pt_build_medium(p->b, name, &p->params);
 }
 
 static int do_medium_interface(struct parser *p)
@@ -484,6 +481,7 @@ int pt_pbrt_read(struct pt_builder *b, const char *path)
     p->attributes.size = sizeof(struct pt_params *);
     p->state = (struct pt_state){
         .ctm = {pt_xform_identity(), pt_xform_identity()}, .active = 3, .material = -1, .medium_in = -1, .medium_out = -1};
+    b->state = &p->state;
     int rc = pt_lexer_include(&p->lexer, path, (struct pt_loc){NULL, 0, 0}, 0);
     if (!rc)
         rc = run(p);

@@ -240,7 +240,7 @@ static double *to_limit(struct mesh *m)
     return normals;
 }
 
-int pt_build_loop_subdiv(struct pt_builder *b, const struct pt_state *s, struct pt_params *p)
+int pt_build_loop_subdiv(struct pt_builder *b, struct pt_params *p)
 {
     size_t vertices, corners;
     const double *P = pt_params_floats(p, "P", 3, &vertices), *indices = pt_params_ints(p, "indices", &corners);
@@ -277,7 +277,7 @@ int pt_build_loop_subdiv(struct pt_builder *b, const struct pt_state *s, struct 
     }
     struct pt_soup soup = {
         .vertex_count = m.vertices, .triangle_count = m.triangles, .pd = m.p, .nd = normals, .indices = m.v};
-    pt_build_mesh(b, s, p, &soup);
+    pt_build_mesh(b, p, &soup);
 out:
     free(m.p);
     free(m.v);
