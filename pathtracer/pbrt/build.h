@@ -164,7 +164,7 @@ int pt_build_area_light(struct pt_builder *b, struct pt_params *p, struct pt_are
 int32_t pt_build_shape_light(struct pt_builder *b, const struct pt_area_light *source, double area);
 
 /* build_medium.c */
-int pt_build_medium(struct pt_builder *b, const char *name, struct pt_params *p);
+int pt_build_medium(struct pt_builder *b, struct pt_params *p);
 /* Id of a medium by name, defined or not yet; -1 for "". */
 int32_t pt_build_medium_ref(struct pt_builder *b, const char *name, struct pt_loc loc);
 /* Fails for names that were used and never defined. */

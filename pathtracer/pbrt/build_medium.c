@@ -130,20 +130,17 @@ static int read_grid(struct pt_builder *b, struct pt_params *p, struct pt_medium
     return place_grid(b, p, m);
 }
 
-int pt_build_medium(struct pt_builder *b, const char *name, struct pt_params *p)
+int pt_build_medium(struct pt_builder *b, struct pt_params *p)
 {
-    char type[64];
     struct pt_medium m = {.kind = PT_MEDIUM_HOMOGENEOUS};
-    const char *given = pt_params_string(p, "type", "homogeneous");
+    const char *name = pt_params_kind(p), *type = pt_params_string(p, "type", "homogeneous");
     if (name[0] == '\0')
         return pt_diag_fail(&b->diag, p->loc, "MakeNamedMedium with an empty name");
-    strncpy(type, given, sizeof type - 1);
-    type[sizeof type - 1] = '\0';
     int is_grid = strcmp(type, "uniformgrid") == 0 || strcmp(type, "heterogeneous") == 0;
     int stand_in = strcmp(type, "rgbgrid") == 0 || strcmp(type, "cloud") == 0 || strcmp(type, "nanovdb") == 0;
     if (!is_grid && !stand_in && strcmp(type, "homogeneous") != 0)
         return pt_diag_fail(&b->diag, pt_params_loc(p, "type"),
-                            "unknown medium type \"%s\" (expected homogeneous or uniformgrid)", type);
+                            "unknown medium type \"%.63s\" (expected homogeneous or uniformgrid)", type);
     if (stand_in) {
         pt_diag_warn(&b->diag, pt_params_loc(p, "type"), "medium type \"%s\" is replaced by empty space", type);
         for (size_t i = 0; i < p->count; i++)

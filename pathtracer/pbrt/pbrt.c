@@ -239,15 +239,10 @@ static int do_material(struct parser *p)
 
 static int do_make_named_material(struct parser *p)
 {
-    char kind[NAME_MAX_BYTES], name[NAME_MAX_BYTES];
-    const char *type = pt_params_string(&p->params, "type", NULL);
+    const char *name = pt_params_kind(&p->params), *type = pt_params_string(&p->params, "type", NULL);
     if (!type)
-        return pt_diag_fail(&p->b->diag, p->loc, "MakeNamedMaterial \"%s\" without \"string type\"",
-                            pt_params_kind(&p->params));
-    strncpy(kind, type, sizeof kind - 1);
-    kind[sizeof kind - 1] = '\0';
-    strcpy(name, pt_params_kind(&p->params));
-    int32_t id = pt_build_material(p->b, kind, &p->params);
+        return pt_diag_fail(&p->b->diag, p->loc, "MakeNamedMaterial \"%s\" without \"string type\"", name);
+    int32_t id = pt_build_material(p->b, type, &p->params);
     if (id >= 0 && pt_names_set(&p->b->named_materials, name, id) != 0)
         return pt_diag_nomem(&p->b->diag, "materials");
     return p->b->diag.rc;
@@ -274,12 +269,7 @@ static int do_texture(struct parser *p)
     return rc ? rc : pt_build_texture(p->b, name, type, &p->params);
 }
 
-static int do_make_named_medium(struct parser *p)
-{
-    char name[NAME_MAX_BYTES];
-    strcpy(name, pt_params_kind(&p->params));
-    return pt_build_medium(p->b, name, &p->params);
-}
+static int do_make_named_medium(struct parser *p) { return pt_build_medium(p->b, &p->params); }
 
 static int do_medium_interface(struct parser *p)
 {
