@@ -240,39 +240,24 @@ static int put_level(struct recorder *r, struct seq_builder *file, const struct 
     return seq_builder_add(file, &frame, err);
 }
 
-static int record_levels(struct recorder *r, struct seq_builder *file, const struct lull_host_block *b, int *stopped,
-                         struct base_err *err)
+/* The block at all levels, one of them in full; or its reference, which is one level. */
+static int record(struct recorder *r, struct seq_builder *file, const struct lull_host_block *b, int reference, int *stopped,
+                  struct base_err *err)
 {
-    const struct seq_manifest *m = &r->manifest;
+    const uint32_t levels = reference ? 1 : r->manifest.n_levels;
     struct pt_render *render = NULL;
     int full_done = 0;
-    int rc = open_block(r, b, 0, &render, err);
-    for (uint32_t k = 0; k < m->n_levels && !rc; k++) {
-        int full = !full_done && (m->levels[k] >= FULL_LEVEL_SPP || k + 1 == m->n_levels);
-        rc = pt_render_advance(render, m->levels[k], r->hooks, stopped, err);
+    int rc = open_block(r, b, reference, &render, err);
+    for (uint32_t k = 0; k < levels && !rc; k++) {
+        const uint64_t spp = reference ? r->config->reference_spp : r->manifest.levels[k];
+        int full = !full_done && (spp >= FULL_LEVEL_SPP || k + 1 == levels);
+        rc = pt_render_advance(render, spp, r->hooks, stopped, err);
         if (rc || *stopped)
             break;
         pt_render_judge(render, r->hooks);
-        rc = put_level(r, file, render, 0, full, err);
+        rc = put_level(r, file, render, reference, full, err);
         full_done |= full;
     }
-    if (render)
-        r->dropped += render->totals->dropped;
-    pt_render_destroy(render);
-    return rc;
-}
-
-static int record_reference(struct recorder *r, struct seq_builder *file, const struct lull_host_block *b, int *stopped,
-                            struct base_err *err)
-{
-    struct pt_render *render = NULL;
-    if (r->config->reference_spp == 0)
-        return 0;
-    int rc = open_block(r, b, 1, &render, err);
-    if (!rc)
-        rc = pt_render_advance(render, r->config->reference_spp, r->hooks, stopped, err);
-    if (!rc && !*stopped)
-        rc = put_level(r, file, render, 1, 1, err);
     if (render)
         r->dropped += render->totals->dropped;
     pt_render_destroy(render);
@@ -311,9 +296,9 @@ static int record_block(struct recorder *r, const struct lull_host_block *b, int
                               r->manifest.seed, err);
     if (rc)
         return rc;
-    rc = record_levels(r, &file, b, stopped, err);
-    if (!rc && !*stopped)
-        rc = record_reference(r, &file, b, stopped, err);
+    rc = record(r, &file, b, 0, stopped, err);
+    if (!rc && !*stopped && r->config->reference_spp > 0)
+        rc = record(r, &file, b, 1, stopped, err);
     if (!rc && !*stopped)
         rc = finish_block(r, &file, b, base_clock_wall_s() - start_s, err);
     seq_builder_release(&file);
