@@ -10,14 +10,6 @@
 
 enum { MOST_EXPENSIVE = 5, REPLAYED = 256 };
 
-static const struct lull_host_quote_row *asked_row(const struct pt_quote *q)
-{
-    int i = 0;
-    while (!q->rows[i].asked)
-        i++;
-    return &q->rows[i];
-}
-
 /* --- what stands out --------------------------------------------------------------------------------------------------- */
 
 struct expensive_block {
@@ -54,7 +46,7 @@ static void take_census(const struct pt_render *r, const struct lull_host_block 
 static uint32_t find_most_expensive(const struct pt_quote *q, const struct pt_render *r,
                                     struct expensive_block out[MOST_EXPENSIVE])
 {
-    const struct lull_host_quote_row *row = asked_row(q);
+    const struct lull_host_quote_row *row = pt_quote_asked(q);
     uint32_t n = 0;
     for (uint32_t i = 0; i < r->blocks->count; i++) {
         uint32_t at = n < MOST_EXPENSIVE ? n++ : MOST_EXPENSIVE;
@@ -120,7 +112,7 @@ static void print_most_expensive(FILE *out, const struct pt_quote *q, const stru
 {
     struct expensive_block expensive[MOST_EXPENSIVE];
     uint32_t n = find_most_expensive(q, r, expensive);
-    const struct lull_host_quote_row *row = asked_row(q);
+    const struct lull_host_quote_row *row = pt_quote_asked(q);
     fprintf(out, "\nblocks that take most of the time, as asked:\n");
     for (uint32_t k = 0; k < n; k++) {
         const struct lull_host_block *b = &r->blocks->list[expensive[k].index];
@@ -152,7 +144,7 @@ static void print_unmet(FILE *out, const struct lull_host_quote_row *row, const 
 
 void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *r, const struct pt_quote_info *info)
 {
-    const struct lull_host_quote_row *asked = asked_row(q);
+    const struct lull_host_quote_row *asked = pt_quote_asked(q);
     char time[64], took[32], load[32];
     snprintf(time, sizeof time, "time, %d thread%s", q->threads, q->threads > 1 ? "s" : "");
     fprintf(out, "%-26s  %-26s  %-30s  %s\n", "times just seen, viewers", "spp min / mean / max", time, "against uniform");
@@ -277,7 +269,7 @@ int pt_quote_json(FILE *out, const struct pt_quote *q, const struct pt_render *r
 
 int pt_quote_map(const char *path, const struct pt_quote *q, const struct pt_render *r, struct base_err *err)
 {
-    const struct lull_host_quote_row *row = asked_row(q);
+    const struct lull_host_quote_row *row = pt_quote_asked(q);
     struct lull_error e = {.struct_size = sizeof e};
     double *values = calloc(r->blocks->count, sizeof *values), most_s = 0.0;
     if (!values)

@@ -27,13 +27,10 @@ struct plan {
 static int keep_answer(struct plan *p, const struct pt_open *o, const struct pt_quote *quote, size_t at,
                        struct base_err *err)
 {
-    const struct lull_host_quote_row *row = NULL;
+    const struct lull_host_quote_row *row = pt_quote_asked(quote);
     const size_t n = o->render->blocks->count;
     char grid[PT_SHOT_GRID];
     struct pilot *pilot = &p->pilots[p->pilot_count++];
-    for (uint32_t i = 0; i < quote->row_count; i++)
-        if (quote->rows[i].asked)
-            row = &quote->rows[i];
     pt_shot_table_grid(&o->render->config, grid);
     if (p->pilot_count == 1) {
         memcpy(p->table.grid, grid, sizeof grid);

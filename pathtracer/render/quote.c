@@ -133,3 +133,11 @@ int pt_quote_finish(struct pt_quote *q, struct pt_render *r, struct base_err *er
     const struct lull_host_view *view = pt_host_show(&r->film, r->blocks, &show);
     return pt_host_result(lull_host_quote_finish(q->quote, view, &q->rows, &q->row_count, &e), &e, err);
 }
+
+const struct lull_host_quote_row *pt_quote_asked(const struct pt_quote *q)
+{
+    int i = 0;
+    while (!q->rows[i].asked)
+        i++;
+    return &q->rows[i];
+}

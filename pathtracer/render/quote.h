@@ -42,5 +42,7 @@ void pt_quote_destroy(struct pt_quote *quote);
 void pt_quote_ask(struct pt_quote *quote, struct pt_render *render, const uint32_t *due, uint32_t count);
 /* After the pilot: asks about every block as it is and works out the answer. */
 int pt_quote_finish(struct pt_quote *quote, struct pt_render *render, struct base_err *err);
+/* Of a finished one: the row of what the options ask for, which is always there. */
+const struct lull_host_quote_row *pt_quote_asked(const struct pt_quote *quote);
 
 #endif
