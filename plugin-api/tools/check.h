@@ -242,6 +242,9 @@ int32_t lc_state_save(const struct lull_state *state, const struct lc_session *s
 /* The entry of a library that the loader has accepted before; NULL if that fails. */
 lull_entry_fn lc_entry(const char *path);
 
+/* The i-th parameter of the criterion. */
+const struct lull_param *lc_param(const struct lc *c, uint32_t i);
+
 /* Calls visit for every symbol that a shared object defines for others. 0, or -1 if the file is not understood. */
 int lc_elf_exports(const char *path, void (*visit)(void *context, const char *name), void *context);
 

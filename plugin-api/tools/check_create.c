@@ -9,12 +9,6 @@
 #include <stdio.h>
 #include <string.h>
 
-static const struct lull_param *param(const struct lc *c, uint32_t i)
-{
-    const void *at = (const char *)c->criterion->params + (size_t)i * c->criterion->param_stride;
-    return at;
-}
-
 /* Creates with the command line's parameters and one more, and destroys. */
 static int32_t try_pair(struct lc *c, const char *key, const char *value, struct lull_error *err)
 {
@@ -59,10 +53,10 @@ static void check_unknown_key(struct lc *c)
     expect_status(c, "", "1", LULL_E_KEY);
     for (uint32_t i = 0; i < c->criterion->param_count; i++) {
         char longer[80];
-        snprintf(longer, sizeof longer, "%sx", param(c, i)->name);
+        snprintf(longer, sizeof longer, "%sx", lc_param(c, i)->name);
         int known = 0;
         for (uint32_t k = 0; k < c->criterion->param_count; k++)
-            known |= strcmp(param(c, k)->name, longer) == 0;
+            known |= strcmp(lc_param(c, k)->name, longer) == 0;
         if (!known)
             expect_status(c, longer, "1", LULL_E_KEY);
     }
@@ -96,7 +90,7 @@ static void check_params(struct lc *c)
     static const char *const not_numbers[] = {"",    " ",   "x",  "1x",   "1 2", "--1",
                                               "nan", "inf", "1e", "0x10", "1,5", "1e99999"};
     for (uint32_t i = 0; i < c->criterion->param_count; i++) {
-        const struct lull_param *p = param(c, i);
+        const struct lull_param *p = lc_param(c, i);
         if (p->default_value)
             expect_status(c, p->name, p->default_value, LULL_OK);
         if (p->type <= LULL_PARAM_BOOL)

@@ -18,6 +18,11 @@ lull_entry_fn lc_entry(const char *path)
     return entry;
 }
 
+const struct lull_param *lc_param(const struct lc *c, uint32_t i)
+{
+    return (const void *)((const char *)c->criterion->params + (size_t)i * c->criterion->param_stride);
+}
+
 /* --- symbols --------------------------------------------------------------------------------------------------------- */
 
 struct exports {

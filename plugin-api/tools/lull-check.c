@@ -139,8 +139,7 @@ static int find_table(struct lc *c, const char *id)
 static const char *missing(const struct lc *c, const char *message)
 {
     for (uint32_t i = 0; i < c->criterion->param_count; i++) {
-        const struct lull_param *p =
-            (const void *)((const char *)c->criterion->params + (size_t)i * c->criterion->param_stride);
+        const struct lull_param *p = lc_param(c, i);
         int given = 0;
         for (uint32_t k = 0; k < c->pair_count; k++)
             given |= strcmp(c->pairs[k].key, p->name) == 0;

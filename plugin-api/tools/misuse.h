@@ -1,0 +1,95 @@
+/* SPDX-License-Identifier: MIT
+ *
+ * Calls outside the rules, for check_misuse.c; a file for each call.
+ *
+ * A call is made up from a good one: lc_make_up begins it, lc_wrong notes each thing that is spoilt and which codes fit it,
+ * lc_announce says it to whoever finds the process dead, and lc_judge holds the answer against the codes. One thread.
+ */
+#ifndef LULL_CHECK_MISUSE_H
+#define LULL_CHECK_MISUSE_H
+
+#include "check.h"
+
+enum lc_slot {
+    AT_HOST,
+    AT_PAIRS,
+    AT_FRAME,
+    AT_RECTS,
+    AT_VIEW,
+    AT_PLANES,
+    AT_BLOCKS,
+    AT_DECISIONS,
+    AT_STREAM,
+    AT_ERROR,
+    SLOTS
+};
+enum { SLOT_SIZE = 8192, BLOCKS_MAX = 8, PAIRS_MAX = 72, TEXT_MAX = 6000 };
+
+/* Sets of statuses: the header's codes are -1 to -11. */
+#define CODE(status) (UINT32_C(1) << -(status))
+#define MAY (~UINT32_C(0)) /* the header leaves it open */
+static const uint32_t INVALID = CODE(LULL_E_INVALID), VERSION = CODE(LULL_E_VERSION), PLANE = CODE(LULL_E_PLANE),
+                      SIZE = CODE(LULL_E_INVALID) | CODE(LULL_E_VERSION), REFUSED = MAY & ~CODE(LULL_OK);
+
+struct lc_misuse {
+    struct lc *check;
+    uint64_t random, calls, refused;
+    void *slot[SLOTS]; /* owns */
+    size_t mapped[SLOTS];
+    struct lc_session s;         /* what must not be disturbed */
+    struct lc_image image;       /* of its film */
+    struct lull_instance *loose; /* owns; whatever it is given */
+    const struct lull_state *state;
+    struct lc_buffer saved; /* a state of the session */
+    int open;               /* the session's frame is */
+
+    /* the call that is being made up */
+    struct lull_instance *instance;
+    uint32_t codes; /* that fit what is wrong; 0: nothing is */
+    char what[400];
+};
+
+/* --- misuse_call.c: what a call with wrong arguments is ----------------------------------------------------------------- */
+
+/* A random number below `below`. */
+uint32_t lc_draw(struct lc_misuse *m, uint32_t below);
+/* A number that makes no sense, or hardly any. */
+double lc_nonsense(struct lc_misuse *m);
+/* A size that is too small, a multiple of 8. */
+uint32_t lc_too_small(struct lc_misuse *m, size_t size);
+/* How many things are to be wrong: one, sometimes several. */
+uint32_t lc_how_many(struct lc_misuse *m);
+
+/* Memory for so many bytes, eight at least, before a page that cannot be touched. */
+void *lc_place(struct lc_misuse *m, enum lc_slot slot, const void *from, size_t size);
+/* The same for a struct that says it has so many bytes. */
+void *lc_place_struct(struct lc_misuse *m, enum lc_slot slot, const void *from, size_t size);
+/* Elements of `size` bytes, `stride` apart; with a stride that is too short, room without elements. */
+void *lc_place_array(struct lc_misuse *m, enum lc_slot slot, const void *from, size_t size, uint32_t count, uint32_t stride);
+
+void lc_make_up(struct lc_misuse *m, struct lull_instance *instance);
+/* Notes what is wrong. Of several wrong things any may be complained about; a call is open to the criterion only if each
+ * is. */
+void lc_wrong(struct lc_misuse *m, uint32_t codes, const char *what);
+/* An error struct, a short one, or none. */
+struct lull_error *lc_announce(struct lc_misuse *m, const char *function);
+/* Is this one of the expected statuses, and does the error say the same? */
+void lc_judge(struct lc_misuse *m, const char *function, int32_t status, const struct lull_error *err);
+
+/* --- the calls ---------------------------------------------------------------------------------------------------------- */
+
+/* To the session's instance (create: to none): what the header says is refused. */
+void lc_misuse_create(struct lc_misuse *m);
+void lc_misuse_requirements(struct lc_misuse *m);
+void lc_misuse_begin(struct lc_misuse *m);
+void lc_misuse_evaluate(struct lc_misuse *m);
+/* Of the extension lull.state/1, which the criterion has. */
+void lc_misuse_save(struct lc_misuse *m);
+void lc_misuse_load(struct lc_misuse *m);
+
+/* To the instance that lc_make_up was given: what the header leaves open. */
+void lc_loose_begin(struct lc_misuse *m);
+void lc_loose_evaluate(struct lc_misuse *m);
+void lc_loose_load(struct lc_misuse *m); /* of m->saved, which is not empty */
+
+#endif
