@@ -74,14 +74,7 @@ static int32_t copy(struct lull_host_display *d, const struct lull_host_view *v,
     int32_t code = lull_host_show(d->blocks, v, 0, &shown, err);
     if (code != LULL_OK)
         return code;
-    const struct lull_view view = {.struct_size = sizeof view,
-                                   .x0 = v->x0,
-                                   .y0 = v->y0,
-                                   .x1 = v->x1,
-                                   .y1 = v->y1,
-                                   .planes = shown.planes,
-                                   .plane_count = LULL_PLANE_COUNT,
-                                   .plane_stride = sizeof shown.planes[0]};
+    const struct lull_view view = lull_host_seen(v, &shown);
     if (!shown.planes[LULL_PLANE_COLOR].data)
         code = lull_error_set(err, LULL_E_INVALID, "a live view needs the plane COLOR");
     for (uint32_t i = 0; i < d->blocks->count && code == LULL_OK; i++) {

@@ -1,6 +1,8 @@
 /* What a renderer hands in, before anything is done with it: a number or a pointer that makes no sense is named. */
 #include "host/frame.h"
 
+#include <lull/criterion_kit.h>
+
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -193,10 +195,6 @@ int32_t lull_host_check_disjoint(const struct lull_host_block *list, uint32_t co
 
 /* --- planes --------------------------------------------------------------------------------------------------------- */
 
-static const char *const plane_names[LULL_PLANE_COUNT] = {"COLOR", "WEIGHT", "SPP",    "MOMENT2",
-                                                          "HALF",  "ALBEDO", "NORMAL", "DEPTH"};
-static const uint32_t plane_channels[LULL_PLANE_COUNT] = {3, 1, 1, 1, 3, 3, 3, 1};
-
 int32_t lull_host_check_plane(const char *name, const struct lull_plane *p, uint32_t channels, struct lull_error *err)
 {
     static const int64_t sizes[] = {4, 2, 8, 4}; /* bytes of a LULL_TYPE_ */
@@ -225,7 +223,7 @@ int32_t lull_host_check_announced(uint32_t planes, const struct lull_plane shown
     for (int i = 0; i < LULL_PLANE_COUNT; i++)
         if ((planes & ~LULL_HOST_COUNTS & LULL_PLANE_BIT(i)) && !shown[i].data)
             return lull_error_set(err, LULL_E_PLANE, "%s: the view does not have the plane, which the config announced",
-                                  plane_names[i]);
+                                  lull_kit_plane_name((unsigned)i));
     return LULL_OK;
 }
 
@@ -255,7 +253,7 @@ int32_t lull_host_check_view(const struct lull_host_blocks *b, const struct lull
         return lull_error_set(err, LULL_E_INVALID, "the view: planes is NULL, plane_count is %u", v->plane_count);
     for (uint32_t i = 0; i < v->plane_count && i < LULL_PLANE_COUNT && code == LULL_OK; i++)
         if (v->planes[i].data)
-            code = lull_host_check_plane(plane_names[i], &v->planes[i], plane_channels[i], err);
+            code = lull_host_check_plane(lull_kit_plane_name(i), &v->planes[i], lull_kit_channels(i), err);
     if (code == LULL_OK)
         code = check_dropped("dropped", v->dropped, err);
     if (code == LULL_OK)

@@ -22,19 +22,13 @@ extern const char lull_host_page_html[] __attribute__((visibility("hidden")));
 
 /* --- the data --------------------------------------------------------------------------------------------------------- */
 
-static int is_number(const cJSON *o, const char *key, double *value)
-{
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(o, key);
-    *value = cJSON_IsNumber(item) ? item->valuedouble : 0.0;
-    return cJSON_IsNumber(item);
-}
-
 /* The size of the pictures that belong to a report; 0: it is none. */
 static int find_size(const cJSON *report, double size[2])
 {
     const cJSON *crop = cJSON_GetObjectItemCaseSensitive(report, "crop");
-    if (!cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(report, "blocks")) || !is_number(report, "width", &size[0]) ||
-        !is_number(report, "height", &size[1]))
+    if (!cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(report, "blocks")) ||
+        !base_json_get(report, "width", -HUGE_VAL, HUGE_VAL, &size[0]) ||
+        !base_json_get(report, "height", -HUGE_VAL, HUGE_VAL, &size[1]))
         return 0;
     for (int i = 0; i < 2 && cJSON_GetArraySize(crop) == 4; i++)
         size[i] = cJSON_GetNumberValue(cJSON_GetArrayItem(crop, 2 + i)) - cJSON_GetNumberValue(cJSON_GetArrayItem(crop, i));

@@ -1,9 +1,8 @@
 #include "host/frame.h"
 
-#include <stdlib.h>
-#include <string.h>
+#include <lull/criterion_kit.h>
 
-#include "base/half.h"
+#include <stdlib.h>
 
 static size_t pixels_of(const struct lull_host_view *v) { return (size_t)(v->x1 - v->x0) * (size_t)(v->y1 - v->y0); }
 
@@ -30,17 +29,8 @@ static struct lull_plane plane_of(const struct lull_host_view *v, const void *da
 
 static double read_at(const struct lull_plane *p, const struct lull_host_view *v, int32_t x, int32_t y, int channel)
 {
-    const void *e = (const char *)p->data + (x - v->x0) * p->stride_x + (y - v->y0) * p->stride_y + channel * p->stride_c;
-    double value = 0.0;
-    if (p->type == LULL_TYPE_F64)
-        value = *(const double *)e;
-    else if (p->type == LULL_TYPE_F32)
-        value = (double)*(const float *)e;
-    else if (p->type == LULL_TYPE_F16)
-        value = (double)base_f16_to_f32(*(const uint16_t *)e);
-    else
-        value = (double)*(const uint32_t *)e;
-    return value * p->scale;
+    const char *e = (const char *)p->data + (x - v->x0) * p->stride_x + (y - v->y0) * p->stride_y + channel * p->stride_c;
+    return lull_kit_stored(e, p->type) * p->scale;
 }
 
 /* Samples of a pixel of block k. */

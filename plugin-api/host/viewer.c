@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "base/half.h"
 
 enum { CREATE = 4, UPDATE = 6, VECTOR_GRAPHICS = 8 };
 enum { STROKE_COLOR = 4, STROKE = 5, BEGIN_PATH = 6, MOVE_TO = 10, LINE_TO = 11, RECT = 18 };
@@ -48,12 +49,7 @@ static void put_i64(struct viewer_packet *p, int64_t v)
     p->size += 8;
 }
 
-static void put_f32(struct viewer_packet *p, float v)
-{
-    uint32_t bits;
-    memcpy(&bits, &v, sizeof bits);
-    put_i32(p, (int32_t)bits);
-}
+static void put_f32(struct viewer_packet *p, float v) { put_i32(p, (int32_t)base_f32_bits(v)); }
 
 static void put_text(struct viewer_packet *p, const char *text)
 {
