@@ -26,7 +26,6 @@ extern char **environ;
 
 struct lull_oidn {
     char program[PATH_MAX + 64], *library; /* owns library, "": the usual places */
-    char version[32];
     int memory_fd;
     struct shared *shared; /* NULL: nothing is prepared */
     size_t bytes;
@@ -136,7 +135,7 @@ static int ask_program(struct lull_oidn *o, int (*cancelled)(void *data), void *
         return rc;
     send(o->program_fd, "", 1, MSG_NOSIGNAL); /* that it is gone is seen by waiting */
     rc = wait_for(o, cancelled, data, err);
-    s->version[sizeof s->version - 1] = s->text[sizeof s->text - 1] = '\0';
+    s->text[sizeof s->text - 1] = '\0';
     if (!rc && s->code)
         rc = base_fail(err, s->code, "%s", s->text);
     if (rc)
@@ -204,7 +203,6 @@ int lull_oidn_open(const char *library, struct lull_oidn **out, struct base_err 
         lull_oidn_close(o);
         return rc;
     }
-    memcpy(o->version, o->shared->version, sizeof o->version);
     drop_memory(o);
     *out = o;
     return 0;
@@ -221,8 +219,6 @@ void lull_oidn_close(struct lull_oidn *o)
     free(o->library);
     free(o);
 }
-
-const char *lull_oidn_version(const struct lull_oidn *o) { return o->version; }
 
 /* --- pictures ---------------------------------------------------------------------------------------------------------- */
 

@@ -67,8 +67,6 @@ static inline int32_t lull_oidn_mirrored(int32_t i, int32_t n)
  * version, or one whose device cannot be made. */
 int lull_oidn_open(const char *library, struct lull_oidn **out, struct base_err *err);
 void lull_oidn_close(struct lull_oidn *oidn);
-/* "2.5.1". */
-const char *lull_oidn_version(const struct lull_oidn *oidn);
 
 /* Takes the memory that pictures of this form need, 72 bytes a pixel; the program takes some 600 more in a run. */
 int lull_oidn_prepare(struct lull_oidn *oidn, const struct lull_oidn_form *form, struct base_err *err);

@@ -52,7 +52,6 @@ static void finding(void **unused)
     lull_oidn_close(open_stub("identity"));
     snprintf(file, sizeof file, "%s/libOpenImageDenoise.so.2", stub);
     assert_int_equal(lull_oidn_open(file, &o, &err), 0);
-    assert_string_equal(lull_oidn_version(o), "2.5.1");
     lull_oidn_close(o);
     refuses("/no/such/folder", "identity", "/no/such/folder: no Open Image Denoise 2 there");
     refuses("/proc/self/exe", "identity", "no Open Image Denoise 2 there");

@@ -173,11 +173,10 @@ static int make_device(struct library *o, struct shared *s, struct base_err *err
     if (rc)
         return rc;
     int major = o->get_device_int(o->device, "versionMajor");
-    snprintf(s->version, sizeof s->version, "%d.%d.%d", major, o->get_device_int(o->device, "versionMinor"),
-             o->get_device_int(o->device, "versionPatch"));
     if (major == MAJOR_VERSION)
         return 0;
-    return base_fail(err, BASE_EINVAL, "Open Image Denoise is of version %s: version 2 is needed", s->version);
+    return base_fail(err, BASE_EINVAL, "Open Image Denoise is of version %d.%d.%d: version 2 is needed", major,
+                     o->get_device_int(o->device, "versionMinor"), o->get_device_int(o->device, "versionPatch"));
 }
 
 /* --- filter ------------------------------------------------------------------------------------------------------------ */

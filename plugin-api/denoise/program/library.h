@@ -11,8 +11,8 @@ struct library; /* lives as long as the process: the library's threads outlive t
 
 /* Finds it; path: a file, a folder, or "" for the usual places. */
 int library_open(const char *path, struct library **out, struct base_err *err);
-/* Makes a device of as many threads, unless there is one from before, and then fills s->version. Unless the width is 0,
- * denoises the colors of s, whose pictures are finite, into its outs. After a failure the process is of no more use. */
+/* Makes a device of as many threads, unless there is one from before. Unless the width is 0, denoises the colors of s, whose
+ * pictures are finite, into its outs. After a failure the process is of no more use. */
 int library_denoise(struct library *library, struct shared *s, struct base_err *err);
 
 #endif

@@ -20,11 +20,10 @@ enum {
 };
 
 struct shared {
-    struct lull_oidn_form form; /* width 0: only say the version */
+    struct lull_oidn_form form; /* width 0: only make a device */
     int32_t colors, prefiltered;
-    int32_t code; /* BASE_ */
-    char version[32];
-    char text[436]; /* the pictures begin at byte 512 */
+    int32_t code;   /* BASE_ */
+    char text[468]; /* the pictures begin at byte 512 */
 };
 
 static inline float *shared_picture(struct shared *s, int which)
