@@ -189,9 +189,11 @@ static void work_whole(struct farming *f)
     }
 }
 
-static int run(struct job *job, struct base_threads *threads, const struct job_farm *farm, struct base_err *err)
+int job_farm_run(struct job *job, struct base_threads *threads, const struct job_farm *farm, struct base_err *err)
 {
     struct farming f = {.job = job, .farm = farm, .threads = base_threads_count(threads)};
+    if (job_failed(job, err))
+        return job->failed.code;
     pthread_mutex_init(&f.lock, NULL);
     if (job)
         job->serial++;
@@ -212,11 +214,6 @@ static int run(struct job *job, struct base_threads *threads, const struct job_f
     if (f.failed.code)
         return base_fail(err, f.failed.code, "%s", f.failed.text);
     return atomic_load(&f.stop) ? JOB_STOPPED : 0;
-}
-
-int job_farm_run(struct job *job, struct base_threads *threads, const struct job_farm *farm, struct base_err *err)
-{
-    return job_failed(job, err) ? job->failed.code : run(job, threads, farm, err);
 }
 
 /* --- workers ---------------------------------------------------------------------------------------------------------- */
