@@ -100,6 +100,7 @@ int lc_film_init(struct lc_film *f, int32_t width, int32_t height, int32_t block
 void lc_film_release(struct lc_film *f);
 /* The frame that suits the criterion: two by one blocks and the rest at the edges, one of them 1x1. The blocks are of the
  * size it was made for if that is the only one it takes or if nominal is set, else small, which saves time. */
+enum { LC_FILM_BLOCKS = 6 };
 int lc_film_init_for(struct lc_film *f, const struct lull_requirements *req, uint32_t seed, int nominal);
 /* Adds samples until the block has spp; nothing if it has. */
 void lc_film_advance(struct lc_film *f, uint32_t id, uint64_t spp);
@@ -190,6 +191,8 @@ int lc_session_open(struct lc_session *s, struct lc *c, const struct lc_manner *
 int lc_session_open_film(struct lc_session *s, struct lc *c, const struct lc_manner *manner, struct lc_film *film);
 /* Begins the frame again (RESTART) with no samples and an empty log. */
 int lc_session_restart(struct lc_session *s);
+/* Adds samples to the blocks that have not stopped. Returns how many, their ids in ids[film.block_count]. */
+uint32_t lc_session_advance(struct lc_session *s, uint32_t *ids);
 /* Adds samples, asks about the blocks that have not stopped, logs the answers. Not 0 if that failed (which is reported). */
 int lc_session_step(struct lc_session *s);
 int lc_session_steps(struct lc_session *s, int steps);
@@ -197,10 +200,9 @@ int lc_session_steps(struct lc_session *s, int steps);
 int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const uint32_t *ids, uint32_t count,
                        struct lull_decision *decisions, struct lull_error *err);
 int lc_session_image(struct lc_session *s, struct lc_image *image);
-/* The asking about all blocks as they are, LC_JUDGED at most; answers into decisions by id. Returns whether there were any,
- * each held against the header's rules; else "evaluate WHAT: …" is reported. */
-enum { LC_JUDGED = 16 };
-int lc_session_judge(struct lc_session *s, const struct lc_image *image, struct lull_decision decisions[LC_JUDGED],
+/* The asking about all blocks as they are, LC_FILM_BLOCKS at most; answers into decisions by id. Returns whether there were
+ * any, each held against the header's rules; else "evaluate WHAT: …" is reported. */
+int lc_session_judge(struct lc_session *s, const struct lc_image *image, struct lull_decision decisions[LC_FILM_BLOCKS],
                      const char *what);
 void lc_session_close(struct lc_session *s);
 
@@ -210,6 +212,10 @@ void lc_log_release(struct lc_log *log);
 /* Such a session, whose log is held against the expected one. Negative if it failed, 1 if it
  * differs; both are reported. */
 int lc_run_as(struct lc *c, const struct lc_manner *manner, const struct lc_log *expected, int exact, const char *what);
+/* Two sessions, the second of which must be like the first, bit for bit. */
+void lc_run_both(struct lc *c, const struct lc_manner *a, const struct lc_manner *b, const char *what);
+/* A session with a film of the caller's choice (taken over). Not 0 if it cannot be opened (which is reported). */
+int lc_run_film(struct lc *c, struct lc_film *film);
 /* Reports the first difference as "what: …". exact: bit for bit; else the actions and, within 0.1 %, the numbers. */
 int lc_log_compare(struct lc *c, const struct lc_log *expected, const struct lc_log *got, int exact, const char *what);
 
@@ -219,8 +225,6 @@ int32_t lc_begin(struct lc *c, struct lull_instance *instance, const struct lull
 void lc_decision_preset(struct lull_decision *d);
 /* Reports an answer that breaks a rule of the header. */
 void lc_decision_check(struct lc *c, const struct lull_block *block, const struct lull_decision *d);
-/* Reports a call that changed the floating-point environment since `before`, and undoes it. */
-void lc_fp_check(struct lc *c, const struct lull_process_state *before, const char *call);
 int lc_deterministic(const struct lc *c);
 
 /* Where a state is written to and read from. */

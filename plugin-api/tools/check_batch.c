@@ -4,26 +4,18 @@
  */
 #include "check.h"
 
-static void compare_manners(struct lc *c, const struct lc_manner *a, const struct lc_manner *b, const char *what)
-{
-    struct lc_log expected;
-    if (lc_run(c, a, &expected) == 0)
-        lc_run_as(c, b, &expected, 1, what);
-    lc_log_release(&expected);
-}
-
 static void check_repeat(struct lc *c)
 {
     struct lc_manner twice = {.ask = LC_ASK_TWICE};
     if (!lc_deterministic(c))
         lc_note(c, "not deterministic: compared with a tolerance");
-    compare_manners(c, NULL, NULL, "the same session once more");
-    compare_manners(c, NULL, &twice, "each question twice");
+    lc_run_both(c, NULL, NULL, "the same session once more");
+    lc_run_both(c, NULL, &twice, "each question twice");
     if (c->req.block_width == 0 && c->req.block_height == 0)
         return;
     struct lc_manner nominal = {.nominal = 1}, nominal_singly = {.nominal = 1, .ask = LC_ASK_SINGLY};
     int invariant = (c->criterion->capabilities & LULL_CAP_BATCH_INVARIANT) != 0;
-    compare_manners(c, &nominal, invariant ? &nominal_singly : &nominal, "blocks of the size it was made for, once more");
+    lc_run_both(c, &nominal, invariant ? &nominal_singly : &nominal, "blocks of the size it was made for, once more");
 }
 
 static void check_batch(struct lc *c)
@@ -33,8 +25,8 @@ static void check_batch(struct lc *c)
         return;
     }
     struct lc_manner reversed = {.ask = LC_ASK_REVERSED}, singly = {.ask = LC_ASK_SINGLY};
-    compare_manners(c, NULL, &reversed, "blocks in reverse order");
-    compare_manners(c, NULL, &singly, "one block per call");
+    lc_run_both(c, NULL, &reversed, "blocks in reverse order");
+    lc_run_both(c, NULL, &singly, "one block per call");
 }
 
 /* Two instances whose calls alternate, on different pictures. */

@@ -137,10 +137,7 @@ static void check_null(struct lc *c)
 
     /* a host that offers nothing, not even a number of workers */
     struct lull_host bare = {.struct_size = sizeof bare, .api_minor = LULL_API_MINOR};
-    struct lc_log nothing;
-    if (lc_run(c, NULL, &nothing) == 0)
-        lc_run_as(c, &(struct lc_manner){.host = &bare}, &nothing, 1, "NULL host against a host of NULLs");
-    lc_log_release(&nothing);
+    lc_run_both(c, NULL, &(struct lc_manner){.host = &bare}, "NULL host against a host of NULLs");
 }
 
 static void check_requirements(struct lc *c)

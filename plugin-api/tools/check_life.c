@@ -79,15 +79,8 @@ static void check_zero_blocks(struct lc *c)
 static void run_frame(struct lc *c, int32_t width, int32_t height, int32_t block_w, int32_t block_h)
 {
     struct lc_film film;
-    struct lc_session s;
-    if (lc_film_init(&film, width, height, block_w, block_h, 1) != 0)
-        return;
-    if (lc_session_open_film(&s, c, NULL, &film) == 0) {
-        lc_session_steps(&s, LC_STEPS);
-        lc_session_close(&s);
-    } else {
+    if (lc_film_init(&film, width, height, block_w, block_h, 1) == 0 && lc_run_film(c, &film) != 0)
         lc_note(c, "that was a frame of %dx%d in blocks of %dx%d", width, height, block_w, block_h);
-    }
 }
 
 static void check_shapes(struct lc *c)
@@ -189,7 +182,7 @@ static void check_final(struct lc *c)
     if (lc_session_open(&s, c, NULL) != 0)
         return;
     int reopens = (c->criterion->capabilities & LULL_CAP_REOPENS) != 0;
-    struct lull_decision d[LC_JUDGED];
+    struct lull_decision d[LC_FILM_BLOCKS];
     struct lc_image image;
     lc_session_steps(&s, 2);
     for (uint32_t i = 0; i < s.film.block_count; i++) {
@@ -212,16 +205,10 @@ static void check_cancel(struct lc *c)
         return;
     struct lc_manner hosted = {.host = &host.host};
     if (lc_session_open(&s, c, &hosted) == 0) {
-        uint32_t ids[16];
-        struct lull_decision d[16];
-        uint32_t count = s.film.block_count < 16 ? s.film.block_count : 16;
+        uint32_t ids[LC_FILM_BLOCKS];
+        struct lull_decision d[LC_FILM_BLOCKS];
         for (int step = 0; step < LC_STEPS && (uint32_t)step == s.step; step++) {
-            uint32_t due = 0;
-            for (uint32_t i = 0; i < count; i++)
-                if (!(s.film.blocks[i].flags & LULL_BLOCK_STOPPED)) {
-                    lc_film_advance(&s.film, i, s.spp << (i % 2));
-                    ids[due++] = i;
-                }
+            const uint32_t due = lc_session_advance(&s, ids);
             struct lc_image image;
             struct lull_error err = {.struct_size = sizeof err};
             host.cancel = 1;

@@ -87,7 +87,7 @@ static void check_window(struct lc *c)
     if (LC_EXPECT(c, status == LULL_OK, "begin_frame of a crop: %d, %s", status, err.message) &&
         lc_session_image(&s, &image) == 0) {
         image.view.x0 += DX, image.view.x1 += DX, image.view.y0 += DY, image.view.y1 += DY;
-        struct lull_decision d[LC_JUDGED];
+        struct lull_decision d[LC_FILM_BLOCKS];
         for (uint32_t i = 0; i < s.film.block_count; i++) {
             struct lull_block *b = &s.film.blocks[i];
             b->x0 += DX, b->x1 += DX, b->y0 += DY, b->y1 += DY;
@@ -110,11 +110,11 @@ static int32_t ask_spoilt(struct lc *c, unsigned plane, enum spoil spoil)
         return 1;
     lc_film_advance(&s.film, 0, s.spp);
     struct lc_image image;
-    struct lull_decision decision[16];
+    struct lull_decision decision[LC_FILM_BLOCKS];
     uint32_t id = 0;
     struct lull_error err = {.struct_size = sizeof err};
     int32_t status = 1;
-    if (s.film.block_count <= 16 && lc_session_image(&s, &image) == 0) {
+    if (lc_session_image(&s, &image) == 0) {
         struct lull_plane *p = lc_image_plane(&image, plane);
         switch (spoil) {
         case SPOIL_ABSENT: p->data = NULL; break;
@@ -190,7 +190,7 @@ static uint32_t steps_with_value(struct lc *c, float value, int every)
     uint32_t flags = ~UINT32_C(0);
     if (lc_session_open(&s, c, NULL) != 0)
         return flags;
-    struct lull_decision d[LC_JUDGED];
+    struct lull_decision d[LC_FILM_BLOCKS];
     char what[64];
     snprintf(what, sizeof what, "with pixels of %g", (double)value);
     for (int step = 0; step < 4; step++, s.spp *= 4) {
@@ -205,7 +205,7 @@ static uint32_t steps_with_value(struct lc *c, float value, int every)
         lc_image_release(&image);
         if (!answered)
             break;
-        for (uint32_t i = 0; i < s.film.block_count && i < LC_JUDGED; i++)
+        for (uint32_t i = 0; i < s.film.block_count; i++)
             flags &= d[i].flags | (d[i].flags & LULL_DECISION_TOO_EARLY ? LULL_DECISION_BAD_INPUT : 0);
     }
     lc_session_close(&s);
@@ -248,14 +248,10 @@ static void paint_half_black(double rgb[3], double *sigma, int32_t x, int32_t y)
 static void run_painted(struct lc *c, void (*paint)(double *, double *, int32_t, int32_t))
 {
     struct lc_film film;
-    struct lc_session s;
     if (lc_film_init_for(&film, &c->req, 1, 0) != 0)
         return;
     film.paint = paint;
-    if (lc_session_open_film(&s, c, NULL, &film) != 0)
-        return;
-    lc_session_steps(&s, LC_STEPS);
-    lc_session_close(&s);
+    lc_run_film(c, &film);
 }
 
 static void check_flat(struct lc *c)
@@ -301,7 +297,7 @@ static int grey_stops_at(struct lc *c, int fireflies)
     s.film.paint = paint_grey;
     for (; step < LC_STEPS && action == LULL_CONTINUE; step += action == LULL_CONTINUE, s.spp *= 2) {
         struct lc_image image;
-        struct lull_decision d[LC_JUDGED];
+        struct lull_decision d[LC_FILM_BLOCKS];
         const struct lull_block *b = &s.film.blocks[0];
         lc_film_advance(&s.film, b->id, s.spp);
         if (lc_session_image(&s, &image) != 0)
@@ -345,7 +341,7 @@ static void check_no_samples(struct lc *c)
         struct lc_manner manner = {.layout = {.normaliser = normalisers[k]}};
         if (lc_session_open(&s, c, &manner) != 0)
             return;
-        struct lull_decision d[LC_JUDGED];
+        struct lull_decision d[LC_FILM_BLOCKS];
         for (uint64_t spp = 0; spp < 3; spp++) {
             struct lc_image image;
             for (uint32_t i = 0; i < s.film.block_count; i++)

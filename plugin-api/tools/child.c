@@ -12,8 +12,9 @@
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
+
+#include "base/clock.h"
 
 /* LeakSanitizer's, in its builds. */
 __attribute__((weak)) int __lsan_do_recoverable_leak_check(void);
@@ -95,23 +96,16 @@ __attribute__((format(printf, 2, 3))) static void keep_failure(struct lc_report 
     keep(r, 'F', text);
 }
 
-static long long now_ms(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (long long)t.tv_sec * 1000 + t.tv_nsec / 1000000;
-}
-
 /* Takes lines until the child closes the pipe; 0 if it did not in time. */
 static int read_lines(int fd, unsigned limit_s, struct lc_report *report)
 {
     char line[LC_LINE_SIZE + 1];
     size_t filled = 0;
-    long long end = now_ms() + 1000LL * limit_s;
+    const double end_s = base_clock_wall_s() + limit_s;
     for (;;) {
-        long long left = end - now_ms();
+        const double left_s = end_s - base_clock_wall_s();
         struct pollfd p = {.fd = fd, .events = POLLIN};
-        int ready = left > 0 ? poll(&p, 1, (int)left) : 0;
+        int ready = left_s > 0 ? poll(&p, 1, (int)(1e3 * left_s)) : 0;
         if (ready < 0 && errno == EINTR)
             continue;
         if (ready <= 0)

@@ -23,7 +23,7 @@ enum lc_slot {
     AT_ERROR,
     SLOTS
 };
-enum { SLOT_SIZE = 8192, BLOCKS_MAX = 8, PAIRS_MAX = 72, TEXT_MAX = 6000 };
+enum { SLOT_SIZE = 8192, PAIRS_MAX = 72, TEXT_MAX = 6000 };
 
 /* Sets of statuses: the header's codes are -1 to -11. */
 #define CODE(status) (UINT32_C(1) << -(status))

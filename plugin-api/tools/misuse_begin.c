@@ -6,7 +6,7 @@
 
 struct frame_call {
     struct lull_frame frame;
-    struct lull_rect rects[BLOCKS_MAX];
+    struct lull_rect rects[LC_FILM_BLOCKS];
     uint32_t size;
     int no_frame, no_blocks;
 };
@@ -103,8 +103,7 @@ static void frame_of_session(const struct lc_misuse *m, struct frame_call *k)
 {
     *k = (struct frame_call){.size = sizeof k->frame};
     lc_film_frame(&m->s.film, &k->frame, m->s.planes);
-    k->frame.block_count = k->frame.block_count < BLOCKS_MAX ? k->frame.block_count : BLOCKS_MAX;
-    memcpy(k->rects, m->s.film.rects, k->frame.block_count * sizeof *k->rects);
+    memcpy(k->rects, m->s.film.rects, sizeof k->rects);
 }
 
 void lc_misuse_begin(struct lc_misuse *m)

@@ -8,7 +8,7 @@
 struct evaluate_call {
     struct lull_view view;
     struct lull_plane planes[LULL_PLANE_COUNT];
-    struct lull_block blocks[BLOCKS_MAX];
+    struct lull_block blocks[LC_FILM_BLOCKS];
     uint32_t count, size, block_stride, decision_stride;
     int no_view, no_planes, no_blocks, no_decisions;
 };
@@ -120,7 +120,7 @@ static void loosen_evaluate(struct lc_misuse *m, struct evaluate_call *k)
 static void send_evaluate(struct lc_misuse *m, const struct evaluate_call *k)
 {
     struct lull_view v = k->view;
-    struct lull_decision presets[BLOCKS_MAX];
+    struct lull_decision presets[LC_FILM_BLOCKS];
     for (uint32_t i = 0; i < k->count; i++)
         lc_decision_preset(&presets[i]);
     const void *planes = lc_place_array(m, AT_PLANES, k->planes, sizeof *k->planes, v.plane_count, v.plane_stride);
@@ -140,9 +140,9 @@ static void send_evaluate(struct lc_misuse *m, const struct evaluate_call *k)
 /* The session's last question once more, about some of its blocks. */
 static void evaluate_of_session(struct lc_misuse *m, struct evaluate_call *k)
 {
-    const uint32_t all = m->s.film.block_count < BLOCKS_MAX ? m->s.film.block_count : BLOCKS_MAX, first = lc_draw(m, all);
+    const uint32_t first = lc_draw(m, LC_FILM_BLOCKS);
     *k = (struct evaluate_call){.view = m->image.view,
-                                .count = 1 + lc_draw(m, all - first),
+                                .count = 1 + lc_draw(m, LC_FILM_BLOCKS - first),
                                 .size = sizeof k->view,
                                 .block_stride = sizeof *k->blocks,
                                 .decision_stride = sizeof(struct lull_decision)};

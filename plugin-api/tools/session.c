@@ -13,7 +13,8 @@
 
 int lc_deterministic(const struct lc *c) { return (c->criterion->capabilities & LULL_CAP_DETERMINISTIC) != 0; }
 
-void lc_fp_check(struct lc *c, const struct lull_process_state *before, const char *call)
+/* Reports a call that changed the floating-point environment since `before`, and undoes it. */
+static void fp_check(struct lc *c, const struct lull_process_state *before, const char *call)
 {
     struct lull_process_state after;
     lull_process_state_read(&after);
@@ -31,7 +32,7 @@ struct lull_instance *lc_create(struct lc *c, const struct lull_host *host)
     struct lull_process_state before;
     lull_process_state_read(&before);
     int32_t status = c->criterion->create(host, c->pairs, c->pair_count, sizeof *c->pairs, &instance, &err);
-    lc_fp_check(c, &before, "create");
+    fp_check(c, &before, "create");
     if (!LC_EXPECT(c, status == LULL_OK, "create failed (%d): %s", status, err.message))
         return NULL;
     LC_EXPECT(c, instance != NULL, "create succeeded without an instance");
@@ -43,7 +44,7 @@ int32_t lc_begin(struct lc *c, struct lull_instance *instance, const struct lull
     struct lull_process_state before;
     lull_process_state_read(&before);
     int32_t status = c->criterion->begin_frame(instance, frame, err);
-    lc_fp_check(c, &before, "begin_frame");
+    fp_check(c, &before, "begin_frame");
     return status;
 }
 
@@ -268,10 +269,10 @@ int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const
     return status;
 }
 
-int lc_session_judge(struct lc_session *s, const struct lc_image *image, struct lull_decision decisions[LC_JUDGED],
+int lc_session_judge(struct lc_session *s, const struct lc_image *image, struct lull_decision decisions[LC_FILM_BLOCKS],
                      const char *what)
 {
-    uint32_t ids[LC_JUDGED] = {0}, count = s->film.block_count < LC_JUDGED ? s->film.block_count : LC_JUDGED;
+    uint32_t ids[LC_FILM_BLOCKS] = {0}, count = s->film.block_count;
     struct lull_error err = {.struct_size = sizeof err};
     for (uint32_t i = 0; i < count; i++)
         ids[i] = i;
@@ -420,23 +421,24 @@ static int step_with(struct lc_session *s, const uint32_t *ids, uint32_t count, 
     return 0;
 }
 
-int lc_session_step(struct lc_session *s)
+uint32_t lc_session_advance(struct lc_session *s, uint32_t *ids)
 {
-    uint32_t *ids = calloc(s->film.block_count, sizeof *ids);
-    struct lull_decision *decisions = calloc(s->film.block_count, sizeof *decisions);
     uint32_t count = 0;
-    int result = -1;
-    if (!ids || !decisions) {
-        lc_fail(s->check, "out of memory");
-        goto out;
-    }
     for (uint32_t i = 0; i < s->film.block_count; i++)
         if (!(s->film.blocks[i].flags & LULL_BLOCK_STOPPED)) {
             lc_film_advance(&s->film, i, s->spp << (i % 2)); /* neighbours with different spp */
             ids[count++] = i;
         }
-    result = step_with(s, ids, count, decisions);
-out:
+    return count;
+}
+
+int lc_session_step(struct lc_session *s)
+{
+    uint32_t *ids = calloc(s->film.block_count, sizeof *ids);
+    struct lull_decision *decisions = calloc(s->film.block_count, sizeof *decisions);
+    int result = -1;
+    if (LC_EXPECT(s->check, ids && decisions, "out of memory"))
+        result = step_with(s, ids, lc_session_advance(s, ids), decisions);
     free(ids);
     free(decisions);
     return result;
@@ -474,6 +476,16 @@ int lc_run(struct lc *c, const struct lc_manner *manner, struct lc_log *log)
     return result;
 }
 
+int lc_run_film(struct lc *c, struct lc_film *film)
+{
+    struct lc_session s;
+    if (lc_session_open_film(&s, c, NULL, film) != 0)
+        return -1;
+    lc_session_steps(&s, LC_STEPS);
+    lc_session_close(&s);
+    return 0;
+}
+
 int lc_run_as(struct lc *c, const struct lc_manner *manner, const struct lc_log *expected, int exact, const char *what)
 {
     struct lc_log got;
@@ -482,4 +494,12 @@ int lc_run_as(struct lc *c, const struct lc_manner *manner, const struct lc_log 
         result = lc_log_compare(c, expected, &got, exact && lc_deterministic(c), what) != 0;
     lc_log_release(&got);
     return result;
+}
+
+void lc_run_both(struct lc *c, const struct lc_manner *a, const struct lc_manner *b, const char *what)
+{
+    struct lc_log expected;
+    if (lc_run(c, a, &expected) == 0)
+        lc_run_as(c, b, &expected, 1, what);
+    lc_log_release(&expected);
 }
