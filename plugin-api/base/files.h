@@ -25,6 +25,8 @@ int base_file_read(const char *path, size_t max_size, char **data, size_t *size,
 
 /* What stands behind the last '/' of a path; borrows. */
 const char *base_file_name(const char *path);
+/* Whether it ends in .ENDING, in small or capital letters. */
+int base_file_has_ending(const char *path, const char *ending);
 /* DIR/NAME; path has room for 4096 bytes. */
 int base_file_join(char *path, const char *dir, const char *name, struct base_err *err);
 

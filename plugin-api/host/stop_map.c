@@ -4,7 +4,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "base/files.h"
 #include "picture/colour_map.h"
@@ -187,6 +186,5 @@ int32_t lull_host_stop_map(const struct lull_host_blocks *b, const char *path, c
     int32_t code = lull_host_given(err, "blocks", b, "path", path, "scene", scene, NULL);
     if (code != LULL_OK)
         return code;
-    const char *dot = strrchr(path, '.');
-    return dot && strcasecmp(dot, ".csv") == 0 ? write_table(b, path, scene, err) : write_picture(b, path, err);
+    return base_file_has_ending(path, "csv") ? write_table(b, path, scene, err) : write_picture(b, path, err);
 }

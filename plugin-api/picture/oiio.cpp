@@ -19,7 +19,6 @@ extern "C" {
 #include <string>
 #include <vector>
 
-#include <strings.h>
 #include <zlib.h>
 
 namespace
@@ -266,12 +265,6 @@ ImageSpec raw_config()
     return config;
 }
 
-bool is_png(const char *name)
-{
-    const char *dot = std::strrchr(name, '.');
-    return dot != nullptr && strcasecmp(dot, ".png") == 0;
-}
-
 /* libpng prints on stderr when a file is damaged (and OpenImageIO then leaks), so damage is found before it sees the data:
  * signature, chunk lengths, checksums, end marker (PNG specification, §5). */
 int check_png(const char *name, const unsigned char *data, size_t size, base_err *err)
@@ -298,7 +291,7 @@ int check_png(const char *name, const unsigned char *data, size_t size, base_err
 
 int read_memory(const pic_request &q, pic_image *out, base_err *err)
 {
-    if (is_png(q.name))
+    if (base_file_has_ending(q.name, "png"))
         if (int rc = check_png(q.name, static_cast<const unsigned char *>(q.data), q.size, err))
             return rc;
     OIIO::Filesystem::IOMemReader reader(q.data, q.size);
@@ -320,7 +313,7 @@ int read_file(pic_request q, pic_image *out, base_err *err)
 {
     if (int rc = base_file_check_input(q.name, err))
         return rc;
-    if (is_png(q.name)) {
+    if (base_file_has_ending(q.name, "png")) {
         char *data = nullptr;
         int rc = base_file_read(q.name, max_png, &data, &q.size, err);
         const memory owner(data);

@@ -1,8 +1,6 @@
 /* The page of a render that is over: a report, the picture that was kept with it, or both. Or the sheet of a shot. */
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-#include <strings.h>
 
 #include <lull/host_draft.h>
 
@@ -54,16 +52,10 @@ static int read_text(const char *path, char **text, struct base_err *err)
     return path ? base_file_read(path, most, text, &size, err) : 0;
 }
 
-static int is_kind(const char *path, const char *kind)
-{
-    const char *ending = strrchr(path, '.');
-    return ending && strcasecmp(ending + 1, kind) == 0;
-}
-
 /* A picture alone is report and picture. */
 static int read_report(struct settings *s, char **report, struct base_err *err)
 {
-    if (s->args[1] || !is_kind(s->args[0], "exr"))
+    if (s->args[1] || !base_file_has_ending(s->args[0], "exr"))
         return read_text(s->args[0], report, err);
     s->args[1] = s->args[0];
     return report_from_exr(s->args[0], report, err);
@@ -99,7 +91,7 @@ static int make_sheet(const struct settings *s, struct base_err *err)
 {
     int count = 0;
     while (count < REPORT_MOST_FRAMES && s->args[count])
-        if (!is_kind(s->args[count++], "exr"))
+        if (!base_file_has_ending(s->args[count++], "exr"))
             return base_fail(err, BASE_EINVAL, "%s: a sheet is made of the frames' .exr files", s->args[count - 1]);
     if (s->quoted)
         return base_fail(err, BASE_EINVAL, "--quoted belongs to a page");
@@ -132,7 +124,7 @@ int main(int argc, char **argv)
     base_interrupt_begin();
     int rc = base_options_parse(&command, argc, argv, &s, &err);
     if (!rc)
-        rc = is_kind(s.page, "png") ? make_sheet(&s, &err) : make_page(&s, &err);
+        rc = base_file_has_ending(s.page, "png") ? make_sheet(&s, &err) : make_page(&s, &err);
     if (rc)
         fprintf(stderr, "lull-report: %s\n", err.text);
     return rc == 0 ? 0 : rc == BASE_ENOMEM ? FAILED : BAD_INPUT;
