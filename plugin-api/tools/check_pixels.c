@@ -7,14 +7,19 @@
 #include <math.h>
 #include <stdio.h>
 
-static void compare_layouts(struct lc *c, const struct lc_layout *layouts, const char *const *names, size_t count, int exact)
+struct stored {
+    struct lc_layout layout;
+    const char *name;
+};
+
+static void compare_layouts(struct lc *c, const struct stored *list, size_t count, int exact)
 {
     struct lc_log expected;
     if (lc_run(c, NULL, &expected) == 0)
         for (size_t i = 0; i < count; i++) {
-            const struct lc_manner manner = {.layout = layouts[i]};
-            if (lc_run_as(c, &manner, &expected, exact, names[i]) < 0)
-                lc_note(c, "that was with %s", names[i]);
+            const struct lc_manner manner = {.layout = list[i].layout};
+            if (lc_run_as(c, &manner, &expected, exact, list[i].name) < 0)
+                lc_note(c, "that was with %s", list[i].name);
         }
     lc_log_release(&expected);
 }
@@ -23,43 +28,40 @@ static void compare_layouts(struct lc *c, const struct lc_layout *layouts, const
 
 static void check_strides(struct lc *c)
 {
-    static const struct lc_layout layouts[] = {{.bottom_up = 1},
-                                               {.right_left = 1},
-                                               {.padded = 1},
-                                               {.planar = 1},
-                                               {.padded = 1, .bottom_up = 1},
-                                               {.planar = 1, .bottom_up = 1, .right_left = 1},
-                                               {.guard = 1},
-                                               {.guard = 1, .bottom_up = 1}};
-    static const char *const names[COUNT(layouts)] = {"rows bottom-up",
-                                                      "columns from the right",
-                                                      "RGBA",
-                                                      "planar channels",
-                                                      "RGBA bottom-up",
-                                                      "planar, bottom-up, from the right",
-                                                      "nothing readable beyond the image",
-                                                      "nothing readable beyond the image, bottom-up"};
-    compare_layouts(c, layouts, names, COUNT(layouts), 1);
+    static const struct stored list[] = {
+        {{.bottom_up = 1}, "rows bottom-up"},
+        {{.right_left = 1}, "columns from the right"},
+        {{.padded = 1}, "RGBA"},
+        {{.planar = 1}, "planar channels"},
+        {{.padded = 1, .bottom_up = 1}, "RGBA bottom-up"},
+        {{.planar = 1, .bottom_up = 1, .right_left = 1}, "planar, bottom-up, from the right"},
+        {{.guard = 1}, "nothing readable beyond the image"},
+        {{.guard = 1, .bottom_up = 1}, "nothing readable beyond the image, bottom-up"},
+    };
+    compare_layouts(c, list, COUNT(list), 1);
 }
 
 static void check_types(struct lc *c)
 {
-    static const struct lc_layout layouts[] = {
-        {.type = LULL_TYPE_F16}, {.type = LULL_TYPE_F64}, {.type = LULL_TYPE_U32, .scale = 1.0 / 256}, {.scale = 0.25}};
-    static const char *const names[COUNT(layouts)] = {"f16", "f64", "u32 with scale 1/256", "f32 with scale 1/4"};
-    compare_layouts(c, layouts, names, COUNT(layouts), 0);
+    static const struct stored list[] = {
+        {{.type = LULL_TYPE_F16}, "f16"},
+        {{.type = LULL_TYPE_F64}, "f64"},
+        {{.type = LULL_TYPE_U32, .scale = 1.0 / 256}, "u32 with scale 1/256"},
+        {{.scale = 0.25}, "f32 with scale 1/4"},
+    };
+    compare_layouts(c, list, COUNT(list), 0);
 }
 
 static void check_normalisers(struct lc *c)
 {
-    static const struct lc_layout layouts[] = {{.normaliser = LULL_NORM_SPP},
-                                               {.normaliser = LULL_NORM_SPP, .type = LULL_TYPE_F64},
-                                               {.normaliser = LULL_NORM_SPP, .type = LULL_TYPE_U32, .scale = 1.0 / 256},
-                                               {.normaliser = LULL_NORM_WEIGHT},
-                                               {.normaliser = LULL_NORM_WEIGHT, .type = LULL_TYPE_F64}};
-    static const char *const names[COUNT(layouts)] = {"f32 sums", "f64 sums", "u32 sums", "f32 weighted sums",
-                                                      "f64 weighted sums"};
-    compare_layouts(c, layouts, names, COUNT(layouts), 0);
+    static const struct stored list[] = {
+        {{.normaliser = LULL_NORM_SPP}, "f32 sums"},
+        {{.normaliser = LULL_NORM_SPP, .type = LULL_TYPE_F64}, "f64 sums"},
+        {{.normaliser = LULL_NORM_SPP, .type = LULL_TYPE_U32, .scale = 1.0 / 256}, "u32 sums"},
+        {{.normaliser = LULL_NORM_WEIGHT}, "f32 weighted sums"},
+        {{.normaliser = LULL_NORM_WEIGHT, .type = LULL_TYPE_F64}, "f64 weighted sums"},
+    };
+    compare_layouts(c, list, COUNT(list), 0);
 }
 
 /* --- a crop ------------------------------------------------------------------------------------------------------------ */

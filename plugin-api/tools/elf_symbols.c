@@ -5,12 +5,11 @@
 #include "check.h"
 
 #include <elf.h>
-#include <fcntl.h>
 #include <link.h>
+#include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
+
+#include "base/files.h"
 
 struct bytes {
     const char *data;
@@ -59,16 +58,11 @@ static int visit_file(const struct bytes *file, void (*visit)(void *context, con
 
 int lc_elf_exports(const char *path, void (*visit)(void *context, const char *name), void *context)
 {
-    int fd = open(path, O_RDONLY | O_CLOEXEC), result = -1;
-    struct stat st;
-    if (fd >= 0 && fstat(fd, &st) == 0 && st.st_size > 0) {
-        void *data = mmap(NULL, (size_t)st.st_size, PROT_READ, MAP_PRIVATE, fd, 0);
-        if (data != MAP_FAILED) {
-            result = visit_file(&(struct bytes){data, (uint64_t)st.st_size}, visit, context);
-            munmap(data, (size_t)st.st_size);
-        }
-    }
-    if (fd >= 0)
-        close(fd);
+    char *data;
+    size_t size;
+    if (base_file_read(path, SIZE_MAX, &data, &size, NULL) != 0)
+        return -1;
+    int result = visit_file(&(struct bytes){data, size}, visit, context);
+    free(data);
     return result;
 }

@@ -198,23 +198,20 @@ static size_t type_size(int32_t type) { return type == LULL_TYPE_F64 ? 8 : type 
 
 static void store(char *at, int32_t type, double v)
 {
+    uint16_t f16;
+    uint32_t u32;
+    float f32;
     switch (type) {
-    case LULL_TYPE_F16: {
-        uint16_t h = base_f64_to_f16(v);
-        memcpy(at, &h, sizeof h);
+    case LULL_TYPE_F16:
+        f16 = base_f64_to_f16(v);
+        memcpy(at, &f16, sizeof f16);
         break;
-    }
     case LULL_TYPE_F64: memcpy(at, &v, sizeof v); break;
-    case LULL_TYPE_U32: {
-        uint32_t u = v > 0 && v < 4294967295.0 ? (uint32_t)llrint(v) : 0;
-        memcpy(at, &u, sizeof u);
+    case LULL_TYPE_U32:
+        u32 = v > 0 && v < 4294967295.0 ? (uint32_t)llrint(v) : 0;
+        memcpy(at, &u32, sizeof u32);
         break;
-    }
-    default: {
-        float s = (float)v;
-        memcpy(at, &s, sizeof s);
-        break;
-    }
+    default: f32 = (float)v; memcpy(at, &f32, sizeof f32);
     }
 }
 
