@@ -122,9 +122,9 @@ struct lc_layout {
 
 struct lc_image {
     struct lull_view view;
-    char *descriptors;               /* owns */
-    void *memory[LULL_PLANE_COUNT];  /* owns */
-    size_t mapped[LULL_PLANE_COUNT]; /* bytes if from mmap, else 0 */
+    char *descriptors;                /* owns */
+    void *memory[LULL_PLANE_COUNT];   /* owns */
+    size_t guarded[LULL_PLANE_COUNT]; /* bytes if from lc_guard_alloc, else 0 */
 };
 
 /* Stores the film's planes of the mask. 0 or -1. Overwrites *image, which needs lc_image_release afterwards. */
@@ -136,9 +136,40 @@ struct lull_plane *lc_image_plane(struct lc_image *image, unsigned plane);
 void lc_image_poke_plane(struct lc_image *image, unsigned plane, int32_t x, int32_t y, float value);
 void lc_image_poke(struct lc_image *image, int32_t x, int32_t y, float value);
 
+/* --- guarded memory ---------------------------------------------------------------------------------------------------- */
+
 /* Memory that ends right before a page that cannot be touched; size bytes, zeroed. NULL if there is none. */
-void *lc_guard_alloc(size_t size, size_t *mapped);
-void lc_guard_free(void *memory, size_t mapped);
+void *lc_guard_alloc(size_t size);
+void lc_guard_free(void *memory, size_t size);
+
+/* Such memory for what a call is given, one piece for each: what is placed there is in the place of what was. */
+enum lc_slot {
+    LC_AT_HOST,
+    LC_AT_PAIRS,
+    LC_AT_FRAME,
+    LC_AT_RECTS,
+    LC_AT_VIEW,
+    LC_AT_PLANES,
+    LC_AT_BLOCKS,
+    LC_AT_DECISIONS,
+    LC_AT_STREAM,
+    LC_AT_ERROR,
+    LC_SLOTS
+};
+enum { LC_SLOT_SIZE = 8192 };
+struct lc_slots {
+    void *at[LC_SLOTS]; /* owns */
+};
+
+/* Not 0 without memory (which is reported); to be released all the same. */
+int lc_slots_init(struct lc_slots *s, struct lc *c);
+void lc_slots_release(struct lc_slots *s);
+/* A copy of so many bytes (NULL: garbage), eight at least. */
+void *lc_place(struct lc_slots *s, enum lc_slot slot, const void *from, size_t size);
+/* The same of a struct, which says that it has so many bytes. */
+void *lc_place_struct(struct lc_slots *s, enum lc_slot slot, const void *from, size_t size);
+/* Elements of `size` bytes, `stride` apart; with a stride that is too short, room without elements. */
+void *lc_place_array(struct lc_slots *s, enum lc_slot slot, const void *from, size_t size, uint32_t count, uint32_t stride);
 
 /* --- sessions -------------------------------------------------------------------------------------------------------- */
 

@@ -126,19 +126,14 @@ static void check_misuse(struct lc *c)
 {
     struct lc_misuse m = {.check = c, .random = c->seed, .state = c->criterion->get_extension(LULL_EXT_STATE)};
     struct lc_log expected;
-    int room = 1;
-    for (int i = 0; i < SLOTS; i++)
-        room &= (m.slot[i] = lc_guard_alloc(SLOT_SIZE, &m.mapped[i])) != NULL;
-    if (LC_EXPECT(c, room, "out of memory") && lc_run(c, NULL, &expected) == 0) {
+    if (lc_slots_init(&m.slots, c) == 0 && lc_run(c, NULL, &expected) == 0) {
         while (m.calls < c->misuse && !c->failed)
             live(&m, &expected);
         lc_log_release(&expected);
     }
     lc_note(c, "%llu calls, %llu of them had to be refused", (unsigned long long)m.calls, (unsigned long long)m.refused);
     free(m.saved.data);
-    for (int i = 0; i < SLOTS; i++)
-        if (m.slot[i])
-            lc_guard_free(m.slot[i], m.mapped[i]);
+    lc_slots_release(&m.slots);
 }
 
 const struct lc_check lc_misuse_checks[] = {

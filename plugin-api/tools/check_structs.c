@@ -5,35 +5,7 @@
  */
 #include "check.h"
 
-#include <stdlib.h>
 #include <string.h>
-
-/* A copy of a struct, or of an array, of which only `size` bytes exist. */
-struct guarded {
-    void *at;
-    size_t mapped;
-};
-
-static int guarded_copy(struct lc *c, struct guarded *g, const void *from, size_t size)
-{
-    g->at = lc_guard_alloc(size, &g->mapped);
-    if (!LC_EXPECT(c, g->at, "out of memory"))
-        return -1;
-    memcpy(g->at, from, size);
-    return 0;
-}
-
-/* The same of one that begins with its size. */
-static int guarded_init(struct lc *c, struct guarded *g, const void *from, size_t size)
-{
-    const uint32_t struct_size = (uint32_t)size;
-    if (guarded_copy(c, g, from, size) != 0)
-        return -1;
-    memcpy(g->at, &struct_size, sizeof struct_size);
-    return 0;
-}
-
-static void guarded_release(struct guarded *g) { lc_guard_free(g->at, g->mapped); }
 
 /* Every struct that the host passes, each of so many bytes fewer than in version 1.0. */
 struct short_structs {
@@ -45,94 +17,86 @@ struct short_calls {
     struct lull_requirements got;
 };
 
-static void short_evaluate(struct lc *c, const struct short_structs *cut, struct lull_instance *instance,
-                           const struct lc_film *film, uint32_t planes, struct lull_error *err, struct short_calls *calls)
+/* An instance, and what it is given. */
+struct life {
+    struct lc *check;
+    const struct short_structs *cut;
+    struct lc_slots slots;
+    struct lull_instance *instance;
+    struct lull_error *err;
+    struct short_calls calls;
+};
+
+static void short_evaluate(struct life *l, const struct lc_film *film, uint32_t planes)
 {
-    struct lc_image image;
     const struct lc_layout layout = {0};
-    struct guarded view = {0}, descriptors = {0}, blocks = {0}, decisions = {0};
-    struct lull_decision d[LC_FILM_BLOCKS];
+    struct lull_decision presets[LC_FILM_BLOCKS];
+    struct lc_image image;
     if (lc_image_build(&image, film, &layout, planes) != 0)
         return;
     for (int i = 0; i < LC_FILM_BLOCKS; i++)
-        lc_decision_preset(&d[i]);
-    struct lull_view *v = &image.view;
-    if (guarded_copy(c, &descriptors, v->planes, sizeof(struct lull_plane) * LULL_PLANE_COUNT) == 0 &&
-        guarded_copy(c, &blocks, film->blocks, sizeof(struct lull_block) * LC_FILM_BLOCKS) == 0 &&
-        guarded_copy(c, &decisions, d, sizeof d) == 0) {
-        v->planes = descriptors.at;
-        v->all = blocks.at;
-        if (guarded_init(c, &view, v, sizeof *v - cut->view) == 0)
-            calls->evaluate = c->criterion->evaluate(instance, view.at, blocks.at, sizeof(struct lull_block), decisions.at,
-                                                     sizeof *d, LC_FILM_BLOCKS, err);
-        for (uint32_t i = 0; i < LC_FILM_BLOCKS && calls->evaluate == LULL_OK; i++)
-            lc_decision_check(c, &film->blocks[i], (const struct lull_decision *)decisions.at + i);
-    }
-    guarded_release(&view);
-    guarded_release(&descriptors);
-    guarded_release(&blocks);
-    guarded_release(&decisions);
+        lc_decision_preset(&presets[i]);
+    struct lull_view v = image.view;
+    v.planes = lc_place(&l->slots, LC_AT_PLANES, v.planes, sizeof *v.planes * LULL_PLANE_COUNT);
+    v.all = lc_place(&l->slots, LC_AT_BLOCKS, film->blocks, sizeof *v.all * LC_FILM_BLOCKS);
+    struct lull_decision *d = lc_place(&l->slots, LC_AT_DECISIONS, presets, sizeof presets);
+    const struct lull_view *view = lc_place_struct(&l->slots, LC_AT_VIEW, &v, sizeof v - l->cut->view);
+    l->calls.evaluate =
+        l->check->criterion->evaluate(l->instance, view, v.all, sizeof *v.all, d, sizeof *d, LC_FILM_BLOCKS, l->err);
+    for (int i = 0; i < LC_FILM_BLOCKS && l->calls.evaluate == LULL_OK; i++)
+        lc_decision_check(l->check, &film->blocks[i], &d[i]);
     lc_image_release(&image);
 }
 
-static void short_frame(struct lc *c, const struct short_structs *cut, struct lull_instance *instance,
-                        struct lull_error *err, struct short_calls *calls)
+static void short_frame(struct life *l)
 {
+    struct lc *c = l->check;
     struct lc_film film;
+    struct lull_frame frame;
     if (lc_film_init_for(&film, &c->req, 1, 0) != 0)
         return;
     for (uint32_t i = 0; i < film.block_count; i++)
         lc_film_advance(&film, i, c->req.first_spp + c->req.first_spp % 2 + 2);
-    struct lull_frame frame;
     lc_film_frame(&film, &frame, c->planes);
-    struct guarded rects, g;
-    if (guarded_copy(c, &rects, film.rects, film.block_count * sizeof *film.rects) == 0) {
-        frame.blocks = rects.at;
-        if (guarded_init(c, &g, &frame, sizeof frame - cut->frame) == 0) {
-            calls->begin_frame = c->criterion->begin_frame(instance, g.at, err);
-            guarded_release(&g);
-        }
-        if (calls->begin_frame == LULL_OK) {
-            short_evaluate(c, cut, instance, &film, frame.planes, err, calls);
-            c->criterion->end_frame(instance);
-        }
-        guarded_release(&rects);
+    frame.blocks = lc_place(&l->slots, LC_AT_RECTS, film.rects, sizeof *film.rects * film.block_count);
+    const struct lull_frame *at = lc_place_struct(&l->slots, LC_AT_FRAME, &frame, sizeof frame - l->cut->frame);
+    l->calls.begin_frame = c->criterion->begin_frame(l->instance, at, l->err);
+    if (l->calls.begin_frame == LULL_OK) {
+        short_evaluate(l, &film, frame.planes);
+        c->criterion->end_frame(l->instance);
     }
     lc_film_release(&film);
 }
 
-static void short_life(struct lc *c, const struct short_structs *cut, struct short_calls *calls)
+static struct short_calls short_life(struct lc *c, const struct short_structs *cut)
 {
-    *calls = (struct short_calls){1, 1, 1, 1, {0}};
-    struct lc_host host;
-    struct guarded h, r, e;
-    struct lull_error blank = {0};
+    struct life l = {.check = c, .cut = cut, .calls = {1, 1, 1, 1, {0}}};
+    const struct lull_error blank = {0};
     struct lull_requirements req = {0};
+    struct lc_host host;
     if (lc_host_init(&host, c, 1) != 0)
-        return;
-    if (guarded_init(c, &h, &host.host, sizeof host.host - cut->host) != 0 ||
-        guarded_init(c, &r, &req, sizeof req - cut->requirements) != 0 ||
-        guarded_init(c, &e, &blank, sizeof blank - cut->error) != 0)
-        return;
-    struct lull_instance *instance = NULL;
-    calls->create = c->criterion->create(h.at, c->pairs, c->pair_count, sizeof *c->pairs, &instance, e.at);
-    if (calls->create == LULL_OK) {
-        calls->requirements = c->criterion->requirements(instance, r.at, e.at);
-        memcpy(&calls->got, r.at, sizeof req - cut->requirements);
-        short_frame(c, cut, instance, e.at, calls);
-        c->criterion->destroy(instance);
+        return l.calls;
+    if (lc_slots_init(&l.slots, c) == 0) {
+        const struct lull_host *h = lc_place_struct(&l.slots, LC_AT_HOST, &host.host, sizeof host.host - cut->host);
+        l.err = lc_place_struct(&l.slots, LC_AT_ERROR, &blank, sizeof blank - cut->error);
+        l.calls.create = c->criterion->create(h, c->pairs, c->pair_count, sizeof *c->pairs, &l.instance, l.err);
     }
-    guarded_release(&h);
-    guarded_release(&r);
-    guarded_release(&e);
+    if (l.calls.create == LULL_OK) {
+        struct lull_requirements *r = lc_place_struct(&l.slots, LC_AT_FRAME, &req, sizeof req - cut->requirements);
+        l.calls.requirements = c->criterion->requirements(l.instance, r, l.err);
+        memcpy(&l.calls.got, r, sizeof req - cut->requirements);
+        short_frame(&l);
+        c->criterion->destroy(l.instance);
+    }
+    lc_slots_release(&l.slots);
     lc_host_release(&host);
+    return l.calls;
 }
 
 static void check_older(struct lc *c)
 {
     struct short_structs exact = {0};
-    struct short_calls calls;
-    short_life(c, &exact, &calls);
+    struct short_calls calls = short_life(c, &exact);
     LC_EXPECT(c,
               calls.create == LULL_OK && calls.requirements == LULL_OK && calls.begin_frame == LULL_OK &&
                   calls.evaluate == LULL_OK,
@@ -145,10 +109,10 @@ static void check_older(struct lc *c)
 
     /* the error struct is for the caller's convenience: a short one is not written, or not beyond its end */
     struct short_structs no_message = {.error = sizeof(struct lull_error) - 8};
-    short_life(c, &no_message, &calls);
+    calls = short_life(c, &no_message);
     LC_EXPECT(c, calls.evaluate == LULL_OK, "an error struct of 8 bytes makes a call fail (%d)", calls.evaluate);
     struct short_structs one_short = {.host = 8, .error = sizeof(struct lull_error) - 8};
-    short_life(c, &one_short, &calls);
+    calls = short_life(c, &one_short);
     LC_EXPECT(c, calls.create != LULL_OK, "create succeeds with a host struct shorter than 1.0");
 }
 
@@ -167,7 +131,7 @@ static void check_too_short(struct lc *c)
     for (int only_8 = 0; only_8 < 2; only_8++)
         for (size_t i = 0; i < sizeof structs / sizeof *structs; i++) {
             *structs[i].cut = only_8 ? structs[i].size - 8 : 8;
-            short_life(c, &cut, &calls);
+            calls = short_life(c, &cut);
             LC_EXPECT(c, *structs[i].status == LULL_E_VERSION, "%s %s: %s %d", structs[i].what,
                       only_8 ? "of 8 bytes" : "shorter than 1.0", structs[i].call, *structs[i].status);
             *structs[i].cut = 0;

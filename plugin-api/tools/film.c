@@ -2,14 +2,11 @@
  *
  * Made-up renders: a gradient with noise, and its storage in every form the ABI allows.
  */
-#define _DEFAULT_SOURCE 1 /* MAP_ANONYMOUS */
 #include "check.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 #include "base/colour.h"
 #include "base/half.h"
@@ -168,30 +165,6 @@ void lc_film_frame(const struct lc_film *f, struct lull_frame *frame, uint32_t p
     };
 }
 
-/* --- guarded memory ---------------------------------------------------------------------------------------------------- */
-
-void *lc_guard_alloc(size_t size, size_t *mapped)
-{
-    size_t page = (size_t)sysconf(_SC_PAGESIZE), inner = (size + page - 1) / page * page;
-    *mapped = inner + 2 * page;
-    char *base = mmap(NULL, *mapped, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    if (base == MAP_FAILED)
-        return NULL;
-    if (mprotect(base + page, inner, PROT_READ | PROT_WRITE) != 0) {
-        munmap(base, *mapped);
-        return NULL;
-    }
-    return base + page + inner - size;
-}
-
-void lc_guard_free(void *memory, size_t mapped)
-{
-    if (!memory)
-        return;
-    size_t page = (size_t)sysconf(_SC_PAGESIZE); /* the block begins in the first page after the guard */
-    munmap((char *)memory - (uintptr_t)memory % page - page, mapped);
-}
-
 /* --- image ----------------------------------------------------------------------------------------------------------- */
 
 static size_t type_size(int32_t type) { return type == LULL_TYPE_F64 ? 8 : type == LULL_TYPE_F16 ? 2 : 4; }
@@ -256,10 +229,11 @@ static int build_plane(struct lc_image *image, const struct lc_film *f, unsigned
     int64_t size = (int64_t)type_size(l.type), channels = lc_plane_channels[plane] + (l.padded ? 1 : 0);
     int64_t pixels = (int64_t)f->width * f->height;
     size_t bytes = (size_t)(size * channels * pixels);
-    char *memory = l.guard ? lc_guard_alloc(bytes, &image->mapped[plane]) : malloc(bytes);
+    char *memory = l.guard ? lc_guard_alloc(bytes) : malloc(bytes);
     if (!memory)
         return -1;
     image->memory[plane] = memory;
+    image->guarded[plane] = l.guard ? bytes : 0;
     struct lull_plane *p = lc_image_plane(image, plane);
     *p = (struct lull_plane){.stride_x = l.planar ? size : size * channels,
                              .stride_c = l.planar ? size * pixels : size,
@@ -315,8 +289,8 @@ int lc_image_build(struct lc_image *image, const struct lc_film *f, const struct
 void lc_image_release(struct lc_image *image)
 {
     for (unsigned p = 0; p < LULL_PLANE_COUNT; p++)
-        if (image->mapped[p] > 0)
-            lc_guard_free(image->memory[p], image->mapped[p]);
+        if (image->guarded[p] > 0)
+            lc_guard_free(image->memory[p], image->guarded[p]);
         else
             free(image->memory[p]);
     free(image->descriptors);

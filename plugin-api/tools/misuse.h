@@ -10,21 +10,6 @@
 
 #include "check.h"
 
-enum lc_slot {
-    AT_HOST,
-    AT_PAIRS,
-    AT_FRAME,
-    AT_RECTS,
-    AT_VIEW,
-    AT_PLANES,
-    AT_BLOCKS,
-    AT_DECISIONS,
-    AT_STREAM,
-    AT_ERROR,
-    SLOTS
-};
-enum { SLOT_SIZE = 8192, PAIRS_MAX = 72, TEXT_MAX = 6000 };
-
 /* Sets of statuses: the header's codes are -1 to -11. */
 #define CODE(status) (UINT32_C(1) << -(status))
 #define MAY (~UINT32_C(0)) /* the header leaves it open */
@@ -34,8 +19,7 @@ static const uint32_t INVALID = CODE(LULL_E_INVALID), VERSION = CODE(LULL_E_VERS
 struct lc_misuse {
     struct lc *check;
     uint64_t random, calls, refused;
-    void *slot[SLOTS]; /* owns */
-    size_t mapped[SLOTS];
+    struct lc_slots slots;       /* what calls are given */
     struct lc_session s;         /* what must not be disturbed */
     struct lc_image image;       /* of its film */
     struct lull_instance *loose; /* owns; whatever it is given */
@@ -49,7 +33,7 @@ struct lc_misuse {
     char what[400];
 };
 
-/* --- misuse_call.c: what a call with wrong arguments is ----------------------------------------------------------------- */
+/* --- misuse_call.c: what a call with wrong arguments is ---------------------------------------------------------------- */
 
 /* A random number below `below`. */
 uint32_t lc_draw(struct lc_misuse *m, uint32_t below);
@@ -60,13 +44,6 @@ uint32_t lc_too_small(struct lc_misuse *m, size_t size);
 /* How many things are to be wrong: one, sometimes several. */
 uint32_t lc_how_many(struct lc_misuse *m);
 
-/* Memory for so many bytes, eight at least, before a page that cannot be touched. */
-void *lc_place(struct lc_misuse *m, enum lc_slot slot, const void *from, size_t size);
-/* The same for a struct that says it has so many bytes. */
-void *lc_place_struct(struct lc_misuse *m, enum lc_slot slot, const void *from, size_t size);
-/* Elements of `size` bytes, `stride` apart; with a stride that is too short, room without elements. */
-void *lc_place_array(struct lc_misuse *m, enum lc_slot slot, const void *from, size_t size, uint32_t count, uint32_t stride);
-
 void lc_make_up(struct lc_misuse *m, struct lull_instance *instance);
 /* Notes what is wrong. Of several wrong things any may be complained about; a call is open to the criterion only if each
  * is. */
@@ -76,7 +53,7 @@ struct lull_error *lc_announce(struct lc_misuse *m, const char *function);
 /* Is this one of the expected statuses, and does the error say the same? */
 void lc_judge(struct lc_misuse *m, const char *function, int32_t status, const struct lull_error *err);
 
-/* --- the calls ---------------------------------------------------------------------------------------------------------- */
+/* --- the calls --------------------------------------------------------------------------------------------------------- */
 
 /* To the session's instance (create: to none): what the header says is refused. */
 void lc_misuse_create(struct lc_misuse *m);

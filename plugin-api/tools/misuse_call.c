@@ -20,32 +20,6 @@ double lc_nonsense(struct lc_misuse *m)
     return numbers[lc_draw(m, sizeof numbers / sizeof *numbers)];
 }
 
-void *lc_place(struct lc_misuse *m, enum lc_slot slot, const void *from, size_t size)
-{
-    size_t room = size < 8 ? 8 : (size + 7) / 8 * 8;
-    char *at = (char *)m->slot[slot] + SLOT_SIZE - room;
-    memset(at, 0xa5, room);
-    if (from && size > 0)
-        memcpy(at, from, size);
-    return at;
-}
-
-void *lc_place_struct(struct lc_misuse *m, enum lc_slot slot, const void *from, size_t size)
-{
-    uint32_t struct_size = (uint32_t)size;
-    void *at = lc_place(m, slot, from, size);
-    memcpy(at, &struct_size, sizeof struct_size);
-    return at;
-}
-
-void *lc_place_array(struct lc_misuse *m, enum lc_slot slot, const void *from, size_t size, uint32_t count, uint32_t stride)
-{
-    char *at = lc_place(m, slot, NULL, (size_t)count * stride);
-    for (uint32_t i = 0; i < count && stride >= size; i++)
-        memcpy(at + (size_t)i * stride, (const char *)from + i * size, size);
-    return at;
-}
-
 void lc_wrong(struct lc_misuse *m, uint32_t codes, const char *what)
 {
     size_t length = strlen(m->what);
@@ -71,7 +45,7 @@ struct lull_error *lc_announce(struct lc_misuse *m, const char *function)
              function, m->codes ? m->what : "as it should be");
     if (form == 0)
         return NULL;
-    return lc_place_struct(m, AT_ERROR, &blank, form == 1 ? lc_too_small(m, sizeof blank) : sizeof blank);
+    return lc_place_struct(&m->slots, LC_AT_ERROR, &blank, form == 1 ? lc_too_small(m, sizeof blank) : sizeof blank);
 }
 
 void lc_judge(struct lc_misuse *m, const char *function, int32_t status, const struct lull_error *err)
