@@ -123,7 +123,7 @@ static int look_round(struct farming *f)
     struct job *job = f->job;
     const double now_s = base_clock_wall_s();
     if (job->interrupted && *job->interrupted)
-        return job_find_dead(job, NULL) ? job->failed.code : JOB_STOPPED;
+        return job_find_dead(job) ? job->failed.code : JOB_STOPPED;
     for (int rank = 1; rank < job->transport->count && !job->failed.code; rank++)
         if (job->workers[rank].held_count > 0)
             job_give_up(job, rank, now_s - job->workers[rank].since_s);

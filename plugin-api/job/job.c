@@ -135,13 +135,12 @@ int job_give_up(struct job *job, int rank, double waited_s)
                      job->timeout_s);
 }
 
-int job_find_dead(struct job *job, struct base_err *err)
+int job_find_dead(struct job *job)
 {
-    for (int i = 1; job && job->transport->rank == 0 && i < job->transport->count; i++)
+    for (int i = 1; i < job->transport->count; i++)
         if (same_host(job->transport, i) && kill((pid_t)job->transport->list[i].pid, 0) != 0 && errno == ESRCH) {
             job->lost = 1;
-            base_fail(&job->failed, BASE_EIO, "%s has died", name_of(job, i));
-            return job_failed(job, err);
+            return base_fail(&job->failed, BASE_EIO, "%s has died", name_of(job, i));
         }
     return 0;
 }
@@ -149,7 +148,7 @@ int job_find_dead(struct job *job, struct base_err *err)
 /* Rank 0 has waited for `rank` so long. */
 static int look_round(struct job *job, int rank, double waited_s)
 {
-    int rc = job->interrupted && *job->interrupted ? job_find_dead(job, NULL) : 0;
+    int rc = job->interrupted && *job->interrupted ? job_find_dead(job) : 0;
     return rc ? rc : job_give_up(job, rank, waited_s);
 }
 

@@ -49,8 +49,6 @@ struct job_traffic job_traffic(const struct job *job);
 int job_handshake(struct job *job, const char *settings, int threads, struct base_err *err);
 int job_worker_threads(const struct job *job); /* of all but rank 0, after the handshake */
 
-/* Whether a process of this host has died (of others nothing is known): a failure that names it. */
-int job_find_dead(struct job *job, struct base_err *err);
 /* The first failure of any call so far, 0: none. */
 int job_failed(const struct job *job, struct base_err *err);
 

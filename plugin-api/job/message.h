@@ -68,6 +68,8 @@ int job_receive(struct job *job, double wait_s, int *rank, struct job_message **
 int job_send_head(struct job *job, int rank, enum job_kind kind, uint32_t serial);
 /* A failure: the message of a process makes no sense. */
 int job_nonsense(struct job *job, int rank);
+/* A failure if a process of rank 0's host has died, which it names; of other hosts nothing is known. */
+int job_find_dead(struct job *job);
 /* A failure if rank 0 has waited too long for a worker, or its last message has come. */
 int job_give_up(struct job *job, int rank, double waited_s);
 

@@ -67,7 +67,6 @@ static void nobody_else_is_a_job_too(void **state)
 {
     struct base_err err = {0};
     assert_int_equal(job_handshake(NULL, "a=1\n", 1, &err), 0);
-    assert_int_equal(job_find_dead(NULL, &err), 0);
     assert_int_equal(job_close(NULL, 5, "", &err), 5);
     (void)state;
 }
@@ -330,9 +329,10 @@ static void who_is_dead_is_named(void **state)
     int available = base_threads_available();
     assert_int_equal(job_threads(NULL), available);
     assert_int_equal(job_threads(job), share < available ? share : available);
-    assert_int_equal(job_find_dead(job, &err), 0); /* of other hosts nothing is known */
+    assert_int_equal(job_find_dead(job), 0); /* of other hosts nothing is known */
     strcpy(last->host, "here");
-    assert_int_equal(job_find_dead(job, &err), BASE_EIO);
+    assert_int_equal(job_find_dead(job), BASE_EIO);
+    assert_int_equal(job_failed(job, &err), BASE_EIO);
     assert_string_equal(err.text, "rank 2 on host here has died");
     assert_int_equal(job_close(job, 2, "", &err), 2);
     assert_int_equal(base_transport_aborted(transport), 1);
