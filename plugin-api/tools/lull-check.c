@@ -11,7 +11,7 @@
 #include "base/interrupt.h"
 #include "base/options.h"
 
-enum { PAIRS_MAX = 64, NAMES_MAX = 64, SPECS_MAX = 256, IDS_MAX = LC_LINES_MAX };
+enum { PAIRS_MAX = 64, NAMES_MAX = 64, SPECS_MAX = 256 };
 
 struct arguments {
     struct lull_pair pairs[PAIRS_MAX];
