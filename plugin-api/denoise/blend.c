@@ -32,18 +32,12 @@ static double sum_around(const float *line, int count, size_t step, int x, int n
     return sum;
 }
 
-/* The sum of these weights, which is that of a line of ones. */
-static double weigh_around(int count, int x, int near, int far)
-{
-    static const float one = 1.0f;
-    return sum_around(&one, count, 0, x, near, far);
-}
-
 /* Means of `lines` lines, `next` apart, each as above. */
 static void pool_lines(const float *from, int lines, size_t next, int count, size_t step, float *to)
 {
+    static const float one = 1.0f;
     for (int x = 0; x < count; x++) {
-        const double total = weigh_around(count, x, 0, RADIUS);
+        const double total = sum_around(&one, count, 0, x, 0, RADIUS); /* of the weights: that of a line of ones */
         for (size_t k = 0; k < (size_t)lines; k++)
             to[k * next + (size_t)x * step] = (float)(sum_around(from + k * next, count, step, x, 0, RADIUS) / total);
     }
