@@ -142,34 +142,23 @@ void lc_image_poke(struct lc_image *image, int32_t x, int32_t y, float value);
 void *lc_guard_alloc(size_t size);
 void lc_guard_free(void *memory, size_t size);
 
-/* Such memory for what a call is given, one piece for each: what is placed there is in the place of what was. */
-enum lc_slot {
-    LC_AT_HOST,
-    LC_AT_PAIRS,
-    LC_AT_FRAME,
-    LC_AT_RECTS,
-    LC_AT_VIEW,
-    LC_AT_PLANES,
-    LC_AT_BLOCKS,
-    LC_AT_DECISIONS,
-    LC_AT_STREAM,
-    LC_AT_ERROR,
-    LC_SLOTS
-};
-enum { LC_SLOT_SIZE = 8192 };
+/* Such memory for what calls are given: each thing takes the next of these pieces, and after the last one the first. No call
+ * of the random ones, and no life with short structs, is given as many things. */
+enum { LC_SLOTS = 10, LC_SLOT_SIZE = 8192 };
 struct lc_slots {
     void *at[LC_SLOTS]; /* owns */
+    unsigned next;
 };
 
 /* Not 0 without memory (which is reported); to be released all the same. */
 int lc_slots_init(struct lc_slots *s, struct lc *c);
 void lc_slots_release(struct lc_slots *s);
 /* A copy of so many bytes (NULL: garbage), eight at least. */
-void *lc_place(struct lc_slots *s, enum lc_slot slot, const void *from, size_t size);
+void *lc_place(struct lc_slots *s, const void *from, size_t size);
 /* The same of a struct, which says that it has so many bytes. */
-void *lc_place_struct(struct lc_slots *s, enum lc_slot slot, const void *from, size_t size);
+void *lc_place_struct(struct lc_slots *s, const void *from, size_t size);
 /* Elements of `size` bytes, `stride` apart; with a stride that is too short, room without elements. */
-void *lc_place_array(struct lc_slots *s, enum lc_slot slot, const void *from, size_t size, uint32_t count, uint32_t stride);
+void *lc_place_array(struct lc_slots *s, const void *from, size_t size, uint32_t count, uint32_t stride);
 
 /* --- sessions -------------------------------------------------------------------------------------------------------- */
 

@@ -45,27 +45,27 @@ void lc_slots_release(struct lc_slots *s)
         lc_guard_free(s->at[i], LC_SLOT_SIZE);
 }
 
-void *lc_place(struct lc_slots *s, enum lc_slot slot, const void *from, size_t size)
+void *lc_place(struct lc_slots *s, const void *from, size_t size)
 {
     size_t room = size < 8 ? 8 : (size + 7) / 8 * 8;
-    char *at = (char *)s->at[slot] + LC_SLOT_SIZE - room;
+    char *at = (char *)s->at[s->next++ % LC_SLOTS] + LC_SLOT_SIZE - room;
     memset(at, 0xa5, room);
     if (from && size > 0)
         memcpy(at, from, size);
     return at;
 }
 
-void *lc_place_struct(struct lc_slots *s, enum lc_slot slot, const void *from, size_t size)
+void *lc_place_struct(struct lc_slots *s, const void *from, size_t size)
 {
     uint32_t struct_size = (uint32_t)size;
-    void *at = lc_place(s, slot, from, size);
+    void *at = lc_place(s, from, size);
     memcpy(at, &struct_size, sizeof struct_size);
     return at;
 }
 
-void *lc_place_array(struct lc_slots *s, enum lc_slot slot, const void *from, size_t size, uint32_t count, uint32_t stride)
+void *lc_place_array(struct lc_slots *s, const void *from, size_t size, uint32_t count, uint32_t stride)
 {
-    char *at = lc_place(s, slot, NULL, (size_t)count * stride);
+    char *at = lc_place(s, NULL, (size_t)count * stride);
     for (uint32_t i = 0; i < count && stride >= size; i++)
         memcpy(at + (size_t)i * stride, (const char *)from + i * size, size);
     return at;

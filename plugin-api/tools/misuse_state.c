@@ -32,7 +32,7 @@ void lc_misuse_save(struct lc_misuse *m)
         return; /* there is nothing to be written */
     if (which == 3)
         writer.write = NULL;
-    const struct lull_writer *at = lc_place_struct(&m->slots, LC_AT_STREAM, &writer, size);
+    const struct lull_writer *at = lc_place_struct(&m->slots, &writer, size);
     struct lull_error *err = lc_announce(m, "save");
     int32_t status = m->state->save(m->instance, which == 1 ? NULL : at, err);
     free(b.data);
@@ -42,7 +42,7 @@ void lc_misuse_save(struct lc_misuse *m)
 static void send_load(struct lc_misuse *m, struct lc_buffer *b, int no_reader, int no_read, uint32_t size)
 {
     struct lull_reader reader = {.context = b, .read = no_read ? NULL : lc_buffer_read};
-    const struct lull_reader *at = lc_place_struct(&m->slots, LC_AT_STREAM, &reader, size);
+    const struct lull_reader *at = lc_place_struct(&m->slots, &reader, size);
     struct lull_error *err = lc_announce(m, "load");
     int32_t status = m->state->load(m->instance, no_reader ? NULL : at, err);
     lc_judge(m, "load", status, err);
