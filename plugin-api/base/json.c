@@ -35,6 +35,13 @@ cJSON *base_json_object(cJSON *to, const char *key, int *failed) { return add(to
 
 cJSON *base_json_array(cJSON *to, const char *key, int *failed) { return add(to, key, cJSON_CreateArray(), failed); }
 
+void base_json_numbers(cJSON *to, const char *key, const double *values, int count, int *failed)
+{
+    cJSON *list = base_json_array(to, key, failed);
+    for (int i = 0; i < count; i++)
+        base_json_number(list, NULL, values[i], failed);
+}
+
 void base_json_item(cJSON *to, const char *key, cJSON *item, int *failed) { add(to, key, item, failed); }
 
 int base_json_write(const char *path, const cJSON *root, int failed, struct base_err *err)

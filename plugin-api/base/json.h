@@ -18,6 +18,9 @@ void base_json_bool(cJSON *to, const char *key, int value, int *failed);
 cJSON *base_json_object(cJSON *to, const char *key, int *failed);
 cJSON *base_json_array(cJSON *to, const char *key, int *failed);
 
+/* All of an array. */
+void base_json_numbers(cJSON *to, const char *key, const double *values, int count, int *failed);
+
 /* Puts item, which may be NULL (an earlier failure), into `to`, which owns it from here on. */
 void base_json_item(cJSON *to, const char *key, cJSON *item, int *failed);
 

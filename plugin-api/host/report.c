@@ -12,9 +12,7 @@ static void add_block_size(cJSON *root, int32_t width, int32_t height, int *fail
         base_json_number(root, "block", width, failed);
         return;
     }
-    cJSON *block = base_json_array(root, "block", failed);
-    base_json_number(block, NULL, width, failed);
-    base_json_number(block, NULL, height, failed);
+    base_json_numbers(root, "block", (const double[]){width, height}, 2, failed);
 }
 
 static void add_criterion(cJSON *root, const struct lull_host_criterion *criterion, int *failed)
@@ -136,10 +134,7 @@ static void add_history(cJSON *root, const struct lull_host_frame *f, int *faile
         cJSON *block = base_json_array(list, NULL, failed);
         for (uint32_t k = 0; k < f->answer_count[i]; k++) {
             const struct lull_host_answer *a = &f->answers[(size_t)i * f->answer_room + k];
-            cJSON *answer = base_json_array(block, NULL, failed);
-            base_json_number(answer, NULL, (double)a->spp, failed);
-            base_json_number(answer, NULL, a->error, failed);
-            base_json_number(answer, NULL, a->p_noisy, failed);
+            base_json_numbers(block, NULL, (const double[]){(double)a->spp, a->error, a->p_noisy}, 3, failed);
         }
     }
 }
@@ -158,12 +153,9 @@ static void add_origin(cJSON *root, const struct lull_host_report *r, int *faile
 
 static void add_crop(cJSON *root, const struct lull_host_config *config, int *failed)
 {
-    if (config->crop[2] == 0 || ((uint32_t)(config->crop[2] - config->crop[0]) == config->width &&
-                                 (uint32_t)(config->crop[3] - config->crop[1]) == config->height))
-        return;
-    cJSON *crop = base_json_array(root, "crop", failed);
-    for (int i = 0; i < 4; i++)
-        base_json_number(crop, NULL, config->crop[i], failed);
+    const int32_t *c = config->crop;
+    if (c[2] != 0 && ((uint32_t)(c[2] - c[0]) != config->width || (uint32_t)(c[3] - c[1]) != config->height))
+        base_json_numbers(root, "crop", (const double[]){c[0], c[1], c[2], c[3]}, 4, failed);
 }
 
 /* The caller deletes it. */

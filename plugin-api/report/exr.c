@@ -193,9 +193,7 @@ static char *make(struct source *s)
     base_json_text(root, "scene", a[SCENE].text, &failed);
     base_json_number(root, "width", w->width, &failed);
     base_json_number(root, "height", w->height, &failed);
-    cJSON *crop = base_json_array(root, "crop", &failed);
-    for (int i = 0; i < 4; i++)
-        base_json_number(crop, NULL, (const int32_t[]){w->x0, w->y0, w->x1, w->y1}[i], &failed);
+    base_json_numbers(root, "crop", (const double[]){w->x0, w->y0, w->x1, w->y1}, 4, &failed);
     base_json_number(root, "seed", number(a[SEED].text), &failed);
     add_criterion(root, a[CRITERION].text, &failed);
     add_effects(root, a[EFFECTS].text, &failed);

@@ -223,11 +223,8 @@ static void put_block(cJSON *blocks, const struct seq_manifest_block *b, int *fa
 
 static void put_view(cJSON *root, const struct seq_manifest *m, int *failed)
 {
-    if (m->has_look_at) {
-        cJSON *look_at = base_json_array(root, "look_at", failed);
-        for (int i = 0; i < 9; i++)
-            base_json_number(look_at, NULL, m->look_at[i], failed);
-    }
+    if (m->has_look_at)
+        base_json_numbers(root, "look_at", m->look_at, 9, failed);
     if (m->fov_deg > 0)
         base_json_number(root, "fov", m->fov_deg, failed);
 }
