@@ -52,17 +52,16 @@ int base_word_index(const char *const *words, const char *text, size_t length)
 
 static int is_flag(const struct base_option *o) { return !o->arg && !o->words; }
 
-/* "a, b or c", each after `before` */
-static void list_words(const struct base_option *o, const char *before, char *text, size_t room)
+/* "a, b or c" with other text between words, and before the last, and before each. */
+static void join(const char *const *words, const char *between, const char *last, const char *before, char *text,
+                 size_t room)
 {
     size_t used = 0;
     text[0] = '\0';
-    for (int i = 0; o->words[i] && used < room; i++)
-        used += (size_t)snprintf(text + used, room - used, "%s%s%s",
-                                 i == 0            ? ""
-                                 : o->words[i + 1] ? ", "
-                                                   : " or ",
-                                 before, o->words[i]);
+    for (int i = 0; words[i] && used < room; i++) {
+        const char *joint = i == 0 ? "" : words[i + 1] ? between : last;
+        used += (size_t)snprintf(text + used, room - used, "%s%s%s", joint, before, words[i]);
+    }
 }
 
 static int has_ending(const struct base_option *o, const char *name)
@@ -119,7 +118,7 @@ static int bad_value(const struct base_option *o, const char *value, struct base
 {
     char words[256];
     if (o->words) {
-        list_words(o, o->to.type == BASE_STORE_TEXT ? "." : "", words, sizeof words);
+        join(o->words, ", ", " or ", o->to.type == BASE_STORE_TEXT ? "." : "", words, sizeof words);
         return base_fail(err, BASE_EINVAL, "--%s %s: expected %s%s", o->name, value,
                          o->to.type == BASE_STORE_TEXT ? "a name that ends in " : "", words);
     }
@@ -191,9 +190,7 @@ static const char *value_name(const struct base_option *o, char *text, size_t ro
 {
     if (o->arg || !o->words)
         return o->arg;
-    size_t used = 0;
-    for (int i = 0; o->words[i] && used < room; i++)
-        used += (size_t)snprintf(text + used, room - used, "%s%s", i ? "|" : "", o->words[i]);
+    join(o->words, "|", "|", "", text, room);
     return text;
 }
 

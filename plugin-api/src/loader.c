@@ -383,10 +383,7 @@ int32_t lull_open(const struct lull_search *search, const char *spec, struct lul
         return lull_error_set(err, LULL_E_INVALID, "%s: a criterion is named NAME, PATH or PATH:ID", spec);
     if (!strchr(base, '/') && !has_suffix(base, ".so"))
         return open_name(search, base, id, found, err);
-    if (strchr(base, '/'))
-        return open_path(search, base, id, found, err);
-
     char path[LULL_PATH_MAX + 2]; /* without a '/' dlopen would search the system's directories */
-    snprintf(path, sizeof path, "./%s", base);
+    snprintf(path, sizeof path, "%s%s", strchr(base, '/') ? "" : "./", base);
     return open_path(search, path, id, found, err);
 }
