@@ -73,8 +73,9 @@ _Noreturn static void child_main(struct lc *c, void (*fn)(struct lc *c, const vo
 
 /* --- parent ------------------------------------------------------------------------------------------------------------ */
 
-static void keep(struct lc_report *r, char kind, const char *text)
+__attribute__((format(printf, 3, 4))) static void keep(struct lc_report *r, char kind, const char *format, ...)
 {
+    va_list args;
     r->failures += kind == 'F';
     r->skipped |= kind == 'S';
     r->refused |= kind == 'R';
@@ -83,17 +84,9 @@ static void keep(struct lc_report *r, char kind, const char *text)
         return;
     }
     r->kind[r->line_count] = kind;
-    snprintf(r->lines[r->line_count++], LC_LINE_SIZE, "%s", text);
-}
-
-__attribute__((format(printf, 2, 3))) static void keep_failure(struct lc_report *r, const char *format, ...)
-{
-    char text[LC_LINE_SIZE];
-    va_list args;
     va_start(args, format);
-    vsnprintf(text, sizeof text, format, args);
+    vsnprintf(r->lines[r->line_count++], LC_LINE_SIZE, format, args);
     va_end(args);
-    keep(r, 'F', text);
 }
 
 /* Takes lines until the child closes the pipe; 0 if it did not in time. */
@@ -120,7 +113,7 @@ static int read_lines(int fd, unsigned limit_s, struct lc_report *report)
             if (line[0] == 'D')
                 report->completed = 1;
             else
-                keep(report, line[0], line + 1);
+                keep(report, line[0], "%s", line + 1);
             size_t used = (size_t)(eol - line) + 1;
             memmove(line, eol + 1, filled - used);
             filled -= used;
@@ -141,17 +134,17 @@ static void keep_output(FILE *output, struct lc_report *report)
         if (text[0] == '\0' || text[0] == '=')
             continue;
         if (lines++ == 0)
-            keep_failure(report, "it printed:");
-        keep(report, 'N', text);
+            keep(report, 'F', "it printed:");
+        keep(report, 'N', "%s", text);
     }
 }
 
 static void keep_end(int status, struct lc_report *report)
 {
     if (WIFSIGNALED(status))
-        keep_failure(report, "it crashed: %s", strsignal(WTERMSIG(status)));
+        keep(report, 'F', "it crashed: %s", strsignal(WTERMSIG(status)));
     else if (!report->completed)
-        keep_failure(report, "it ended the process (exit status %d)", WEXITSTATUS(status));
+        keep(report, 'F', "it ended the process (exit status %d)", WEXITSTATUS(status));
 }
 
 /* Waits for the child and says how it ended, what it was at if that was no good end, and what it printed. */
@@ -161,13 +154,13 @@ static void gather(struct lc *c, pid_t pid, int fd, unsigned limit_s, FILE *outp
     if (!read_lines(fd, limit_s, report)) {
         kill(pid, SIGKILL);
         waitpid(pid, &status, 0);
-        keep_failure(report, "it hangs: it did not end within %u s", limit_s);
+        keep(report, 'F', "it hangs: it did not end within %u s", limit_s);
     } else {
         waitpid(pid, &status, 0);
         keep_end(status, report);
     }
     if (!report->completed && c->doing[0] != '\0')
-        keep(report, 'N', c->doing);
+        keep(report, 'N', "%s", c->doing);
     keep_output(output, report);
 }
 

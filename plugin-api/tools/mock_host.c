@@ -103,10 +103,8 @@ int lc_host_init(struct lc_host *h, struct lc *c, uint32_t threads)
 {
     uint32_t workers = 2 * threads < WORKERS_MAX ? 2 * threads : WORKERS_MAX;
     *h = (struct lc_host){.threads = (workers + 1) / 2, .check = c, .workers = calloc(1, sizeof *h->workers)};
-    if (!h->workers) {
-        lc_fail(c, "out of memory");
+    if (!LC_EXPECT(c, h->workers, "out of memory"))
         return -1;
-    }
     pthread_mutex_init(&h->workers->mutex, NULL);
     pthread_cond_init(&h->workers->freed, NULL);
     h->workers->count = workers;

@@ -103,9 +103,8 @@ int lc_log_compare(struct lc *c, const struct lc_log *expected, const struct lc_
                 a->id, (unsigned long long)a->spp, p->action, p->error, p->p_noisy, (unsigned long long)p->next_spp);
         return -1;
     }
-    if (!LC_EXPECT(c, expected->count == got->count, "%s: %zu answers, %zu before", what, got->count, expected->count))
-        return -1;
-    return 0;
+    int same = expected->count == got->count;
+    return LC_EXPECT(c, same, "%s: %zu answers, %zu before", what, got->count, expected->count) ? 0 : -1;
 }
 
 void lc_log_release(struct lc_log *log)
@@ -347,20 +346,16 @@ int lc_session_open(struct lc_session *s, struct lc *c, const struct lc_manner *
 {
     struct lc_film film;
     *s = (struct lc_session){0};
-    if (lc_film_init_for(&film, &c->req, manner ? 1 + manner->seed : 1, manner && manner->nominal) != 0) {
-        lc_fail(c, "out of memory");
-        return -1;
-    }
-    return lc_session_open_film(s, c, manner, &film);
+    int made = lc_film_init_for(&film, &c->req, manner ? 1 + manner->seed : 1, manner && manner->nominal) == 0;
+    return LC_EXPECT(c, made, "out of memory") ? lc_session_open_film(s, c, manner, &film) : -1;
 }
 
 int lc_session_restart(struct lc_session *s)
 {
     struct lc_film fresh;
-    if (lc_film_init_for(&fresh, &s->check->req, s->film.seed, s->manner.nominal) != 0) {
-        lc_fail(s->check, "out of memory");
+    int made = lc_film_init_for(&fresh, &s->check->req, s->film.seed, s->manner.nominal) == 0;
+    if (!LC_EXPECT(s->check, made, "out of memory"))
         return -1;
-    }
     lc_film_release(&s->film);
     s->film = fresh;
     return begin(s, LULL_FRAME_RESTART);
@@ -368,10 +363,9 @@ int lc_session_restart(struct lc_session *s)
 
 int lc_session_image(struct lc_session *s, struct lc_image *image)
 {
-    if (lc_image_build(image, &s->film, &s->manner.layout, s->planes) != 0) {
-        lc_fail(s->check, "out of memory");
+    int built = lc_image_build(image, &s->film, &s->manner.layout, s->planes) == 0;
+    if (!LC_EXPECT(s->check, built, "out of memory"))
         return -1;
-    }
     if (s->manner.no_all) {
         image->view.all = NULL;
         image->view.all_count = 0;
@@ -409,10 +403,8 @@ static int step_with(struct lc_session *s, const uint32_t *ids, uint32_t count, 
         struct lull_block *b = &s->film.blocks[ids[i]];
         const struct lull_decision *d = &decisions[ids[i]];
         lc_decision_check(s->check, b, d);
-        if (log_add(&s->log, &(struct lc_answer){s->step, b->id, b->spp, *d}) != 0) {
-            lc_fail(s->check, "out of memory");
+        if (!LC_EXPECT(s->check, log_add(&s->log, &(struct lc_answer){s->step, b->id, b->spp, *d}) == 0, "out of memory"))
             return -1;
-        }
         if (d->action == LULL_STOP)
             b->flags |= LULL_BLOCK_STOPPED;
     }
