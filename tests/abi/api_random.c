@@ -1,7 +1,8 @@
 /*
  * Every criterion through the ABI with random frames within its rules: parameters, tilings, planes, strides of either sign, types,
  * scales, normalisers, pixels of any bits, tasks in any order on any worker, calls in any permitted order, cancelled ones, states that
- * are saved, damaged and loaded. Under ASan what is read beyond a plane or written beyond a decision ends the test.
+ * are saved, damaged and loaded. Under ASan what is read beyond a plane or written beyond a decision ends the test. Calls outside the
+ * rules are lull-check's (-o misuse).
  *
  * API_RANDOM_CALLS=N makes N calls of evaluate to each criterion instead of a few, API_RANDOM_CRITERION=ID to this one only. Each
  * criterion begins with API_RANDOM_SEED (4711), so that a long run can be made in pieces, one seed each.
