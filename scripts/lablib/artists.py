@@ -3,14 +3,14 @@
 Each scene is exported to Blender (scripts/hosts/pbrt_to_blend.py). Cycles renders a number of samples, by adaptive sampling to a noise
 threshold, or for as long as some number of samples took; lull.blender stops at multiples of what is just seen, or after that time.
 Visible errors are those of the model observer against two references of Cycles, whose noise is taken out (`ggn visible --second`). One
-process renders at a time, on one thread. Needs bpy in build/hosts (make test-hosts). Interrupted, the same command goes on."""
+process renders at a time. Needs bpy in build/hosts (make test-hosts). Interrupted, the same command goes on."""
 import json
 import os
 import statistics
 
 from lablib import peers, tables, tool
 
-SCENES = "cornell-box soft-shadow glossy corridor indirect-hall chess".split()
+SCENES = "cornell-box soft-shadow glossy corridor chess".split()
 SAMPLES, ERRORS, MOST, THRESHOLD = (64, 128, 256), (1, 2, 3), 4096, 0.01
 TIMED = "%d samples" % SAMPLES[1]  # whose seconds the ways with a limit of time get
 PHASES = ("samples", "synchronisation", "copies", "looks", "denoising")
@@ -96,9 +96,11 @@ def ways_table(scenes):
         of = [ways[name] for ways in scenes.values()]
         base = [w["s"] / ways[TIMED]["s"] for w, ways in zip(of, scenes.values())]
         errors = [e for w in of for e in w["errors"]]
-        rows.append([NAMES[name], "%.0f" % sum(w["s"] for w in of), peers.spread(base), peers.spread([max(w["errors"]) for w in of]),
-                     "%.2f" % statistics.mean(errors), tables.percent(sum(e > peers.VISIBLE for e in errors) / len(errors))])
-    heads = ("way", "processor s, all", "against %s, median (range)" % TIMED, "worst block, median (range)", "mean block", "visibly off")
+        rows.append([NAMES[name], "%.0f" % sum(w["s"] for w in of), "%.0f" % sum(w["wall_s"] for w in of), peers.spread(base),
+                     peers.spread([max(w["errors"]) for w in of]), "%.2f" % statistics.mean(errors),
+                     tables.percent(sum(e > peers.VISIBLE for e in errors) / len(errors))])
+    heads = ("way", "processor s, all", "wall clock s, all", "processor s against %s, median (range)" % TIMED,
+             "worst block, median (range)", "mean block", "visibly off")
     return tables.table(heads, rows)
 
 

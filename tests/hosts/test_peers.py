@@ -52,7 +52,7 @@ def test_artists_by_worst_block():
     assert table == "| one | 60 | 8.0 | 2.00 | 2.00 | 60 | 2.0 | 4.00 | ≥ 2.00 | 60 | 1.0 | 8.00 | ≥ 1.00 |", table
     assert artists.phases_table({"one": ways}).splitlines()[-1] == "| one | 5.0 | 50 % | 0 % | 0 % | 10 % | 0 % |"
     row = next(line for line in artists.ways_table({"one": ways}).splitlines() if "--error 3" in line)
-    assert row == "| `--error 3` | 1 | 0.25 | 8.00 | 4.05 | 50 % |", row
+    assert row == "| `--error 3` | 1 | 5 | 0.25 | 8.00 | 4.05 | 50 % |", row
 
 
 def need_bpy():
