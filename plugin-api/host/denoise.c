@@ -120,18 +120,19 @@ static void estimate_other(struct picture *p, const struct lull_kit_span *s, siz
 
 static void estimate_noisy(struct picture *p, const struct lull_kit_span *s, size_t at) { estimate(p, s, at, p->part.half); }
 
-/* Whether each block is as good as was asked: the criterion told its error at its last samples, and has stopped it or sees
- * none. Clean auxiliaries take more than twice as long as the rest then, for what nobody misses; looks do not have them. */
-static int is_good_enough(const struct picture *p)
+/* Whether this is a draft that is as good as was asked: the criterion has stopped every block, and told of one that it shows
+ * an error. Clean auxiliaries would take more than twice as long as the rest, for what nobody asked. */
+static int is_draft(const struct picture *p)
 {
     const struct lull_host_blocks *blocks = &p->frame->blocks;
-    uint32_t good = 0;
+    double worst = 0.0;
     for (uint32_t i = 0; i < blocks->count; i++) {
         const struct lull_host_block *b = &blocks->list[i];
-        const int told = b->asked && b->asked_spp == b->spp && !isnan(b->error);
-        good += told && (b->reason == LULL_REASON_CRITERION || b->error <= 1.0);
+        if (b->reason != LULL_REASON_CRITERION || b->asked_spp != b->spp || isnan(b->error))
+            return 0;
+        worst = fmax(worst, b->error);
     }
-    return good == blocks->count;
+    return worst > 1.0;
 }
 
 /* The mean of the denoised halves, and how much of the noisy picture each pixel takes. */
@@ -141,7 +142,7 @@ static int32_t denoise_halves(struct picture *p, float *denoised, struct lull_er
     struct base_err why = {0};
     each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF), read_halves);
     if (lull_denoised_run(&p->pair, p->how->cancelled, p->how->context, &why) ||
-        (!is_good_enough(p) && lull_denoised_again(&p->pair, p->how->cancelled, p->how->context, &why)))
+        (!is_draft(p) && lull_denoised_again(&p->pair, p->how->cancelled, p->how->context, &why)))
         return lull_host_translate(&why, err);
     if (p->pair.other[0]) {
         each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), estimate_other);

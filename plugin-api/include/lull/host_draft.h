@@ -171,7 +171,7 @@ struct lull_host_picture {
  * NORMAL, if the view has them. For the blend, each half of the samples is denoised by itself and the two are averaged:
  * their difference then tells the error of just this picture, by which the blend weighs it against the noisy one at each
  * pixel; where there are no halves it is the denoised picture. Both are denoised once more with denoised ALBEDO and NORMAL,
- * unless every block is as good as was asked: its last answer has an error, and has stopped it or is 1 at most. Pixels
+ * unless it is a draft that is done: the criterion has stopped every block, one of them with an error above 1. Pixels
  * without samples are black. LULL_E_INVALID: no library, one that fails, or a view that lacks a plane; out is undefined
  * then. Takes 180 bytes a pixel, the denoiser some 600 more. */
 LULL_EXPORT int32_t lull_host_denoise(const struct lull_host_frame *frame, const struct lull_host_view *view,
