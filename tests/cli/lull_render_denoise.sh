@@ -37,6 +37,8 @@ t "any criterion: the noisy picture is the one without --denoise" same a.exr b.e
 t "--spp: nobody judges, the picture is denoised all the same" sh -c "exrheader uniform.exr | grep -q lull.weight && ! exrheader uniform.exr | grep -q noisy_error"
 "$P" $scene -q --size 48x40 --block 16 --denoise --quote >quote.txt
 t "a quote has both prices" sh -c "grep -q ' denoised  *[0-9]' quote.txt && grep -q ' noisy  *[0-9]' quote.txt"
+t "  …and its drafts begin where their first looks are" \
+    sh -c "grep -q '^ *8 x  rough  *16 ' quote.txt && grep -q '^ *4 x  draft  *32 ' quote.txt && grep -q '^ *2 x  good  *64 ' quote.txt"
 
 refused "leave out --denoise" "$scene" --sequence d --denoise
 refused "expected blend or full" "$scene" --denoise=much
