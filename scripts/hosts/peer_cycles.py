@@ -37,7 +37,8 @@ class Watch:
 
 
 def equal_terms(scene, seed):
-    """What both renderers do: one thread, a box filter of a pixel, nothing clamped or blurred, all caustics."""
+    """What both renderers do: a box filter of a pixel, nothing clamped or blurred, all caustics; and one thread, where Blender holds
+    to it (the module bpy 5.0.1 takes all)."""
     render, cycles = scene.render, scene.cycles
     render.engine, render.threads_mode, render.threads = "CYCLES", "FIXED", 1
     cycles.device, cycles.seed, cycles.use_animated_seed = "CPU", seed, False

@@ -3,7 +3,7 @@
 Each scene is exported with what both renderers have (scripts/hosts/pbrt_to_blend.py); it counts if their references agree. Cycles goes
 down its ladder of noise thresholds until its worst block is as good as ours; between two thresholds seconds are interpolated as
 logarithms. Visible errors are those of the model observer against two references of the same renderer, whose noise is taken out
-(`ggn visible --second`). One process renders at a time, on one thread; ways take turns within a seed, seeds come last, so that an
+(`ggn visible --second`). One process renders at a time, ours on one thread; ways take turns within a seed, seeds come last, so that an
 interrupted run has all scenes. Needs bpy in build/hosts (make test-hosts) or the program blender, and oiiotool."""
 import json
 import math
