@@ -111,10 +111,9 @@ static int read_pair(const struct gp_block_view *seen, int *differ, double *spli
         return base != NULL;
     }
     if (!gp_has_halves(b)) {
-        gp_warn_once(
-            &in->kit, &in->warned,
-            "ggn: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped by "
-            "it");
+        gp_say_once(&in->kit, LULL_LOG_WARNING, &in->warned,
+                    "ggn: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped by "
+                    "it");
         return 0;
     }
     *split *= seq_half_scale((double)b->spp, (double)b->half_spp);

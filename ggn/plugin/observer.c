@@ -62,6 +62,7 @@ struct lull_instance {
     struct ggn_viewing viewing;
     double stop_error;
     atomic_flag warned;     /* of planes that say nothing about noise: once per frame */
+    atomic_flag held;       /* likewise, of blocks that wait for light alone */
     struct gp_means means;  /* of a frame without HALF */
     uint32_t workers;       /* of the open frame */
     struct lull_rect frame; /* around all blocks */
@@ -176,8 +177,8 @@ static double error_of_halves(struct lull_instance *in, const struct lull_view *
                               struct worker *w, struct lull_kit_tally *tally)
 {
     if (!gp_has_halves(b)) {
-        gp_warn_once(
-            &in->kit, &in->warned,
+        gp_say_once(
+            &in->kit, LULL_LOG_WARNING, &in->warned,
             "observer: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped "
             "by it");
         tally->early = 1;
@@ -236,8 +237,14 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
         error = (in->means.count ? error_of_means : error_of_halves)(in, view, b, w, &tally);
     /* What surrounds a block, and what it may not have met, is read where it matters: before a stop, and where the answer is
      * all that is wanted. */
-    if (!in->means.count && (error <= in->stop_error || (b->flags & LULL_BLOCK_FINAL && !isnan(error))))
-        error = fmax(fmax(error, error_around(in, view, b, w)), gp_undersampled_error(&in->kit, view, b));
+    if (!in->means.count && (error <= in->stop_error || (b->flags & LULL_BLOCK_FINAL && !isnan(error)))) {
+        const double seen = fmax(error, error_around(in, view, b, w)), unmet = gp_undersampled_error(&in->kit, view, b);
+        if (seen <= in->stop_error && unmet > in->stop_error)
+            gp_say_once(&in->kit, LULL_LOG_INFO, &in->held,
+                        "blocks below 100x100 pixels go on though no noise is seen: a few samples like their "
+                        "brightest would be");
+        error = fmax(seen, unmet);
+    }
     lull_kit_verdict(&in->kit, b, &tally, error, in->stop_error, 0, in->kit.value[P_GROWTH], d);
     if (d->action == LULL_CONTINUE && !isnan(d->predicted_spp)) /* the last steps are short: checks cost little here */
         lull_kit_continue(&in->kit, b, ggn_observer_next((double)b->spp, d->predicted_spp, in->kit.value[P_GROWTH]), d);
@@ -374,6 +381,7 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     in->means = means;
     in->frame = all;
     atomic_flag_clear(&in->warned);
+    atomic_flag_clear(&in->held);
     lull_kit_frame_open(in, frame);
     if (in->means.count)
         gp_log(&in->kit, LULL_LOG_INFO, "observer: no plane HALF: noise is told from how the mean changes between checks");
@@ -423,4 +431,5 @@ const struct lull_criterion ggn_plugin_observer =
                  "mean changes between checks) and from their second moments: lightness, slightly blurred and pooled so\n"
                  "that a few bright pixels count, against a limit that rises with the texture. `error` is the visible\n"
                  "noise over that limit (1 = just not visible), fitted to human thresholds. Small blocks also wait for\n"
-                 "what surrounds them.");
+                 "what surrounds them, those below 100x100 pixels until no single sample matters, for up to a tenth more\n"
+                 "samples in all.");

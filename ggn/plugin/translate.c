@@ -16,10 +16,10 @@ void gp_log(const struct lull_kit *kit, int32_t level, const char *text)
         kit->host->log(kit->host, level, text);
 }
 
-void gp_warn_once(const struct lull_kit *kit, atomic_flag *warned, const char *text)
+void gp_say_once(const struct lull_kit *kit, int32_t level, atomic_flag *said, const char *text)
 {
-    if (kit->host && kit->host->log && !atomic_flag_test_and_set(warned))
-        gp_log(kit, LULL_LOG_WARNING, text);
+    if (kit->host && kit->host->log && !atomic_flag_test_and_set(said))
+        gp_log(kit, level, text);
 }
 
 double gp_error_of_same(const struct lull_kit *kit, int has_structure, atomic_flag *warned, const char *text,
@@ -27,7 +27,7 @@ double gp_error_of_same(const struct lull_kit *kit, int has_structure, atomic_fl
 {
     if (!has_structure)
         return 0;
-    gp_warn_once(kit, warned, text);
+    gp_say_once(kit, LULL_LOG_WARNING, warned, text);
     tally->early = tally->bad = 1;
     return (double)NAN;
 }

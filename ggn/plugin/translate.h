@@ -15,8 +15,8 @@ int32_t gp_fail_from(struct lull_error *err, int32_t otherwise, const char *what
 
 /* Says it to a host that listens. */
 void gp_log(const struct lull_kit *kit, int32_t level, const char *text);
-/* A warning unless *warned, which it sets: once per frame where begin_frame clears it. */
-void gp_warn_once(const struct lull_kit *kit, atomic_flag *warned, const char *text);
+/* Likewise, unless *said, which it sets: once per frame where begin_frame clears it. */
+void gp_say_once(const struct lull_kit *kit, int32_t level, atomic_flag *said, const char *text);
 
 /* Whether HALF holds some of the block's samples and not all. */
 static inline int gp_has_halves(const struct lull_block *b) { return b->half_spp > 0 && b->half_spp < b->spp; }

@@ -132,7 +132,7 @@ static void log_setting(const struct lull_instance *in, const struct lull_frame 
     if (!ggn_setting_difference(&learned, &here, difference, sizeof difference))
         return;
     snprintf(text, sizeof text, "the model is asked about what it has not learned: %s", difference);
-    gp_log(&in->kit, in->rule.reach > 0 ? LULL_LOG_INFO : LULL_LOG_WARNING, text);
+    gp_log(&in->kit, in->rule.reach > 0 ? LULL_LOG_DEBUG : LULL_LOG_WARNING, text);
 }
 
 int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
@@ -226,7 +226,7 @@ static void log_late(struct lull_instance *in, const struct ggn_stopper *before,
         text, sizeof text,
         "the model is asked at %llu samples behind %.0f, where it has learned %.0f: the host's checks are further apart",
         (unsigned long long)spp, last, next);
-    gp_warn_once(&in->kit, &in->late, text);
+    gp_say_once(&in->kit, LULL_LOG_WARNING, &in->late, text);
 }
 
 /* Fills in->history.pending[b->id] with the verdict on a checked block. */

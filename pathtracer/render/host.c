@@ -18,7 +18,7 @@ struct services {
 static void log_message(void *context, int32_t level, const char *text)
 {
     const struct services *s = context;
-    if (level <= LULL_LOG_WARNING)
+    if (level <= LULL_LOG_INFO)
         base_log_note(s->log, "%s", text);
 }
 

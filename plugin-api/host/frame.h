@@ -4,6 +4,7 @@
 
 #include <lull/host_draft.h>
 
+#include <pthread.h>
 #include <stdatomic.h>
 
 #include "base/err.h"
@@ -20,6 +21,9 @@ struct lull_host_frame;
 
 /* Samples that an active block gets before it is asked about again. */
 uint64_t lull_host_goal(const struct lull_host_blocks *blocks, const struct lull_host_block *block);
+
+/* Lines of a criterion that are kept, and the characters of one. */
+enum { LULL_HOST_MESSAGES = 8, LULL_HOST_LINE = 600 };
 
 struct lull_host_criterion {
     const struct lull_criterion *table;
@@ -41,7 +45,12 @@ struct lull_host_criterion {
 
     /* The first warning, where the services have no log; the LULL_WARNING_ state says what became of it. */
     atomic_int warning_state;
-    char warning[600];
+    char warning[LULL_HOST_LINE];
+
+    /* What was said in its frame, for the report: the first lines of LULL_LOG_INFO or worse. */
+    pthread_mutex_t messages_lock;
+    uint32_t message_count;
+    char messages[LULL_HOST_MESSAGES][LULL_HOST_LINE];
 };
 
 enum { LULL_WARNING_NONE, LULL_WARNING_BEING_WRITTEN, LULL_WARNING_WAITING, LULL_WARNING_PASSED };
@@ -113,7 +122,8 @@ struct lull_host_quote {
 int32_t lull_host_offer(struct lull_host_criterion *criterion, const struct lull_host_services *services,
                         struct lull_error *err);
 void lull_host_withdraw(struct lull_host_criterion *criterion);
-/* A line to the renderer's log; the first warning without one is kept for lull_host_pass_warning. */
+/* A line to the renderer's log and, of LULL_LOG_INFO or worse, for the report; the first warning without a log is kept for
+ * lull_host_pass_warning. */
 void lull_host_say(struct lull_host_criterion *criterion, int32_t level, const char *text);
 /* Passes a warning that was logged nowhere to err, once, with the code LULL_OK; returns LULL_OK. */
 int32_t lull_host_pass_warning(struct lull_host_criterion *criterion, struct lull_error *err);

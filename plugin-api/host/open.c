@@ -63,6 +63,7 @@ int32_t lull_host_create(const struct lull_host_services *services, const struct
         return code != LULL_OK ? code : lull_host_no_memory(err, "criterion");
     }
     c->table = table;
+    pthread_mutex_init(&c->messages_lock, NULL);
     struct lull_error e = {.struct_size = sizeof e};
     code = lull_host_offer(c, services, err);
     if (code == LULL_OK)
@@ -134,6 +135,7 @@ void lull_host_close(struct lull_host_criterion *c)
     release_frame(c);
     release_pairs(c);
     lull_host_withdraw(c);
+    pthread_mutex_destroy(&c->messages_lock);
     free(c);
 }
 
@@ -268,6 +270,8 @@ int32_t lull_host_join(const struct lull_host_frame *f, struct lull_host_criteri
     int32_t code = lull_host_given(err, "frame", f, "criterion", c, NULL);
     if (code != LULL_OK)
         return code;
+    if (c->open) /* what was said before a first frame belongs to it */
+        c->message_count = 0;
     code = fits(c, &f->blocks, err);
     c->frame = NULL;
     if (code == LULL_OK)

@@ -15,7 +15,17 @@ static void add_block_size(cJSON *root, int32_t width, int32_t height, int *fail
     base_json_numbers(root, "block", (const double[]){width, height}, 2, failed);
 }
 
-static void add_criterion(cJSON *root, const struct lull_host_criterion *criterion, int *failed)
+/* What it said, if anything. */
+static void add_messages(cJSON *of, struct lull_host_criterion *criterion, int *failed)
+{
+    pthread_mutex_lock(&criterion->messages_lock);
+    cJSON *list = criterion->message_count > 0 ? base_json_array(of, "messages", failed) : NULL;
+    for (uint32_t i = 0; i < criterion->message_count; i++)
+        base_json_text(list, NULL, criterion->messages[i], failed);
+    pthread_mutex_unlock(&criterion->messages_lock);
+}
+
+static void add_criterion(cJSON *root, struct lull_host_criterion *criterion, int *failed)
 {
     if (!criterion) {
         base_json_text(root, "criterion", NULL, failed);
@@ -31,6 +41,7 @@ static void add_criterion(cJSON *root, const struct lull_host_criterion *criteri
         base_json_text(params, p->name, lull_host_parameter(t, p->name, criterion->pairs, criterion->pair_count, NULL),
                        failed);
     }
+    add_messages(c, criterion, failed);
 }
 
 cJSON *lull_host_report_block(cJSON *list, const struct lull_host_block *b, const double *noisy_error, int *failed)

@@ -4,16 +4,25 @@
 #include <stdlib.h>
 #include <string.h>
 
+static void keep_message(struct lull_host_criterion *c, const char *line)
+{
+    pthread_mutex_lock(&c->messages_lock);
+    if (c->message_count < LULL_HOST_MESSAGES)
+        snprintf(c->messages[c->message_count++], LULL_HOST_LINE, "%s", line);
+    pthread_mutex_unlock(&c->messages_lock);
+}
+
 void lull_host_say(struct lull_host_criterion *c, int32_t level, const char *text)
 {
     int none = LULL_WARNING_NONE;
-    char line[sizeof c->warning];
-    if (!c->offered.log && level > LULL_LOG_WARNING)
-        return;
+    char line[LULL_HOST_LINE];
     snprintf(line, sizeof line, "criterion %s: %s", c->table->id, text);
+    if (level <= LULL_LOG_INFO)
+        keep_message(c, line);
     if (c->offered.log)
         c->offered.log(c->offered.context, level, line);
-    else if (atomic_compare_exchange_strong(&c->warning_state, &none, LULL_WARNING_BEING_WRITTEN)) {
+    else if (level <= LULL_LOG_WARNING &&
+             atomic_compare_exchange_strong(&c->warning_state, &none, LULL_WARNING_BEING_WRITTEN)) {
         memcpy(c->warning, line, sizeof line);
         atomic_store(&c->warning_state, LULL_WARNING_WAITING);
     }

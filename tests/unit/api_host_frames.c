@@ -632,6 +632,42 @@ static void reports_as_text(void **state)
     end();
 }
 
+/* What a criterion says in a frame stands in the report: the first lines, nothing of LULL_LOG_DEBUG, nothing of another frame. */
+static void messages_in_reports(void **state)
+{
+    (void)state;
+    struct bytes b = {.size = 0};
+    struct lull_writer writer = {.struct_size = sizeof writer, .context = &b, .write = gather};
+    struct lull_host_report report = {
+        .struct_size = sizeof report, .processes = 1, .film_pixels = 64, .scene_bytes = (double)NAN};
+    begin(0, 0);
+    lull_host_say(criterion, LULL_LOG_DEBUG, "chatter");
+    lull_host_say(criterion, LULL_LOG_INFO, "news");
+    for (int i = 0; i < 2 * LULL_HOST_MESSAGES; i++)
+        lull_host_say(criterion, LULL_LOG_WARNING, i < LULL_HOST_MESSAGES - 1 ? "trouble" : "too much");
+    frame->blocks.count = 1; /* short */
+    assert_int_equal(lull_host_report_text(frame, &report, &writer, &fault), LULL_OK);
+    b.data[b.size] = '\0';
+    const char *text = (const char *)b.data, *last = NULL;
+    assert_non_null(strstr(text, "\"messages\":\t[\"criterion told: news\", \"criterion told: trouble\""));
+    assert_null(strstr(text, "chatter"));
+    assert_null(strstr(text, "too much"));
+    int count = 0;
+    for (last = strstr(text, "trouble"); last; last = strstr(last + 1, "trouble"))
+        count++;
+    assert_int_equal(count, LULL_HOST_MESSAGES - 1);
+    frame->blocks.count = BLOCKS;
+    lull_host_end(frame);
+    assert_int_equal(lull_host_begin(&config, criterion, &frame, &fault), LULL_OK);
+    frame->blocks.count = 1;
+    b.size = 0;
+    assert_int_equal(lull_host_report_text(frame, &report, &writer, &fault), LULL_OK);
+    b.data[b.size] = '\0';
+    assert_null(strstr(text, "messages"));
+    frame->blocks.count = BLOCKS;
+    end();
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -651,6 +687,7 @@ int main(void)
         cmocka_unit_test(bad_states_are_refused),
         cmocka_unit_test(identities_by_name),
         cmocka_unit_test(reports_as_text),
+        cmocka_unit_test(messages_in_reports),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

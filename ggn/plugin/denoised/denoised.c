@@ -148,9 +148,9 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
         else
             tally.early = 1;
         if (b->spp >= in->kit.need.first_spp && !gp_has_halves(b))
-            gp_warn_once(&in->kit, &in->warned,
-                         "denoised: HALF holds none or all of a block's samples, so that errors cannot be told; no block is "
-                         "stopped by it");
+            gp_say_once(&in->kit, LULL_LOG_WARNING, &in->warned,
+                        "denoised: HALF holds none or all of a block's samples, so that errors cannot be told; no block is "
+                        "stopped by it");
         decide(in, b, &tally, error, now, d);
         *now = (struct past){b->spp,      d->next_spp,  d->p_noisy, d->predicted_spp, d->error,
                              now->halves, now->crossed, now->trend, d->action,        d->flags};
