@@ -18,7 +18,7 @@ import lull  # noqa: E402
 import tap  # noqa: E402
 from lull import Rect, exr  # noqa: E402
 from lull.blender import ui, view  # noqa: E402
-from lull.blender.cycles import Cycles, HostError, merge  # noqa: E402
+from lull.blender.cycles import WAVE, Cycles, HostError, merge  # noqa: E402
 from lull.blender.session import Session, Settings  # noqa: E402
 from tap import raises  # noqa: E402
 
@@ -86,7 +86,7 @@ def test_passes():
     layer.use_pass_diffuse_color = True
     with Cycles(scene, 64) as host:
         whole = Rect(0, 0, 40, 30)
-        wanted, early = host._render_area(whole, 0, 32), host._render_area(whole, 0, 16)
+        wanted, early = host._render_area(whole, 0, 32), host._render_area(whole, 0, WAVE)
     wanted.update({name: plane for name, plane in early.items() if name.startswith("Vector.")})  # of the first wave
     compared = set()
     for name, plane in wanted.items():
@@ -128,8 +128,8 @@ def test_same_picture():
     with Session(scene, Settings("fixed", {"spp": "40"}, block=24)) as session:
         assert session.driver.run().outcome == "done" and len(session.frame.blocks) == 6
         mean = session.frame.mean()
-    assert {b.spp for b in session.frame.blocks} == {64}
-    whole = one_render(scene, 64)
+    assert {b.spp for b in session.frame.blocks} == {48}  # the first pair of waves beyond
+    whole = one_render(scene, 48)
     assert whole.std() > .01 and abs(mean - whole).max() < SAME * whole.max(), abs(mean - whole).max()
 
 
@@ -257,9 +257,9 @@ def test_region():
     subprocess.run(["oiiotool", tmp("r.exr"), "--compression", "none", "-o", tmp("s.exr")], check=True)
     stored, origin = exr.read(tmp("s.exr"))
     assert origin == (28, 5) and abs(np.stack([stored[c] for c in "RGB"], -1) - mean).max() < 1e-6
-    assert (stored["lull.spp.V"] == 32).all()
+    assert (stored["lull.spp.V"] == 2 * WAVE).all()
     render.use_border = False
-    assert abs(one_render(scene, 32)[5:23, 28:35] - mean).max() < SAME * 10  # two waves: the first check
+    assert abs(one_render(scene, 2 * WAVE)[5:23, 28:35] - mean).max() < SAME * 10  # two waves: the first check
     render.use_border, render.border_max_x = True, render.border_min_x
     raises(HostError, "holds no pixel", Cycles, scene, 4)
 
@@ -283,7 +283,7 @@ def test_failing_render():
         result = session.driver.run()
         written, failed = session.write(result)
     assert result.outcome == "failed" and "camera" in str(result.exception) and written == [tmp("k.exr")] and not failed
-    assert session.frame.blocks[0].spp == 16 and session.frame.mean().max() > 0
+    assert session.frame.blocks[0].spp == WAVE and session.frame.mean().max() > 0
 
 
 def test_view():

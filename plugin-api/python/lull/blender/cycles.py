@@ -52,7 +52,7 @@ def _silence() -> Iterator[None]:
 PLANES = {"color": [f"Combined.{c}" for c in "RGB"], "albedo": [f"Denoising Albedo.{c}" for c in "RGB"],
           "normal": [f"Denoising Normal.{c}" for c in "XYZ"]}
 
-WAVE = 16  # samples
+WAVE = 8  # samples
 
 # Names of the colour passes by which Cycles divides light, in 4.x and in 5.x
 COLOURS = {"diffuse": {"DiffCol", "Diffuse Color"}, "glossy": {"GlossCol", "Glossy Color"},
