@@ -169,9 +169,11 @@ PT_KERNEL_INLINE int pt_path_sample_light(pt_effects fx, const struct pt_path *p
 PT_KERNEL_INLINE void pt_path_plan_light(pt_effects fx, const struct pt_path *path, pt_vec3 f, float pdf, pt_vec3 origin,
                                          int32_t medium, struct pt_light_plan *plan)
 {
-    const struct pt_light_sample *light = &plan->light;
+    struct pt_light_sample *light = &plan->light;
     float scale = light->inv_pdf_solid, r = pdf * scale;
-    if (!((fx & PT_FX_DELTA_LIGHT) && light->delta))
+    if (fx & PT_FX_ALPHA)
+        scale *= pt_place_lamp_alpha(path->scene, light);
+    if (!((fx & (PT_FX_DELTA_LIGHT | PT_FX_ALPHA)) && light->delta))
         scale *= 1.0f / (1.0f + r * r); /* power heuristic */
     plan->add = v3_mul(v3_scale(v3_mul(f, light->radiance), scale), path->throughput);
     plan->origin = origin;

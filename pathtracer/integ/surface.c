@@ -30,3 +30,29 @@ void pt_place_instance(const struct pt_scene *scene, int32_t instance, float tim
     at->s.dpdu = pt_mat34_vector(&t, at->s.dpdu);
     at->s.dpdv = pt_mat34_vector(&t, at->s.dpdv);
 }
+
+float pt_place_lamp_alpha(const struct pt_scene *scene, struct pt_light_sample *light)
+{
+    const struct pt_emitter *e = light->emitter;
+    const struct pt_light *lamp = &scene->lights[e->light];
+    const struct pt_shape *shape = lamp->kind == PT_LIGHT_AREA ? &scene->shapes[lamp->shape] : NULL;
+    if (!shape || !shape->has_alpha)
+        return 1.0f;
+    if (!shape->alpha.texture) {
+        light->delta = shape->alpha.value.x <= 0.0f;
+        return light->delta ? 1.0f : shape->alpha.value.x;
+    }
+    struct pt_place at = {.shape = shape};
+    struct pt_hit hit = {.shape = lamp->shape, .instance = -1, .primitive = e->primitive, .geometric = e->n};
+    if (shape->kind == PT_SHAPE_QUADRIC) {
+        hit.geometric = pt_mat34_point(&scene->quadrics[shape->data].from_render, light->target);
+        pt_place_quadric(scene, &hit, &at);
+    } else {
+        pt_vec3 d = v3_sub(light->target, e->p0), n = v3_cross(e->e1, e->e2);
+        float inv = 1.0f / v3_dot(n, n);
+        hit.u = v3_dot(v3_cross(d, e->e2), n) * inv;
+        hit.v = v3_dot(v3_cross(e->e1, d), n) * inv;
+        pt_place_mesh(PT_FX_ALPHA, scene, &hit, &at);
+    }
+    return fminf(1.0f, fmaxf(0.0f, pt_shape_alpha(scene, shape, at.s.u, at.s.v)));
+}

@@ -8,6 +8,7 @@
 #include "geom/accel.h"
 #include "geom/offset.h"
 #include "geom/quadric.h"
+#include "shade/light.h"
 #include "shade/material.h"
 
 struct pt_place {
@@ -118,6 +119,10 @@ static inline void pt_place_quadric(const struct pt_scene *scene, const struct p
 
 /* Object → render space. Out of line in surface.c: only instances need it. */
 void pt_place_instance(const struct pt_scene *scene, int32_t instance, float time, struct pt_place *at);
+
+/* For a lamp with an alpha mask: the share of its light that the mask leaves where the sample was taken. A lamp of alpha 0
+ * all over keeps its light though no ray can meet it, as in pbrt-v4: *light becomes one that no other strategy finds. */
+float pt_place_lamp_alpha(const struct pt_scene *scene, struct pt_light_sample *light);
 
 /* All of *at but for the fields that the effect set never reads. */
 static inline void pt_place_at_hit(pt_effects fx, const struct pt_scene *scene, const struct pt_ray *ray,

@@ -38,6 +38,7 @@ struct pt_light_sample {
     int delta;          /* no other strategy can find it */
     int finite;         /* `target` counts; else the light is at infinity along wi */
     pt_vec3 target;     /* point on the light, already moved off its surface towards the reference side */
+    const struct pt_emitter *emitter; /* only with PT_FX_ALPHA: whose light it is */
 };
 
 #endif

@@ -23,6 +23,8 @@ static inline int pt_light_sample_emitter(pt_effects fx, const struct pt_scene *
 {
     if (fx & PT_FX_ENVIRONMENT)
         out->pixel = NULL;
+    if (fx & PT_FX_ALPHA)
+        out->emitter = e;
     if (fx & (PT_FX_ENVIRONMENT | PT_FX_DELTA_LIGHT | PT_FX_QUADRIC)) {
         const struct pt_light *light = &scene->lights[e->light];
         if ((fx & PT_FX_QUADRIC) && light->kind == PT_LIGHT_AREA && e->primitive < 0)

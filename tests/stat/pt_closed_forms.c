@@ -227,6 +227,52 @@ static void moving_shadow(void **state)
         lit_share, CHANCE_ERROR);
 }
 
+/* --- lamps with an alpha mask ----------------------------------------------------------------------------------------------- */
+
+/* Of a lamp of area 4 and radiance 1e4 π / 4 that is 100 above the floor: cos⁴. */
+static double lamp_light(int x, int y)
+{
+    double dx = x - 3.5, dy = 3.5 - y, cos2 = 1e4 / (1e4 + dx * dx + dy * dy);
+    return cos2 * cos2;
+}
+static double three_tenths_of_it(int x, int y) { return 0.3 * lamp_light(x, y); }
+static double half_of_it(int x, int y) { return 0.5 * lamp_light(x, y); }
+static double all(int x, int y) { return (void)x, (void)y, 1.0; }
+static double three_tenths(int x, int y) { return (void)x, (void)y, 0.3; }
+
+/* What a mask takes away does not shine; but a lamp of alpha 0 all over is one that shines unseen, as in pbrt-v4. Small lamps are met
+ * by samples of the lamp only, a sphere around everything by those of the BSDF, too. */
+static void masked_lamps(void **state)
+{
+    (void)state;
+    static const char *const small[] = {
+        QUAD "[ -1 -1 -95  1 -1 -95  1 1 -95  -1 1 -95 ]",
+        "Translate 0 0 -95 Shape \"disk\" \"float radius\" 1.128379167",
+    };
+    static const char *const half = "Texture \"half\" \"float\" \"checkerboard\" \"float uscale\" 2 \"float vscale\" 0\n";
+    static const struct {
+        const char *alpha;
+        expected_at *small, *around;
+    } masks[] = {{"\"float alpha\" .3", three_tenths_of_it, three_tenths},
+                 {"\"float alpha\" 0", lamp_light, all},
+                 {"\"texture alpha\" \"half\"", half_of_it, NULL}};
+    for (size_t k = 0; k < sizeof masks / sizeof *masks; k++) {
+        char text[1500];
+        for (size_t i = 0; i < sizeof small / sizeof *small; i++) {
+            snprintf(text, sizeof text,
+                     HEAD(BOX, "") "%s" FLOOR BLACK "AreaLightSource \"diffuse\" \"rgb L\" [ 7853.98 7853.98 7853.98 ] "
+                                   "\"bool twosided\" true %s %s",
+                     half, small[i], masks[k].alpha);
+            check_image(text, masks[k].small, CHANCE_ERROR);
+        }
+        snprintf(text, sizeof text,
+                 HEAD(BOX, "") FLOOR BLACK "ReverseOrientation " GLOW "Shape \"sphere\" \"float radius\" 100 %s",
+                 masks[k].alpha);
+        if (masks[k].around)
+            check_image(text, masks[k].around, CHANCE_ERROR);
+    }
+}
+
 /* --- normals of sheared instances ---------------------------------------------------------------------------------------- */
 
 /* z' = z + x / 2 tilts the plane: its normal is (-1/2, 0, 1) whatever the matrix does to other vectors, so cos² = 4/5. The same with
@@ -278,6 +324,7 @@ int main(void)
         cmocka_unit_test(half_transparent_to_the_eye),
         cmocka_unit_test(half_transparent_to_light),
         cmocka_unit_test(moving_shadow),
+        cmocka_unit_test(masked_lamps),
         cmocka_unit_test(sheared_instances),
         cmocka_unit_test(shadows_of_what_is_close_to_the_light),
     };
