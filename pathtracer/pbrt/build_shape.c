@@ -81,6 +81,8 @@ static int add_shape(struct pt_builder *b, struct pt_params *p, const struct pla
         return b->diag.rc;
     if (s->area.on && (b->open_object >= 0 || pl->animated))
         pt_diag_warn(&b->diag, s->area.loc, "area lights in objects and on moving shapes do not emit");
+    else if (s->area.on && is_interface(b, shape->material)) /* as in pbrt-v4: rays go through it */
+        pt_diag_warn(&b->diag, p->loc, "an area light of interface material does not emit");
     else if (s->area.on && !v3_is_black(s->area.emission))
         shape->light = pt_build_shape_light(b, &s->area, area);
     if (is_interface(b, shape->material))

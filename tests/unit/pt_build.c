@@ -130,6 +130,18 @@ static void lights(void **state)
     pt_scene_destroy(s);
 }
 
+/* Rays go through an interface: a lamp of it gives no light rather than some of it, and says so. */
+static void interface_lamps_are_dark(void **state)
+{
+    (void)state;
+    int warnings = 0;
+    struct pt_scene *s = text_scene("WorldBegin Material \"interface\" AreaLightSource \"diffuse\" Shape \"sphere\"\n"
+                                    "Material \"diffuse\" Shape \"sphere\"",
+                                    NULL, &warnings);
+    assert_true(s->light_count == 1 && s->shapes[0].light == -1 && s->shapes[1].light == 0 && warnings == 1);
+    pt_scene_destroy(s);
+}
+
 /* A lamp of area A and power P has the radiance P/(π A), whatever transform made that area. */
 static void power_of_stretched_lamps(void **state)
 {
@@ -401,6 +413,7 @@ int main(void)
                                        cmocka_unit_test(instances_and_motion),
                                        cmocka_unit_test(part_of_the_motion),
                                        cmocka_unit_test(graphics_state),
+                                       cmocka_unit_test(interface_lamps_are_dark),
                                        cmocka_unit_test(warnings_come_once_and_strict_refuses),
                                        cmocka_unit_test(tessellated),
                                        cmocka_unit_test(pixel_bounds),
