@@ -253,7 +253,7 @@ static void media(void **state)
         "MakeNamedMedium \"fog\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [ 1 2 3 ] "
         "\"rgb sigma_s\" [ 0 0 0 ] \"float scale\" 0.5 \"float Lescale\" 3\n" /* which scales nothing without Le */
         "MakeNamedMedium \"smoke\" \"string type\" \"uniformgrid\" \"integer nx\" 2 \"float density\" [ 1 3 ] "
-        "\"point3 p0\" [ -1 -1 -1 ] \"point3 p1\" [ 1 1 1 ]\n"
+        "\"point3 p0\" [ 1 -1 -1 ] \"point3 p1\" [ -1 1 1 ]\n" /* corners in any order: they turn nothing round */
         "MediumInterface \"smoke\" \"fog\" Material \"interface\" Shape \"sphere\"",
         NULL, &warnings);
     assert_int_equal(warnings, 0);
