@@ -105,9 +105,8 @@ static int do_coord_sys_transform(struct parser *p)
     if (id < 0)
         return pt_diag_fail(&p->b->diag, p->loc, "unknown coordinate system \"%s\"", name);
     const struct pt_xform(*systems)[2] = p->systems.items;
-    for (int i = 0; i < 2; i++)
-        if (p->state.active >> i & 1)
-            p->state.ctm[i] = systems[id][i];
+    /* Of both times, whatever ActiveTransform says: so pbrt does. */
+    memcpy(p->state.ctm, systems[id], sizeof p->state.ctm);
     return 0;
 }
 

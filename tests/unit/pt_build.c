@@ -318,6 +318,12 @@ static void graphics_state(void **state)
     near(s->quadrics[2].to_render.m[0], 2, 0);
     near(s->quadrics[3].to_render.m[0], 1, 0);
     pt_scene_destroy(s);
+    /* a named system is one of both times: nothing moves */
+    s = world_scene("TransformBegin Translate 3 0 0 CoordinateSystem \"here\" TransformEnd\n"
+                    "ActiveTransform StartTime CoordSysTransform \"here\" ActiveTransform All Shape \"sphere\"");
+    assert_int_equal(s->instance_count, 0);
+    near(s->quadrics[0].to_render.m[3], 3, 0);
+    pt_scene_destroy(s);
 }
 
 static void warnings_come_once_and_strict_refuses(void **state)
