@@ -80,8 +80,8 @@ static void build_film(struct pt_builder *b)
     if (pt_params_find(p, "whitebalance") && pt_params_float(p, "whitebalance", 0) != 0)
         pt_diag_warn(&b->diag, pt_params_find(p, "whitebalance")->loc, "white balance is ignored");
     double limit = pt_params_float_in(p, "maxcomponentvalue", INFINITY, 1e-30, 1e30);
-    if (pt_params_find(p, "maxsampleluminance"))
-        limit = pt_params_float_in(p, "maxsampleluminance", limit, 1e-30, 1e30);
+    if (pt_params_find(p, "maxsampleluminance")) /* v3's, of a sample before the film's scale */
+        limit = pt_params_float_in(p, "maxsampleluminance", limit, 1e-30, 1e30) * (double)b->scene->radiance_scale;
     d->integrator.max_component = (float)limit;
     pt_params_ignore(p, "diagonal savefp16 writeframe type coordinatesystem nbuckets lambdamin lambdamax");
     pt_params_check_used(p);

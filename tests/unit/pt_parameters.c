@@ -81,11 +81,12 @@ static void film_filter_and_sampler(void **state)
         pt_scene_destroy(s);
     }
     struct pt_scene_defaults d;
-    pt_scene_destroy(text_scene("Film \"image\" \"float maxsampleluminance\" 12 \"string filename\" \"x.exr\" Sampler "
-                                "\"halton\" \"integer seed\" 77 "
-                                "Integrator \"path\" \"integer maxdepth\" -1 WorldBegin",
-                                &d, NULL));
-    assert_true(d.integrator.max_component == 12 && d.integrator.seed == 77 && d.integrator.max_depth == -1);
+    pt_scene_destroy(
+        text_scene("Film \"image\" \"float maxsampleluminance\" 12 \"float scale\" 2 \"string filename\" \"x.exr\" Sampler "
+                   "\"halton\" \"integer seed\" 77 "
+                   "Integrator \"path\" \"integer maxdepth\" -1 WorldBegin",
+                   &d, NULL));
+    assert_true(d.integrator.max_component == 24 && d.integrator.seed == 77 && d.integrator.max_depth == -1);
     assert_string_equal(d.film_path, "x.exr");
 }
 
