@@ -19,9 +19,6 @@ static pt_vec3 scaled_colour(struct pt_builder *b, struct pt_params *p, const ch
     return v3_mul(value, by);
 }
 
-/* Luminance of a colour, never 0. */
-static double luminance(pt_vec3 c) { return fmax((double)v3_luminance(c), 1e-30); }
-
 /* --- kinds ------------------------------------------------------------------------------------------------------------ */
 
 struct context {
@@ -185,9 +182,8 @@ static void make_infinite(struct context *c)
     make_portal(c);
     pt_builder_effect(c->b, PT_FX_ENVIRONMENT, p->loc);
     if (file[0] == '\0') {
-        if (illuminance > 0) /* of an upward patch under the whole sky: π L */
-            c->light->emission =
-                v3_scale(c->light->emission, (float)(illuminance / BASE_PI / luminance(c->light->emission)));
+        if (illuminance > 0) /* of an upward patch under the whole sky of radiance 1; "L" and "scale" come on top */
+            c->light->emission = v3_scale(c->light->emission, (float)(illuminance / BASE_PI));
         return;
     }
     struct pt_loc loc = pt_params_find(p, key)->loc;

@@ -122,7 +122,7 @@ static void lights(void **state)
         "LightSource \"spot\" \"float conedeltaangle\" 0 \"float coneangle\" 0.001 LightSource \"spot\" \"float "
         "conedeltaangle\" 180 \"float coneangle\" 180\n"
         "LightSource \"distant\" \"rgb L\" [ 1 2 3 ] \"float illuminance\" 5 \"float scale\" 2\n"
-        "LightSource \"infinite\" \"rgb L\" [ 3 3 3 ] \"float illuminance\" 6\n"
+        "LightSource \"infinite\" \"rgb L\" [ 3 3 3 ] \"float illuminance\" 6 \"float scale\" .5\n"
         "LightSource \"point\" \"rgb I\" [ 1 2 4 ] \"rgb scale\" [ 3 2 1 ] \"float power\" 8\n"
         "LightSource \"point\" \"spectrum I\" [ 400 3 700 3 ] \"float scale\" 5\n"
         "Translate 1 2 3 Scale 2 2 2 LightSource \"spot\" \"point3 from\" [ 1 1 1 ] \"point3 to\" [ 1 1 0 ]");
@@ -144,7 +144,7 @@ static void lights(void **state)
     near3(l[4].emission, 2 * 10 / flux, 2 * 10 / flux, 2 * 10 / flux);
     assert_true(l[5].cos_start == l[5].cos_total && l[6].cos_total == -1 && l[6].cos_start == 1);
     near3(l[7].emission, 10, 20, 30);
-    near3(l[8].emission, 6 / pi, 6 / pi, 6 / pi); /* of an upward patch: π L */
+    near3(l[8].emission, 9 / pi, 9 / pi, 9 / pi); /* of an upward patch: π L; "L" and "scale" are factors of it, as in v4 */
     near3(l[9].emission, 3 * 8 / (4 * pi), 4 * 8 / (4 * pi), 4 * 8 / (4 * pi));
     near((double)v3_luminance(l[10].emission), 5, 1e-4); /* v4: a spectrum of any strength has luminance 1 */
     near3(l[11].position, 3, 4, 5);
