@@ -306,6 +306,7 @@ static void make_imagemap(struct context *c, struct pt_texture *t)
                      wrap);
     t->scale = (float)pt_params_float(p, "scale", 1);
     t->invert = pt_params_bool(p, "invert", 0);
+    t->is_signed = c->is_float && !t->invert;
     read_mapping(c, t);
     pt_params_ignore(p, "filter maxanisotropy trilinear");
     struct pt_param *named = pt_params_find(p, "filename");

@@ -92,7 +92,7 @@ static pt_vec3 eval_image(const struct pt_scene *scene, const struct pt_texture 
     pt_vec3 value = v3_scale(pt_image_bilinear(&scene->images[t->image], t->wrap, t->channel, s, 1.0f - v), t->scale);
     if (t->invert)
         value = v3_sub(v3_splat(1.0f), value);
-    return v3_most(value, v3_splat(0.0f));
+    return t->is_signed ? value : v3_most(value, v3_splat(0.0f));
 }
 
 /* Recursion ends: inputs of a texture have smaller numbers. The loader bounds the depth. */

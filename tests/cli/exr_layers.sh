@@ -45,6 +45,29 @@ refused "luminance and chroma" colour.pbrt -q --spp 1 -o x.exr
 make 1,2,3 N.X,N.Y,N.Z 3
 refused "t.exr: none of its channels is a picture: N.X, N.Y, N.Z" colour.pbrt -q --spp 1 -o x.exr
 
+# slope LEFT RIGHT SCALE PICTURE: a plane with a displacement that runs from LEFT to RIGHT
+slope() {
+    oiiotool --pattern "fill:left=$1:right=$2" 64x4 1 --chnames Y -d float -o t.exr
+    cat >slope.pbrt <<S
+LookAt 0 0 -5  0 0 0  0 1 0
+Camera "orthographic" "float screenwindow" [-.4 .4 -.4 .4]
+Film "rgb" "integer xresolution" 8 "integer yresolution" 8
+WorldBegin
+LightSource "distant" "point3 from" [1 0 -2]
+Texture "f" "float" "imagemap" "string filename" "t.exr" "string wrap" "clamp" "float scale" $3
+Material "diffuse" "texture displacement" "f"
+Shape "bilinearmesh" "point3 P" [.5 -.5 0 -.5 -.5 0 .5 .5 0 -.5 .5 0]
+S
+    "$P" slope.pbrt -q --spp 8 -o "$4"
+}
+slope 0 1 .25 up.exr
+slope 1 0 -.25 got.exr
+t "heights of a negative scale" idiff -q -fail 1e-4 up.exr got.exr
+slope -1 0 .25 got.exr
+t "heights below 0" idiff -q -fail 1e-4 up.exr got.exr
+slope 0 0 .25 got.exr
+t "  …without slope it is another picture" sh -c '! idiff -q -fail 1e-4 up.exr got.exr'
+
 "$P" "$scene" -q --size 32x16 --spp 1 --block 8 --crop 8,4,24,12 -o t.exr
 t "a cropped picture is placed and said" sh -c "'$P' colour.pbrt --spp 1 -o x.exr 2>&1 | grep 'its pixels are not those of its whole picture'"
 refused "its pixels are not those of its whole picture" colour.pbrt -q --strict --spp 1 -o x.exr
