@@ -56,7 +56,7 @@ enum pt_header {
 
 struct pt_material_info {
     struct pt_loc loc;
-    int has_opacity; /* of v3's uber: becomes the alpha of shapes */
+    int has_opacity; /* of v3's uber, of what is mixed with an interface: becomes the alpha of shapes */
     struct pt_input opacity;
     int used;
 };
@@ -135,6 +135,8 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
 int32_t pt_build_image_texture(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding);
 /* Product of two inputs; constants fold. */
 struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct pt_input y);
+/* (1 - amount) x + amount y. */
+struct pt_input pt_input_mix(struct pt_builder *b, struct pt_input x, struct pt_input y, struct pt_input amount);
 
 /* build_material.c, build_material_v3.c: id, or -1. */
 int32_t pt_build_material(struct pt_builder *b, const char *kind, struct pt_params *p);
@@ -154,6 +156,8 @@ struct pt_input pt_build_reflectance(struct pt_making *making, const char *name,
 void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallback, int v3_rule, struct pt_material *m);
 /* Number of the displacement texture, 0 = none. */
 int32_t pt_build_bump(struct pt_builder *b, struct pt_params *p, const char *name);
+/* For a mix whose materials and amount are read: what of them lets rays through becomes its opacity. */
+void pt_build_mix_opacity(struct pt_making *making);
 /* Material by the name that string i of a parameter gives; -1 after a failure. */
 int32_t pt_build_material_named(struct pt_builder *b, struct pt_loc loc, const char *name);
 

@@ -130,6 +130,43 @@ static void read_model(struct pt_making *c, const struct pt_bsdf_model *model)
         c->m->kind = PT_MATERIAL_INTERFACE;
 }
 
+/* The share of hits that count. */
+static struct pt_input opacity_of(const struct pt_builder *b, int32_t id)
+{
+    int is_interface = ((struct pt_material *)b->materials.items)[id].kind == PT_MATERIAL_INTERFACE;
+    return is_interface ? pt_input_grey(0) : ((struct pt_material_info *)b->material_infos.items)[id].opacity;
+}
+
+static int is_all(struct pt_input in, float value) { return !in.texture && in.value.x == value; }
+
+void pt_build_mix_opacity(struct pt_making *c)
+{
+    struct pt_material *m = c->m;
+    if (c->b->diag.rc)
+        return;
+    struct pt_input a = opacity_of(c->b, m->mix_a), b = opacity_of(c->b, m->mix_b);
+    if (is_all(a, 1) && is_all(b, 1))
+        return;
+    if (!m->mix_amount.texture)
+        m->mix_amount.value = v3_least(v3_most(m->mix_amount.value, v3_splat(0)), v3_splat(1));
+    struct pt_input both = pt_input_mix(c->b, a, b, m->mix_amount);
+    if (is_all(both, 0)) {
+        m->kind = PT_MATERIAL_INTERFACE;
+        return;
+    }
+    /* Of the hits that count, a share is b's. */
+    if (is_all(a, 0))
+        m->mix_a = m->mix_b;
+    else if (is_all(b, 0))
+        m->mix_b = m->mix_a;
+    else if (!both.texture && !b.texture && !m->mix_amount.texture)
+        m->mix_amount = pt_input_grey((double)(m->mix_amount.value.x * b.value.x / both.value.x));
+    else
+        pt_diag_warn(&c->b->diag, c->p->loc, "textured opacity within a mix is taken as that of all of it");
+    c->info->has_opacity = 1;
+    c->info->opacity = both;
+}
+
 static void make_mix(struct pt_making *c)
 {
     struct pt_param *list = pt_params_find(c->p, "materials");
@@ -141,6 +178,7 @@ static void make_mix(struct pt_making *c)
     c->m->mix_a = pt_build_material_named(c->b, list->loc, pt_params_string_at(c->p, list, 0));
     c->m->mix_b = pt_build_material_named(c->b, list->loc, pt_params_string_at(c->p, list, 1));
     c->m->mix_amount = pt_build_float_input(c->b, c->p, "amount", 0.5);
+    pt_build_mix_opacity(c);
 }
 
 static void make_interface(struct pt_making *c) { (void)c; }

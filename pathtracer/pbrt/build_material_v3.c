@@ -130,11 +130,12 @@ static void make_mix(struct pt_making *c)
     struct pt_param *amount = pt_params_find(c->p, "amount");
     if (amount && amount->type == PT_PARAM_FLOAT) {
         c->m->mix_amount = pt_build_float_input(c->b, c->p, "amount", 0.5);
-        return;
+    } else {
+        c->m->mix_amount = pt_build_reflectance(c, "amount", 0.5f);
+        float grey = v3_luminance(c->m->mix_amount.value);
+        c->m->mix_amount.value = v3_splat(grey);
     }
-    c->m->mix_amount = pt_build_reflectance(c, "amount", 0.5f);
-    float grey = v3_luminance(c->m->mix_amount.value);
-    c->m->mix_amount.value = v3_splat(grey);
+    pt_build_mix_opacity(c);
 }
 
 static void make_kd_subsurface(struct pt_making *c)

@@ -52,10 +52,10 @@ static struct pt_shape common(struct pt_builder *b, struct pt_params *p)
     shape.material = s->material >= 0 ? s->material : pt_build_default_material(b);
     shape.flip_normal = s->reverse_orientation != 0;
     shape.alpha = pt_build_float_input(b, p, "alpha", 1);
-    if (!shape.alpha.texture && shape.alpha.value.x == 1 && shape.material >= 0) {
+    if (shape.material >= 0) {
         const struct pt_material_info *info = &((struct pt_material_info *)b->material_infos.items)[shape.material];
         if (info->has_opacity)
-            shape.alpha = info->opacity;
+            shape.alpha = pt_input_product(b, shape.alpha, info->opacity);
     }
     shape.has_alpha = shape.alpha.texture || shape.alpha.value.x < 1;
     if (shape.has_alpha)

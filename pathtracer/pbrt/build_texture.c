@@ -187,6 +187,15 @@ struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct
     return input_of(pt_list_add(b, &b->textures, &t));
 }
 
+struct pt_input pt_input_mix(struct pt_builder *b, struct pt_input x, struct pt_input y, struct pt_input amount)
+{
+    if (!x.texture && !y.texture && !amount.texture)
+        return (struct pt_input){0,
+                                 v3_add(v3_mul(v3_sub(v3_splat(1), amount.value), x.value), v3_mul(amount.value, y.value))};
+    struct pt_texture t = {.kind = PT_TEXTURE_MIX, .scale = 1, .su = 1, .sv = 1, .in = {x, y, amount}};
+    return input_of(pt_list_add(b, &b->textures, &t));
+}
+
 /* --- classes ---------------------------------------------------------------------------------------------------------- */
 
 struct context {

@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "pt_text_scene.h"
+#include "shade/texture.h"
 
 #define TRIANGLE "\"integer indices\" [ 0 1 2 ] \"point3 P\" [ 0 0 1  1 0 1  0 1 1 ]"
 
@@ -223,6 +224,50 @@ static void materials_of_both_versions(void **state)
     pt_scene_destroy(s);
 }
 
+/* Rays go through what is mixed with an interface, or with a material that is partly there, as often as the mix says: by alpha. */
+static void mixed_with_nothing(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *a, *b, *amount, *alpha;
+        double opacity, share_of_b; /* share_of_b: -1 = a alone, 2 = b alone */
+    } cases[] = {{"none", "solid", "\"float amount\" .25", "", 0.25, 2},
+                 {"solid", "none", "\"float amount\" .25", "", 0.75, -1},
+                 {"solid", "half", "\"float amount\" .5", "", 0.75, 1.0 / 3},
+                 {"half", "none", "\"float amount\" .5", "\"float alpha\" .5", 0.125, -1},
+                 {"solid", "solid", "\"float amount\" .5", "\"float alpha\" .5", 0.5, 0.5}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[600];
+        snprintf(text, sizeof text,
+                 "MakeNamedMaterial \"none\" \"string type\" \"interface\" MakeNamedMaterial \"solid\" \"string type\" "
+                 "\"diffuse\" MakeNamedMaterial \"half\" \"string type\" \"uber\" \"rgb opacity\" [ .5 .5 .5 ]\n"
+                 "Material \"mix\" \"string materials\" [ \"%s\" \"%s\" ] %s Shape \"sphere\" %s",
+                 cases[i].a, cases[i].b, cases[i].amount, cases[i].alpha);
+        struct pt_scene *s = world_scene(text);
+        const struct pt_material *m = &s->materials[3];
+        near(s->shapes[0].alpha.value.x, cases[i].opacity, 1e-6);
+        assert_true(m->kind == PT_MATERIAL_MIX && (s->effects & PT_FX_ALPHA) && !(s->effects & PT_FX_INTERFACE));
+        if (cases[i].share_of_b < 0 || cases[i].share_of_b > 1)
+            assert_true(m->mix_a == m->mix_b && s->materials[m->mix_a].kind != PT_MATERIAL_INTERFACE);
+        else
+            near(m->mix_amount.value.x, cases[i].share_of_b, 1e-6);
+        pt_scene_destroy(s);
+    }
+    struct pt_scene *s = world_scene("MakeNamedMaterial \"none\" \"string type\" \"interface\"\n"
+                                     "Material \"mix\" \"string materials\" [ \"none\" \"none\" ] Shape \"sphere\"");
+    assert_int_equal(s->materials[1].kind, PT_MATERIAL_INTERFACE);
+    pt_scene_destroy(s);
+    /* what a texture mixes */
+    s = world_scene(
+        "MakeNamedMaterial \"none\" \"string type\" \"interface\" MakeNamedMaterial \"solid\" \"string type\" "
+        "\"diffuse\" Texture \"mask\" \"float\" \"checkerboard\"\n"
+        "Material \"mix\" \"string materials\" [ \"solid\" \"none\" ] \"texture amount\" \"mask\" Shape \"sphere\"");
+    assert_true(s->shapes[0].alpha.texture && s->textures[s->shapes[0].alpha.texture - 1].kind == PT_TEXTURE_MIX);
+    near(pt_texture_eval(s, s->shapes[0].alpha.texture, 0.5f, 0.5f).x, 0, 0);
+    near(pt_texture_eval(s, s->shapes[0].alpha.texture, 1.5f, 0.5f).x, 1, 0);
+    pt_scene_destroy(s);
+}
+
 static void textures(void **state)
 {
     (void)state;
@@ -420,6 +465,7 @@ int main(void)
                                        cmocka_unit_test(part_of_the_motion),
                                        cmocka_unit_test(graphics_state),
                                        cmocka_unit_test(interface_lamps_are_dark),
+                                       cmocka_unit_test(mixed_with_nothing),
                                        cmocka_unit_test(warnings_come_once_and_strict_refuses),
                                        cmocka_unit_test(tessellated),
                                        cmocka_unit_test(pixel_bounds),
