@@ -193,8 +193,10 @@ static void make_infinite(struct context *c)
     const struct pt_image_map *map = &((struct pt_image_map *)c->b->images.items)[id];
     c->light->kind = PT_LIGHT_ENV_IMAGE;
     c->light->image = id;
-    /* v4 maps are square and equal-area, v3 maps twice as wide as high; v4 files with a v3 map exist. */
-    c->light->mapping = map->width == map->height ? PT_ENV_EQUAL_AREA : PT_ENV_LATLONG;
+    /* v4 maps are square and equal-area, v3 maps (mapname) of latitude and longitude, mostly twice as wide as high; v4 files
+     * with a v3 map exist. */
+    int is_v4 = map->width == map->height && strcmp(key, "filename") == 0;
+    c->light->mapping = is_v4 ? PT_ENV_EQUAL_AREA : PT_ENV_LATLONG;
     if (map->width != map->height && map->width != 2 * map->height)
         pt_diag_warn(&c->b->diag, loc, "environment map of %d x %d pixels is taken as latitude and longitude", map->width,
                      map->height);
