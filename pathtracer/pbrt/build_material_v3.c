@@ -44,6 +44,17 @@ static void make_plastic(struct pt_making *c)
     clear_coat(c);
 }
 
+/* A share that v3 gives as a colour is one number here. */
+static struct pt_input read_share(struct pt_making *c, const char *name, float fallback)
+{
+    struct pt_input in = pt_build_reflectance(c, name, fallback);
+    if (in.texture)
+        return in;
+    if (in.value.x != in.value.y || in.value.y != in.value.z)
+        pt_diag_warn(&c->b->diag, pt_params_loc(c->p, name), "a coloured %s is taken as a grey one", name);
+    return pt_input_grey((double)v3_luminance(in.value));
+}
+
 /* A sum of four lobes there. Here it is the one that stands alone, or else a coated diffuse surface. */
 static void make_uber(struct pt_making *c)
 {
@@ -54,9 +65,8 @@ static void make_uber(struct pt_making *c)
     c->m->eta = (float)eta;
     struct pt_param *opacity = pt_params_find(c->p, "opacity");
     if (opacity) {
-        struct pt_input o = pt_build_reflectance(c, "opacity", 1);
-        c->info->has_opacity = o.texture || v3_luminance(o.value) < 1;
-        c->info->opacity = o.texture ? o : pt_input_grey((double)v3_luminance(o.value));
+        c->info->opacity = read_share(c, "opacity", 1);
+        c->info->has_opacity = c->info->opacity.texture || c->info->opacity.value.x < 1;
     }
     if (!is_black(kt) && is_black(kd)) {
         c->m->kind = PT_BSDF_DIELECTRIC;
@@ -128,13 +138,8 @@ static void make_mix(struct pt_making *c)
     c->m->mix_b = pt_build_material_named(c->b, first->loc, pt_params_string(c->p, "namedmaterial1", ""));
     c->m->mix_a = pt_build_material_named(c->b, second->loc, pt_params_string(c->p, "namedmaterial2", ""));
     struct pt_param *amount = pt_params_find(c->p, "amount");
-    if (amount && amount->type == PT_PARAM_FLOAT) {
-        c->m->mix_amount = pt_build_float_input(c->b, c->p, "amount", 0.5);
-    } else {
-        c->m->mix_amount = pt_build_reflectance(c, "amount", 0.5f);
-        float grey = v3_luminance(c->m->mix_amount.value);
-        c->m->mix_amount.value = v3_splat(grey);
-    }
+    c->m->mix_amount = amount && amount->type == PT_PARAM_FLOAT ? pt_build_float_input(c->b, c->p, "amount", 0.5)
+                                                                : read_share(c, "amount", 0.5f);
     pt_build_mix_opacity(c);
 }
 

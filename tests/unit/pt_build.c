@@ -371,6 +371,27 @@ static void graphics_state(void **state)
     pt_scene_destroy(s);
 }
 
+/* v3's shares of uber and mix are one number here: colours in them are said. */
+static void coloured_shares_are_said(void **state)
+{
+    (void)state;
+    static const char *const format =
+        "Film \"image\" WorldBegin MakeNamedMaterial \"a\" \"string type\" \"uber\" \"rgb opacity\" [ %s ]\n"
+        "MakeNamedMaterial \"b\" \"string type\" \"mix\" \"string namedmaterial1\" \"a\" "
+        "\"string namedmaterial2\" \"a\" \"rgb amount\" [ %s ]";
+    static const struct {
+        const char *opacity, *amount;
+        int warnings;
+    } cases[] = {{".5 .5 .5", ".5 .5 .5", 0}, {"1 0 0", "1 1 1", 1}, {"1 1 1", "0 0 1", 1}, {"1 0 0", "0 0 1", 2}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[600];
+        int warnings = 0;
+        snprintf(text, sizeof text, format, cases[i].opacity, cases[i].amount);
+        pt_scene_destroy(text_scene(text, NULL, &warnings));
+        assert_int_equal(warnings, cases[i].warnings);
+    }
+}
+
 static void warnings_come_once_and_strict_refuses(void **state)
 {
     (void)state;
@@ -465,6 +486,7 @@ int main(void)
                                        cmocka_unit_test(part_of_the_motion),
                                        cmocka_unit_test(graphics_state),
                                        cmocka_unit_test(interface_lamps_are_dark),
+                                       cmocka_unit_test(coloured_shares_are_said),
                                        cmocka_unit_test(mixed_with_nothing),
                                        cmocka_unit_test(warnings_come_once_and_strict_refuses),
                                        cmocka_unit_test(tessellated),
