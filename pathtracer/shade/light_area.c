@@ -29,6 +29,12 @@ static float whole_sphere(const struct pt_quadric *q, pt_vec3 *centre)
  * the near half is sampled, which for an inner side is the point itself. */
 #define ON_SPHERE 0.99999f
 
+/* The cone has the near side of a sphere only. Where a mask lets rays through, the far side is seen, too. */
+static int is_seen_through(const struct pt_shape *shape)
+{
+    return shape->has_alpha && (shape->alpha.texture || shape->alpha.value.x > 0.0f);
+}
+
 /* Steps in which the area of a stretched quadric is summed up: within 1e-4 however flat or long the transform makes it. */
 enum { AREA_STEPS = 256 };
 
@@ -146,7 +152,8 @@ int pt_light_quadric_sample(const struct pt_scene *scene, const struct pt_emitte
     const struct pt_shape *shape = &scene->shapes[light->shape];
     const struct pt_quadric *q = &scene->quadrics[shape->data];
     pt_vec3 centre, n_quadric;
-    float radius = whole_sphere(q, &centre), one_minus_cos = radius > 0.0f ? cone(v3_sub(centre, p_ref), radius) : 0.0f;
+    float radius = is_seen_through(shape) ? 0.0f : whole_sphere(q, &centre),
+          one_minus_cos = radius > 0.0f ? cone(v3_sub(centre, p_ref), radius) : 0.0f;
     if (one_minus_cos > 0.0f) {
         int lit = sample_cone(light, shape, p_ref, centre, radius, one_minus_cos, u0, u1, out);
         out->inv_pdf_solid /= e->pmf;
@@ -169,7 +176,8 @@ float pt_light_quadric_pdf(const struct pt_scene *scene, const struct pt_shape *
 {
     const struct pt_quadric *q = &scene->quadrics[shape->data];
     pt_vec3 centre;
-    float radius = whole_sphere(q, &centre), one_minus_cos = radius > 0.0f ? cone(v3_sub(centre, p_ref), radius) : 0.0f;
+    float radius = is_seen_through(shape) ? 0.0f : whole_sphere(q, &centre),
+          one_minus_cos = radius > 0.0f ? cone(v3_sub(centre, p_ref), radius) : 0.0f;
     if (one_minus_cos > 0.0f)
         return 1.0f / (2.0f * PT_PI * one_minus_cos);
     /* n_quadric ∝ Mᵀ n */

@@ -237,6 +237,8 @@ static double lamp_light(int x, int y)
 }
 static double three_tenths_of_it(int x, int y) { return 0.3 * lamp_light(x, y); }
 static double half_of_it(int x, int y) { return 0.5 * lamp_light(x, y); }
+/* Of a lamp with two sides: the inner far side shines through the near one. */
+static double both_sides_of_it(int x, int y) { return (0.3 + 0.7 * 0.3) * lamp_light(x, y); }
 static double all(int x, int y) { return (void)x, (void)y, 1.0; }
 static double three_tenths(int x, int y) { return (void)x, (void)y, 0.3; }
 
@@ -271,6 +273,10 @@ static void masked_lamps(void **state)
         if (masks[k].around)
             check_image(text, masks[k].around, CHANCE_ERROR);
     }
+    check_image(HEAD(BOX, "") FLOOR BLACK
+                "AreaLightSource \"diffuse\" \"rgb L\" [ 7853.98 7853.98 7853.98 ] \"bool twosided\" true "
+                "Translate 0 0 -95 Shape \"sphere\" \"float radius\" 1.128379167 \"float alpha\" .3",
+                both_sides_of_it, CHANCE_ERROR);
 }
 
 /* --- normals of sheared instances ---------------------------------------------------------------------------------------- */
