@@ -531,6 +531,31 @@ def test_not_finite():
     assert abs(f.mean()[3, 5] - np.mean([noise.sample(b.rect, s)[3, 5] for s in kept], 0)).max() < 1e-12
 
 
+def test_put_and_weights_not_finite():
+    """a host's own means that are not finite are no samples until they are put again, and no weight spoils a pixel for good"""
+    f = lull.Frame(lull.load("observer"), 16, 16, block=16, supplies=["albedo"])
+    b, mean = f.blocks[0], np.random.default_rng(7).uniform(.1, .9, (16, 16, 3))
+    holes, half = mean.copy(), 1.001 * mean
+    holes[3, 5, 1], holes[7, 7], half[9, 2, 0] = np.nan, np.inf, -np.inf
+    wrong = np.zeros((16, 16), bool)
+    wrong[[3, 7, 9], [5, 7, 2]] = True
+    for spp in (16, 32):
+        f.put(b, {"color": holes, "albedo": holes}, spp, half, spp // 2)
+        assert (f.spp() == np.where(wrong, 0, spp)).all() and b.dropped == f.totals.dropped == 3 * spp
+        assert np.allclose(f.mean(), np.where(wrong[..., None], 0, mean)) and all(np.isfinite(s).all() for s in f.sums.values())
+        f.check()
+        assert b.reason != "criterion" and b.error < 1, (b.reason, b.error)
+    f.put(b, {"color": mean, "albedo": mean}, 48, mean, 24)
+    assert (f.spp() == 48).all() and np.allclose(f.mean(), mean, rtol=1e-12) and b.dropped == f.totals.dropped == 0
+    assert (f.waves == np.where(wrong, 0, 3)).all(), f.waves  # what came after a hole cannot be told from what is in it
+    for value in (np.nan, np.inf):
+        f, weight = lull.Frame(lull.load("observer"), 16, 16, block=16, weighted=True), np.ones((16, 16))
+        f.add(f.blocks[0], {"color": mean, "weight": weight}, 16, True)
+        weight[3, 5] = value
+        f.add(f.blocks[0], {"color": mean, "weight": weight}, 16, False)
+        assert np.allclose(f.mean(), mean, rtol=1e-12, atol=0) and f.blocks[0].dropped == 16 and f.spp()[3, 5] == 16
+
+
 def test_state():
     """a criterion's saved history goes on as if there had been no break; broken bytes are refused"""
     def frames():

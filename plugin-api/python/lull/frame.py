@@ -60,11 +60,13 @@ class Frame(HostFrame):
 
         sample: their mean, [h, w, 3 or more], or a mapping of plane names to means (moment2: of the squared luminance,
         [h, w]). half: they belong to half A; which samples do must not depend on their values. Bad input (TypeError,
-        ValueError) changes nothing. A pixel whose color is not finite leaves these samples out.
+        ValueError) changes nothing. A pixel whose color or weight is not finite leaves these samples out.
         """
         parts = self._parts(block, sample)
         at = self._slices(block.rect)
         bad = ~np.isfinite(parts["color"]).all(-1)
+        if self.weights:
+            bad |= ~np.isfinite(parts["weight"])
         if bad.any():
             self.dropped[at][bad] += count
             self.dropped_half[at][bad] += count * half
@@ -86,23 +88,29 @@ class Frame(HostFrame):
 
     def put(self, block: Block, mean: Sample, spp: int, half: Optional[np.ndarray] = None, half_spp: int = 0) -> None:
         """Replaces what is known of one block, for a host that accumulates itself: the mean of all its samples (as in add)
-        and, if the criterion reads half buffers, the mean of the half_spp of them that are in half A, [h, w, 3]."""
+        and, if the criterion reads half buffers, the mean of the half_spp of them that are in half A, [h, w, 3]. A pixel
+        that is not finite in either has no samples until it is put again."""
         if self.weights:
             raise ValueError("a weighted frame takes its samples by add")
-        parts, at = {name: (part, spp) for name, part in self._parts(block, mean).items()}, self._slices(block.rect)
+        parts, at = self._parts(block, mean), self._slices(block.rect)
         if "half" in self.sums:
             if half is None:
                 raise ValueError("the criterion reads half buffers: half is missing")
-            parts["half"] = (_as_mean("half", half, block.rect), half_spp)
+            parts["half"] = _as_mean("half", half, block.rect)
+        bad = ~np.isfinite([parts[name] for name in ("color", "half") if name in parts]).all((0, -1))
         if self.waves is not None and spp != block.spp:
             before = block.spp if spp > block.spp else 0
             if before == 0:  # begun anew
                 self.sums["moment2"][at], self.waves[at] = 0.0, 0
-            new = (spp * parts["color"][0] - (self.sums["color"][at] if before else 0.0)) / max(spp - before, 1)
-            self._add_wave(at, new, spp - before, None, np.isfinite(new).all(-1))
-        for name, (part, count) in parts.items():
-            self.sums[name][at] = count * part
-        block.spp, block.half_spp = spp, half_spp
+            new = (spp * parts["color"] - (self.sums["color"][at] if before else 0.0)) / max(spp - before, 1)
+            self._add_wave(at, new, spp - before, None, ~bad & (self.dropped[at] == 0) if before else ~bad)
+        for name, part in parts.items():
+            part = np.where(bad[..., None] if part.ndim == 3 else bad, 0.0, np.nan_to_num(part, posinf=0.0, neginf=0.0))
+            self.sums[name][at] = (half_spp if name == "half" else spp) * part
+        self.dropped[at], self.dropped_half[at] = spp * bad, half_spp * bad
+        left_out = spp * int(bad.sum())
+        self.totals.dropped += left_out - block.dropped
+        block.spp, block.half_spp, block.dropped = spp, half_spp, left_out
 
     def _add_wave(self, at: tuple[slice, slice], color: np.ndarray, count: int, weight: Optional[np.ndarray],
                   good: np.ndarray) -> None:
