@@ -593,8 +593,11 @@ def test_resume():
     assert max(b.spp for b in more.frame.blocks) > 400
     other = lull.Driver(lull.Frame(lull.load("ggn", threads=1, visible=.9, passes=1), 32, 16, block=16), None)
     raises(lull.LullError, "run.npz: made with picture=32x32, but this render has picture=32x16", checkpoint.load, tmp("run.npz"), other)
-    Path(tmp("junk.npz")).write_bytes(b"junk")
-    raises(ValueError, "not a checkpoint", checkpoint.load, tmp("junk.npz"), start())
+    np.save(tmp("array.npy"), np.zeros(3))
+    saved, npy = (Path(tmp(name)).read_bytes() for name in ("run.npz", "array.npy"))
+    for at, damage in ((0, b"junk"), (saved.rindex(b"PK\1\2") + 6, b"\x82"), (saved.rindex(b"PK\1\2") + 10, b"\x63"), (0, npy)):  # a newer zip, packed otherwise
+        Path(tmp("junk.npz")).write_bytes(damage if at == 0 else saved[:at] + damage + saved[at + len(damage):])
+        raises(ValueError, "junk.npz: not a checkpoint", checkpoint.load, tmp("junk.npz"), start())
 
 
 def test_identity():
@@ -670,6 +673,8 @@ def test_exr():
     channels = {name: rng.random((37, 23)).astype(np.float32) for name in ("R", "G", "B", "lull.spp.V")}
     channels["lull.spp.V"][:] = 64
     exr.write(tmp("a.exr"), channels, (100, 90), (5, 6), {"lull:block": "16x16", "lull:samples": 3.})
+    exr.write(tmp("n.exr"), channels, (23, 37), attributes={"lull:scene": os.fsdecode(b"caf\xe9.blend")})  # a name that is not UTF-8
+    assert b"caf\xe9.blend" in Path(tmp("n.exr")).read_bytes()
     info = subprocess.run(["oiiotool", "--info", "-v", tmp("a.exr")], text=True, capture_output=True, check=True).stdout
     assert "100 x 90" in info and "pixel data origin: x=5, y=6" in info and "lull:block" in info and "lull.spp" in info, info
     subprocess.run(["oiiotool", tmp("a.exr"), "--compression", "none", "-d", "float", "-o", tmp("b.exr")], check=True)

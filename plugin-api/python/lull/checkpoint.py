@@ -53,7 +53,9 @@ def load(path: str, driver: Driver) -> None:
         with np.load(path, allow_pickle=False) as file:
             data = dict(file)
         saved, state = (data[name].tobytes() for name in _OWN)
-    except (ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except OSError:
+        raise
+    except Exception as error:  # numpy and zipfile name the same damage by many kinds
         raise ValueError(f"{path}: not a checkpoint: {error}") from None
     call("host_same_identity", saved, C.c_uint64(len(saved)), _identity(driver), os.fsencode(path))
     arrays = driver.frame.arrays()

@@ -43,7 +43,8 @@ def write(path: str, channels: Mapping[str, np.ndarray], size: tuple[int, int], 
     head += _attribute("screenWindowCenter", "v2f", struct.pack("<ff", 0, 0))
     head += _attribute("screenWindowWidth", "float", struct.pack("<f", 1))
     for name, value in (attributes or {}).items():
-        head += (_attribute(name, "string", value.encode()) if isinstance(value, str) else
+        # a file's name need not be UTF-8
+        head += (_attribute(name, "string", value.encode(errors="surrogateescape")) if isinstance(value, str) else
                  _attribute(name, "double", struct.pack("<d", value)))
     version = 2 | (_LONG_NAMES if any(len(n) > 31 for n in [*names, *(attributes or {})]) else 0)
     head = struct.pack("<II", _MAGIC, version) + head + b"\0"
