@@ -35,14 +35,15 @@ struct lull_oidn {
 
 /* --- the program ------------------------------------------------------------------------------------------------------- */
 
-/* The file that this code is in; a program that was found by PATH only knows its own name. 0: no telling. */
-static int own_file(char *path, size_t room)
+/* The file that this code is in, as it was loaded or what that links to; a program that was found by PATH only knows its
+ * own name. 0: no telling. */
+static int own_file(int resolved, char path[PATH_MAX])
 {
     static const char here;
     Dl_info info;
     if (dladdr(&here, &info) && info.dli_fname && strchr(info.dli_fname, '/'))
-        return snprintf(path, room, "%s", info.dli_fname) < (int)room;
-    ssize_t n = readlink("/proc/self/exe", path, room - 1);
+        return resolved ? realpath(info.dli_fname, path) != NULL : snprintf(path, PATH_MAX, "%s", info.dli_fname) < PATH_MAX;
+    ssize_t n = readlink("/proc/self/exe", path, PATH_MAX - 1);
     path[n > 0 ? n : 0] = '\0';
     return n > 0;
 }
@@ -52,11 +53,13 @@ static int find_program(struct lull_oidn *o, struct base_err *err)
 {
     static const char *const places[] = {"%.*s/../lib/lull/modules/lull-denoiser", "%.*s/modules/lull-denoiser"};
     char own[PATH_MAX];
-    const char *slash = own_file(own, sizeof own) ? strrchr(own, '/') : NULL;
-    for (size_t i = 0; slash && i < 2; i++) {
-        snprintf(o->program, sizeof o->program, places[i], (int)(slash - own), own);
-        if (access(o->program, X_OK) == 0)
-            return 0;
+    for (int resolved = 0; resolved < 2; resolved++) {
+        const char *slash = own_file(resolved, own) ? strrchr(own, '/') : NULL;
+        for (size_t i = 0; slash && i < 2; i++) {
+            snprintf(o->program, sizeof o->program, places[i], (int)(slash - own), own);
+            if (access(o->program, X_OK) == 0)
+                return 0;
+        }
     }
     return base_fail(err, BASE_EINVAL,
                      "no program lull-denoiser in lib/lull/modules: is this tree built, or installed, as a whole?");

@@ -147,17 +147,21 @@ static const char *beside_program(char path[LULL_PATH_MAX])
     return path;
 }
 
-/* lull beside the host library, if that is where this code is: a renderer is installed elsewhere. */
-static const char *beside_library(char path[LULL_PATH_MAX])
+/* lull beside the host library, if that is where this code is: a renderer is installed elsewhere. resolved: beside the file
+ * that the library's name links to. */
+static const char *beside_library(int resolved, char path[LULL_PATH_MAX])
 {
     static const char here, name[] = "/liblull-host.so", tail[] = "/lull";
     Dl_info info;
-    const char *slash = dladdr(&here, &info) != 0 && info.dli_fname ? strrchr(info.dli_fname, '/') : NULL;
-    if (!slash || strncmp(slash, name, strlen(name)) != 0 || (size_t)(slash - info.dli_fname) + sizeof tail > LULL_PATH_MAX)
-        return NULL;
-    memcpy(path, info.dli_fname, (size_t)(slash - info.dli_fname));
-    memcpy(path + (slash - info.dli_fname), tail, sizeof tail);
-    return path;
+    char *file = dladdr(&here, &info) != 0 && info.dli_fname ? realpath(info.dli_fname, NULL) : NULL;
+    const char *own = resolved || !file ? file : info.dli_fname, *slash = own ? strrchr(own, '/') : NULL;
+    int is_there = slash && strncmp(slash, name, strlen(name)) == 0 && (size_t)(slash - own) + sizeof tail <= LULL_PATH_MAX;
+    if (is_there) {
+        memcpy(path, own, (size_t)(slash - own));
+        memcpy(path + (slash - own), tail, sizeof tail);
+    }
+    free(file);
+    return is_there ? path : NULL;
 }
 
 /* Walks the directories of a search, entries joined by ':' one by one. */
@@ -168,11 +172,13 @@ struct dir_walk {
     char own[LULL_PATH_MAX];
 };
 
-enum { USUAL_ENTRIES = 3 };
+enum { USUAL_ENTRIES = 4 };
 
 static const char *usual_entry(struct dir_walk *walk, size_t index)
 {
-    return index == 0 ? getenv("LULL_PLUGIN_PATH") : index == 1 ? beside_program(walk->own) : beside_library(walk->own);
+    return index == 0   ? getenv("LULL_PLUGIN_PATH")
+           : index == 1 ? beside_program(walk->own)
+                        : beside_library(index == 3, walk->own);
 }
 
 static int next_dir(struct dir_walk *walk, char dir[LULL_PATH_MAX])

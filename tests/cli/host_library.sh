@@ -47,4 +47,6 @@ t "builds against an installed copy" sh -c "PKG_CONFIG_PATH=$tmp/usr/lib/pkgconf
 mkdir "$tmp/usr/lib/lull" && cp "$build/lib/lull/fixed.so" "$tmp/usr/lib/lull"
 t "finds the criteria that are installed beside it" sh -c "unset LULL_PLUGIN_PATH && LD_LIBRARY_PATH=$tmp/usr/lib $tmp/host fixed $tmp/s3.csv &&
     ! LD_LIBRARY_PATH=$tmp/usr/lib $tmp/host observer $tmp/s3.csv"
+mkdir "$tmp/far" && ln -s "$tmp/usr/lib/liblull-host.so.1" "$tmp/far"
+t "  …or beside the file that its name links to" sh -c "unset LULL_PLUGIN_PATH && LD_LIBRARY_PATH=$tmp/far $tmp/host fixed $tmp/s4.csv"
 echo "1..$n"

@@ -12,6 +12,8 @@ same() { oiiotool --fail 0 --warn 0 "$1" "$2" --diff; }
 
 "$P" $common --denoise -o blend.exr --preview blend.png --report r.json
 "$P" $common --denoise=full -o full.exr
+ln -s "$P" linked
+t "a link to the program is the program" sh -c "./linked $common --denoise -o linked.exr && cmp linked.exr blend.exr"
 t "layers: what is kept, the noisy and the denoised picture, the weight, both errors" test "$(layers blend.exr)" = \
     "B G R albedo.B albedo.G albedo.R denoised.B denoised.G denoised.R lull.error.V lull.noisy_error.V lull.p_noisy.V lull.reason.V lull.spp.V lull.weight.V noisy.B noisy.G noisy.R normal.X normal.Y normal.Z "
 plane full.exr R,G,B kept.exr && plane full.exr denoised.R,denoised.G,denoised.B denoised.exr

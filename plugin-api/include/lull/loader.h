@@ -25,7 +25,8 @@ extern "C" {
 struct lull_search {
     const char *const *dirs; /* each entry: one directory or several joined by ':'; NULL and "" are skipped; in order.
                               * dirs itself NULL: the usual ones, $LULL_PLUGIN_PATH, ../lib/lull from the folder of the
-                              * running program, and lull beside liblull-host.so, if this code is in there */
+                              * running program, and lull beside liblull-host.so, if this code is in there, or beside
+                              * what that links to */
     size_t dir_count;
     /* Told about libraries that are skipped and about side effects of loading; level is LULL_LOG_; may be NULL. */
     void (*log)(void *context, int32_t level, const char *text);
