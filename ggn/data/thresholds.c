@@ -89,7 +89,7 @@ int ggn_thresholds_parse_csv(const char *path, char *text, struct ggn_thresholds
 {
     struct ggn_thresholds t = {0};
     int rc = 0, number = 0;
-    for (char *line = text, *next; line && !rc; line = next) {
+    for (char *line = text + base_utf8_mark(text, strlen(text)), *next; line && !rc; line = next) {
         next = strchr(line, '\n');
         if (next)
             *next++ = '\0';

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/files.h"
+#include "base/text.h"
 
 enum { TRIAL_BLOCKS = 256 };
 
@@ -24,7 +25,7 @@ static int parse_trials(const char *path, char *text, struct trial **out, int *c
     *skipped = 0;
     if (!t)
         return base_fail_nomem(err, path);
-    for (char *line = text, *next; line && *line != '\0'; line = next) {
+    for (char *line = text + base_utf8_mark(text, strlen(text)), *next; line && *line != '\0'; line = next) {
         char *end = line;
         next = strchr(line, '\n');
         if (next)

@@ -9,6 +9,7 @@
 #include "base/files.h"
 #include "base/list.h"
 #include "base/options.h"
+#include "base/text.h"
 #include "render/checkpoint.h"
 #include "render/output.h"
 #include "scene/arena.h"
@@ -96,7 +97,7 @@ static int parse_line(const char *name, const char *begin, size_t length, size_t
 
 int pt_shot_parse_path(const char *name, const char *text, size_t size, struct pt_shot *s, struct base_err *err)
 {
-    const char *end = text + size, *at = text;
+    const char *end = text + size, *at = text + base_utf8_mark(text, size);
     size_t lines = 1, room = 0;
     for (const char *p = text; p < end; p++)
         lines += *p == '\n';

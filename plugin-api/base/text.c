@@ -31,6 +31,12 @@ void base_utf8_mend(char *s)
     }
 }
 
+size_t base_utf8_mark(const char *text, size_t size)
+{
+    static const char mark[] = "\xef\xbb\xbf";
+    return size >= 3 && memcmp(text, mark, 3) == 0 ? 3 : 0;
+}
+
 void base_view_name(const char *path, char *name, size_t room)
 {
     const char *at = base_file_name(path), *dot = strrchr(at, '.');

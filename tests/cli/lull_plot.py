@@ -147,6 +147,8 @@ def test_regression():
 def test_blocks():
     """bars, maps and points are the blocks'; of those at the cap there is no point"""
     blocks = read("blocks.csv")
+    write("marked.csv", "\ufeff" + BLOCKS)  # by a spreadsheet of Windows
+    assert read("marked.csv").rows == blocks.rows
     bars = {round(4 * (p.get_x() + p.get_width() / 2)): p.get_height() for p in kinds.histogram(blocks, ANYTHING).axes[0].patches}
     assert bars == {0: 1, 4: 1, -4: 1, 16: 1}, bars
     shown = [axes.images[0].get_array().filled(-1).tolist() for axes in kinds.maps(blocks, ANYTHING).axes[:2]]

@@ -14,12 +14,15 @@
 
 static void a_view_is_listed_once(void **state)
 {
-    char once[] = "a;1;\n# a;2;\nb;2;3;\n", twice[] = "a;1;\nb;2;\na;3;\n";
+    char once[] = "\xef\xbb\xbf" /* which is no part of the first name */
+                  "a;1;\n# a;2;\nb;2;3;\n",
+         twice[] = "a;1;\nb;2;\na;3;\n";
     struct ggn_thresholds t;
     struct base_err err = {0};
     (void)state;
     assert_int_equal(ggn_thresholds_parse_csv("t.csv", once, &t, &err), 0);
     assert_int_equal(t.n, 2);
+    assert_non_null(ggn_thresholds_find(&t, "a"));
     ggn_thresholds_release(&t);
     assert_int_equal(ggn_thresholds_parse_csv("t.csv", twice, &t, &err), BASE_EINVAL);
     assert_string_equal(err.text, "t.csv: view 'a' appears twice");

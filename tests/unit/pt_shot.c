@@ -109,7 +109,8 @@ static void no_two_frames_have_one_seed(void **state)
 
 static void paths_of_the_camera(void **state)
 {
-    static const char good[] = "frame;eye;at;up;fov\r\n3;0 1 5;0 0 0;0 1 0;45\n10; 1 1 5 ; 0 0 0;0 1 0;\n";
+    static const char good[] = "\xef\xbb\xbf" /* as spreadsheets of Windows write it */
+                               "frame;eye;at;up;fov\r\n3;0 1 5;0 0 0;0 1 0;45\n10; 1 1 5 ; 0 0 0;0 1 0;\n";
     static const char *const bad[][2] = {
         {"", "expected frame;eye;at;up;fov"},
         {"frame;eye;at;up;fov\n", "a line for each frame"},

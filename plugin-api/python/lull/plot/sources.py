@@ -2,6 +2,7 @@
 """The files that pictures are drawn from, as they are read: no matplotlib here."""
 from __future__ import annotations
 
+import codecs
 import csv
 import math
 from typing import Any, NamedTuple, Optional, Sequence
@@ -135,6 +136,7 @@ class Cost:
 def read(path: str) -> Any:
     """A Table, an Evaluation or a Cost; Refused when it is none of them."""
     data = read_file(path, MOST_BYTES)
+    data = data[len(codecs.BOM_UTF8):] if data.startswith(codecs.BOM_UTF8) else data  # of a program of Windows
     source: Any = None
     try:
         if data.lstrip()[:1] == b"{":
