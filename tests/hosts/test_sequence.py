@@ -98,7 +98,8 @@ def test_light():
         write_layers(f"{view}/b.{n:04d}.exr", all=mean)
     ggn("import", "exr", "-o", "data-exr", "-b", SIDE)
     levels = [Level(n, mean) for n, mean, _ in pictures()]
-    sequence.write("written-exr/b", levels, scene="b", block=SIDE, reference=levels[-1])
+    counts = [Level(np.int64(level.spp), level.mean, level.first_half, level.display) for level in levels]  # as np.geomspace gives them
+    sequence.write("written-exr/b", counts, scene="b", block=np.uint16(SIDE), seed=np.uint64(0), reference=counts[-1])
     assert blocks("written-exr/b") == blocks("data-exr/b")
 
 
@@ -163,6 +164,14 @@ def test_refused():
     for text, levels in (("0 levels", []), ("8 spp: levels rise", [Level(8, mean), Level(8, mean)]), ("not finite", [Level(4, bad)]),
                          ("another size", [Level(4, mean), Level(8, mean[:8])]), ("half of one sample", [Level(1, mean, first)])):
         raises(ValueError, text, sequence.write, "refused", levels, scene="x")
+    levels, big = [Level(8, mean)], 1 << 64
+    for error, text, words in ((ValueError, "the scene has no name", {"scene": ""}), (ValueError, "scene 5: expected text", {"scene": 5}),
+                               (ValueError, "expected text", {"source": os.fsdecode(b"caf\xe9.exr")}),
+                               (ValueError, f"seed {big}", {"seed": big}), (ValueError, "seed -1", {"reference_seed": -1}), (TypeError, "block 8.0", {"block": 8.})):
+        raises(error, text, sequence.write, "refused", levels, **{"scene": "x", **words})
+    raises(TypeError, "spp 8.0", sequence.write, "refused", [Level(8., mean)], scene="x")
+    raises(ValueError, "not [0, ", sequence.write, "refused", [Level(8, mean[:0])], scene="x")
+    raises(TypeError, "fill its holes", sequence.write, "refused", [Level(8, np.ma.masked_array(mean, mean > 1))], scene="x")
     assert not os.path.exists("refused")
     data = next(iter(blocks(f"{RECORDED}/train/one-view0").values()))
     for cut in (b"", data[:50], data[:-1], data + b"x", data[:300] + bytes([data[300] ^ 1]) + data[301:]):

@@ -14,18 +14,19 @@ import json
 import os
 import struct
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Sequence
 
 import numpy as np
 
+from . import limits
 from .files import LUMINANCE, replaced, srgb
 
 MAGIC, FILE_HEADER, RECORD_HEADER, PLANE_HEADER = b"LULLSEQ1", 64, 32, 16
 LEVEL, REFERENCE = 1, 2
 DISPLAY, FINE, HALF_LOG, MEAN_F16, HALF_F16 = 1, 2, 3, 4, 5
 SHUFFLE, AVERAGE, GREEN = 1, 2, 4
-MAX_SIDE, MAX_RECORDS, FULL_SPP = 4096, 4096, 320
+MAX_RECORDS, FULL_SPP = 4096, 320
 
 
 @dataclass
@@ -229,11 +230,11 @@ def _record(level: Level, box: tuple[int, int, int, int], full: bool, kind: int)
 def _check(levels: Sequence[Level], reference: Level | None) -> tuple[int, int]:
     _need(0 < len(levels) < MAX_RECORDS, f"{len(levels)} levels")
     shape = np.shape(levels[0].display if levels[0].mean is None else levels[0].mean)
-    _need(len(shape) == 3 and shape[2] >= 3, f"pictures are [height, width, 3], not {list(shape)}")
+    _need(len(shape) == 3 and min(shape[:2]) > 0 and shape[2] >= 3, f"pictures are [height, width, 3], not {list(shape)}")
     for before, level in zip([None, *levels], levels):
         _need(level.spp > (before.spp if before else 0), f"{level.spp} spp: levels rise")
     for level in [*levels, *([reference] if reference else [])]:
-        given = [p for p in (level.mean, level.first_half, level.display) if p is not None]
+        given = [limits.unmasked("a picture", p) for p in (level.mean, level.first_half, level.display) if p is not None]
         _need(level.mean is not None or (level.display is not None and level.first_half is None),
               f"{level.spp} spp: a mean, or codes without halves")
         _need(all(np.shape(p) == shape for p in given), f"{level.spp} spp: pictures of another size")
@@ -247,9 +248,16 @@ def write(folder: str, levels: Sequence[Level], *, scene: str, block: int = 200,
           reference_seed: int | None = None) -> None:
     """Writes a sequence of whole pictures as block files and manifest.json into `folder`, which is made. Views with the
     same `scene` are on the same side of a split. reference: of many samples; without a reference_seed of its own it
-    shares its samples with the levels. ValueError and OSError, one line; each file is whole or not there."""
+    shares its samples with the levels. TypeError, ValueError and OSError, one line, the first two before anything is
+    written; each file is whole or not there."""
+    for name, text in (("scene", scene), ("camera", camera), ("source", source), ("renderer", renderer)):
+        _need(isinstance(text, str) and text == text.encode(errors="replace").decode(), f"{name} {text!r}: expected text")
+    _need(scene != "", "the scene has no name")
+    levels = [replace(level, spp=limits.checked("spp", level.spp)) for level in levels]  # numbers of numpy are none to JSON
+    reference = reference and replace(reference, spp=limits.checked("spp", reference.spp))
+    block, seed = limits.checked("block", block), limits.checked("seed", seed)
+    reference_seed = None if reference_seed is None else limits.checked("seed", reference_seed)
     width, height = _check(levels, reference)
-    _need(0 < block <= MAX_SIDE, f"blocks of {block} pixels")
     os.makedirs(folder, exist_ok=True)
     full = next((i for i, level in enumerate(levels) if level.spp >= FULL_SPP), len(levels) - 1)
     halves = levels[full].first_half is not None
