@@ -911,6 +911,9 @@ def test_weights():
     raises(ValueError, "alpha", lull.Frame, lull.load("halfbuf"), 8, 8, layers=["alpha", "alpha"])
     for name in ("R", "color", "", "lull.spp"):
         raises(ValueError, "layer", lull.Frame, lull.load("halfbuf"), 8, 8, layers=[name])
+    for name in ("a\0b", "é" * 128, "caf\udce9"):  # which would make an EXR that nobody can read
+        raises(ValueError, "expected a name of 1 to 255 bytes", lull.Frame, lull.load("halfbuf"), 8, 8, layers=[name])
+        raises(ValueError, "expected a name of 1 to 255 bytes", exr.write, tmp("name.exr"), {name: np.zeros((8, 8))}, (8, 8))
     result = run(host=lambda rects, *_: [np.zeros((16, 16, 3))], sigmas=[[0.]], weighted=True)[0]
     assert "no plane weight" in str(result.exception)
 

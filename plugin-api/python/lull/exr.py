@@ -15,6 +15,13 @@ _LINES = 16  # of a ZIP chunk
 _TYPES = ("<u4", "<f2", "<f4")  # by pixel type
 
 
+def check_name(name: str) -> None:
+    """ValueError for a channel's name that makes a file nobody can read."""
+    data = name.encode(errors="replace")
+    if not 0 < len(data) < 256 or b"\0" in data or data.decode() != name:
+        raise ValueError(f"channel {name!r}: expected a name of 1 to 255 bytes of UTF-8 without a NUL")
+
+
 def _attribute(name: str, kind: str, data: bytes) -> bytes:
     return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<I", len(data)) + data
 
@@ -33,6 +40,8 @@ def write(path: str, channels: Mapping[str, np.ndarray], size: tuple[int, int], 
     """channels: by name ("R", "lull.spp"), each [h, w], stored as float32. size: (width, height) of the whole picture;
     origin: where the upper left stored pixel lies in it. Attributes are text or numbers."""
     names = sorted(channels)
+    for name in names:
+        check_name(name)
     height, width = channels[names[0]].shape
     x0, y0 = origin
     listed = b"".join(n.encode() + b"\0" + struct.pack("<iiii", _TYPES.index("<f4"), 0, 1, 1) for n in names) + b"\0"

@@ -9,7 +9,7 @@ from typing import Any, Callable, Mapping, Optional, Sequence, Union
 import numpy as np
 import numpy.typing as npt
 
-from . import abi, limits
+from . import abi, exr, limits
 from .criterion import CHANNELS, Criterion, Plane, Rect, plane_names
 from .files import LUMINANCE, srgb_decoded
 from .host import Block, HostFrame
@@ -264,6 +264,8 @@ def _layers(names: Sequence[str]) -> tuple[str, ...]:
     taken = {*CHANNELS, "R", "G", "B"}
     if wrong := [n for n in names if not isinstance(n, str) or not n or n in taken or n.startswith("lull.")]:
         raise ValueError(f"layer {wrong[0]!r}: expected a name that is none of {', '.join(sorted(taken))} and not of lull.")
+    for name in names:
+        exr.check_name(name)
     if len(set(names)) < len(names):
         raise ValueError(f"layers {', '.join(names)}: expected each name once")
     return tuple(names)
