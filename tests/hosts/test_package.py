@@ -548,6 +548,14 @@ def test_put_and_weights_not_finite():
     f.put(b, {"color": mean, "albedo": mean}, 48, mean, 24)
     assert (f.spp() == 48).all() and np.allclose(f.mean(), mean, rtol=1e-12) and b.dropped == f.totals.dropped == 0
     assert (f.waves == np.where(wrong, 0, 3)).all(), f.waves  # what came after a hole cannot be told from what is in it
+    was = copy.deepcopy(f.arrays())
+    for error, text, call in ((ValueError, "count -1", lambda: f.add(b, {"color": mean, "albedo": mean}, -1, True)),
+                              (TypeError, "count 1.5", lambda: f.add(b, {"color": mean, "albedo": mean}, 1.5, True)),
+                              (ValueError, "count -1", lambda: f.put(b, {"color": mean, "albedo": mean}, -1, mean, 0)),
+                              (TypeError, "count 8.0", lambda: f.put(b, {"color": mean, "albedo": mean}, 64, mean, 8.)),
+                              (ValueError, "half_spp 9", lambda: f.put(b, {"color": mean, "albedo": mean}, 8, mean, 9))):
+        raises(error, text, call)
+        assert b.spp == 48 and all((now == was[name]).all() for name, now in f.arrays().items()), text
     for value in (np.nan, np.inf):
         f, weight = lull.Frame(lull.load("observer"), 16, 16, block=16, weighted=True), np.ones((16, 16))
         f.add(f.blocks[0], {"color": mean, "weight": weight}, 16, True)

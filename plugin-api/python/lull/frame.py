@@ -62,7 +62,7 @@ class Frame(HostFrame):
         [h, w]). half: they belong to half A; which samples do must not depend on their values. Bad input (TypeError,
         ValueError) changes nothing. A pixel whose color or weight is not finite leaves these samples out.
         """
-        parts = self._parts(block, sample)
+        count, parts = limits.checked("count", count), self._parts(block, sample)
         at = self._slices(block.rect)
         bad = ~np.isfinite(parts["color"]).all(-1)
         if self.weights:
@@ -89,9 +89,12 @@ class Frame(HostFrame):
     def put(self, block: Block, mean: Sample, spp: int, half: Optional[np.ndarray] = None, half_spp: int = 0) -> None:
         """Replaces what is known of one block, for a host that accumulates itself: the mean of all its samples (as in add)
         and, if the criterion reads half buffers, the mean of the half_spp of them that are in half A, [h, w, 3]. A pixel
-        that is not finite in either has no samples until it is put again."""
+        that is not finite in either has no samples until it is put again. Bad input changes nothing."""
         if self.weights:
             raise ValueError("a weighted frame takes its samples by add")
+        spp, half_spp = limits.checked("count", spp), limits.checked("count", half_spp)
+        if half_spp > spp:
+            raise ValueError(f"half_spp {half_spp}: expected at most the {spp} of spp")
         parts, at = self._parts(block, mean), self._slices(block.rect)
         if "half" in self.sums:
             if half is None:
