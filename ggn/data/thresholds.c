@@ -170,6 +170,15 @@ out:
     return rc;
 }
 
+/* Where the first pixel lies in its block: blocks are those of the whole picture, of which the file may hold a crop. */
+static void find_corner(const char *path, const struct pic_image *image, int block, int *left, int *top)
+{
+    struct pic_window w;
+    int found = pic_read_header(path, &w, NULL, 0, NULL) == 0 && w.x1 - w.x0 == image->width && w.y1 - w.y0 == image->height;
+    *left = found ? w.x0 % block : 0;
+    *top = found ? w.y0 % block : 0;
+}
+
 /* One value per block: the largest in the block (a block is one value; the largest forgives borders that are filtered). */
 static int read_exr(const char *path, int block, struct ggn_thresholds *out, struct base_err *err)
 {
@@ -178,7 +187,9 @@ static int read_exr(const char *path, int block, struct ggn_thresholds *out, str
     int rc = pic_read_channel(path, "lull.spp.V", &image, err);
     if (rc)
         return rc;
-    long columns = (image.width + block - 1) / block, rows = (image.height + block - 1) / block;
+    int left, top;
+    find_corner(path, &image, block, &left, &top);
+    long columns = (left + image.width + block - 1L) / block, rows = (top + image.height + block - 1L) / block;
     if (columns * rows > GGN_VIEW_BLOCKS) {
         rc = base_fail(err, BASE_EINVAL, "%s: %ld blocks of %d pixels", path, columns * rows, block);
         goto out;
@@ -192,7 +203,7 @@ static int read_exr(const char *path, int block, struct ggn_thresholds *out, str
     v->unnamed = 1;
     for (int y = 0; y < image.height; y++)
         for (int x = 0; x < image.width; x++) {
-            double *s = &v->spp[y / block * columns + x / block];
+            double *s = &v->spp[(top + y) / block * columns + (left + x) / block];
             double value = (double)image.f32[(size_t)y * (size_t)image.width + (size_t)x];
             if (!(*s >= value))
                 *s = value;

@@ -35,6 +35,10 @@ oiiotool --pattern constant:color=300 8x4 1 --chnames lull.spp.V -d float -o "$t
     printf 'map.exr;100;600;\n' >"$tmp/e.csv" && $ggn compare "$tmp/e.csv" "$tmp/map.exr" -b 4 --json >"$tmp/out" 2>"$tmp/err" &&
     grep -q '"blocks": 2,' "$tmp/out" && grep -q '"samples_ratio": 0.857143' "$tmp/out"
 check "EXR stop map" $?
+oiiotool --create 8x8 1 --chnames lull.spp.V --fill:color=300 8x8+0+0 --fill:color=100 4x8+0+0 --fill:color=700 8x1+0+4 --crop 5x3+3+2 -d float \
+    -o "$tmp/crop.exr" >"$tmp/err" 2>&1 && $ggn thresholds -b 4 "$tmp/crop.exr" >"$tmp/out" 2>"$tmp/err" &&
+    [ "$(tr -d '\n\t ' <"$tmp/out" | grep -o '"columns":2,"spp":.*')" = '"columns":2,"spp":[100,300,700,700]}]]' ]
+check "  …of a crop, whose blocks are those of the whole picture" $?
 printf 'room;100;600;\n' >"$tmp/room.csv"
 $ggn compare "$tmp/room.csv" "$tmp/map.exr" -b 4 >"$tmp/out" 2>"$tmp/err" && grep -qx "'room' against 'map.exr'" "$tmp/out"
 check "an EXR has no name: it goes with a single view" $?
