@@ -193,9 +193,9 @@ static void services(void **state)
     const struct lull_host *alone = &few->host, *many = &busy->host;
     assert_true(alone->max_workers == 1 && many->max_workers == 3);
     assert_string_equal(alone->name, "lull-render " BASE_VERSION);
-    alone->log(alone, LULL_LOG_INFO, "psst");
+    alone->log(alone, LULL_LOG_DEBUG, "psst");
     assert_string_equal(messages.text, "");
-    alone->log(alone, LULL_LOG_WARNING, "mind the gap");
+    alone->log(alone, LULL_LOG_INFO, "mind the gap");
     assert_string_equal(messages.text, "criterion fake: mind the gap\n");
     many->log(many, LULL_LOG_ERROR, "nobody hears it");
     capture_end(&messages);
