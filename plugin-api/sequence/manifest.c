@@ -124,22 +124,28 @@ static int get_view(const char *path, const cJSON *root, struct seq_manifest *m,
     return 0;
 }
 
+/* The nearest to it that JSON's numbers have: seeds of other programs reach 2^64. */
+static uint64_t get_seed(const cJSON *root, const char *name)
+{
+    double seed = 0;
+    base_json_get_whole(root, name, 0, 0x1p64, &seed);
+    return seed < 0x1p64 ? (uint64_t)seed : UINT64_MAX;
+}
+
 static int get_sizes(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
 {
-    double width, height, block, spp = 0, seed = 0, reference_seed = 0;
+    double width, height, block, spp = 0;
     if (!base_json_get_whole(root, "width", 1, 1 << 20, &width) ||
         !base_json_get_whole(root, "height", 1, 1 << 20, &height) ||
         !base_json_get_whole(root, "block", 1, SEQ_MAX_SIDE, &block))
         return base_fail(err, BASE_EINVAL, "%s: width, height or block is missing or out of range", path);
     base_json_get_whole(root, "reference_spp", 0, MAX_SPP, &spp);
-    base_json_get_whole(root, "seed", 0, 9007199254740992.0, &seed);
-    base_json_get_whole(root, "reference_seed", 0, 9007199254740992.0, &reference_seed);
     m->width = (uint32_t)width;
     m->height = (uint32_t)height;
     m->block = (uint32_t)block;
     m->reference_spp = (uint32_t)spp;
-    m->seed = (uint64_t)seed;
-    m->reference_seed = (uint64_t)reference_seed;
+    m->seed = get_seed(root, "seed");
+    m->reference_seed = get_seed(root, "reference_seed");
     m->reference_independent = !cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(root, "reference_independent"));
     return 0;
 }

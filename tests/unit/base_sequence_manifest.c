@@ -148,6 +148,8 @@ static void manifests_word_for_word(void **state)
         m.look_at[i] = i + 0.5;
     m.fov_deg = 33.25;
     m.reference_independent = 0;
+    m.seed = UINT64_C(1) << 60; /* of another program */
+    m.reference_seed = UINT64_MAX;
     m.n_blocks = 2;
     m.blocks = list;
     assert_int_equal(seq_manifest_write(made_dir, &m, &err), 0);
@@ -157,7 +159,8 @@ static void manifests_word_for_word(void **state)
         "\t\"source_crc32\":\t\"00000012\",\n\t\"inputs_crc32\":\t\"00000345\",\n\t\"camera\":\t\"view0\",\n"
         "\t\"look_at\":\t[0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5, "
         "8.5],\n\t\"fov\":\t33.25,\n\t\"renderer\":\t\"r\",\n\t\"width\":\t64,\n"
-        "\t\"height\":\t48,\n\t\"block\":\t16,\n\t\"seed\":\t1,\n\t\"reference_seed\":\t2,\n\t\"reference_spp\":\t9,\n"
+        "\t\"height\":\t48,\n\t\"block\":\t16,\n\t\"seed\":\t1.152921504606847e+18,\n\t\"reference_seed\":\t1."
+        "8446744073709552e+19,\n\t\"reference_spp\":\t9,\n"
         "\t\"reference_independent\":\tfalse,\n\t\"levels\":\t[20, "
         "40],\n\t\"blocks\":\t[{\n\t\t\t\"id\":\t3,\n\t\t\t\"x0\":\t16,\n\t\t\t\"y0\":\t0,\n"
         "\t\t\t\"x1\":\t32,\n\t\t\t\"y1\":\t16,\n\t\t\t\"file\":\t\"block-00003.lseq\",\n\t\t\t\"bytes\":\t1234,"
@@ -169,6 +172,7 @@ static void manifests_word_for_word(void **state)
         "\n");
     assert_int_equal(seq_manifest_read(made_dir, &back, &err), 0);
     assert_string_equal(back.source, "a/s.pbrt");
+    assert_true(back.seed == m.seed && back.reference_seed == m.reference_seed);
     assert_true(back.n_blocks == 2 && same_block(&back.blocks[0], &list[0]) && same_block(&back.blocks[1], &list[1]));
     seq_manifest_release(&back);
     assert_true(back.n_blocks == 0 && !back.blocks && !back.levels);
