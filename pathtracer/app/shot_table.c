@@ -6,7 +6,7 @@
 
 #include "base/files.h"
 
-static const char FIRST_LINE[] = "lull-shot-table 1\n";
+static const char FIRST_LINE[] = "lull-shot-table 1";
 enum { MAX_BYTES = 1 << 28 };
 
 static int bad(const char *name, size_t line, const char *what, struct base_err *err)
@@ -14,7 +14,14 @@ static int bad(const char *name, size_t line, const char *what, struct base_err 
     return base_fail(err, BASE_EINVAL, "%s:%zu: expected %s", name, line, what);
 }
 
-/* An integer in [low, high] and the character behind it, which is passed. */
+/* Bytes of the line end at p: 0 where there is none. Programs of Windows write two. */
+static size_t line_end(const char *p, const char *end)
+{
+    size_t n = p < end && *p == '\r';
+    return p + n < end && p[n] == '\n' ? n + 1 : 0;
+}
+
+/* An integer in [low, high] and the character behind it, which is passed; '\n' for any line end. */
 static int take(const char **at, const char *end, int64_t low, int64_t high, char *behind, int64_t *out)
 {
     int64_t value = 0;
@@ -24,9 +31,10 @@ static int take(const char **at, const char *end, int64_t low, int64_t high, cha
             return 0;
     if (p == *at || p == end || value < low)
         return 0;
+    size_t line = line_end(p, end);
     *out = value;
-    *behind = *p;
-    *at = p + 1;
+    *behind = line ? '\n' : *p;
+    *at = p + (line ? line : 1);
     return 1;
 }
 
@@ -62,12 +70,13 @@ int pt_shot_table_parse(const char *name, const char *text, size_t size, struct 
     const size_t first = sizeof FIRST_LINE - 1;
     const char *end = text + size, *at = text + first;
     *t = (struct pt_shot_table){0};
-    if (size < first || memcmp(text, FIRST_LINE, first) != 0)
+    if (size < first || memcmp(text, FIRST_LINE, first) != 0 || line_end(at, end) == 0)
         return bad(name, 1, "lull-shot-table 1 (made by --plan-shot)", err);
+    at += line_end(at, end);
     const char *newline = memchr(at, '\n', (size_t)(end - at));
     if (!newline || newline - at >= PT_SHOT_GRID || memchr(at, '\0', (size_t)(newline - at)))
         return bad(name, 2, "size, crop and block of the frames", err);
-    memcpy(t->grid, at, (size_t)(newline - at));
+    memcpy(t->grid, at, (size_t)(newline - at) - (newline > at && newline[-1] == '\r'));
     at = newline + 1;
     size_t lines = count_in(at, end, '\n'), longest = count_in(at, end, ';');
     newline = lines ? memchr(at, '\n', (size_t)(end - at)) : at;
@@ -105,7 +114,7 @@ int pt_shot_table_write(const char *path, const struct pt_shot_table *t, struct 
     int rc = base_file_begin(&out, path, err);
     if (rc)
         return rc;
-    fprintf(out.file, "%s%s\n", FIRST_LINE, t->grid);
+    fprintf(out.file, "%s\n%s\n", FIRST_LINE, t->grid);
     for (size_t f = 0; f < t->frame_count; f++) {
         fprintf(out.file, "%d", t->frames[f]);
         for (size_t i = 0; i < t->block_count; i++)

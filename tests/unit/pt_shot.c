@@ -195,6 +195,23 @@ static void tables_come_back(void **state)
     unlink(path);
 }
 
+static void tables_with_ends_of_windows(void **state)
+{
+    char text[2 * sizeof table_text], *to = text;
+    struct pt_shot_table t, plain;
+    (void)state;
+    for (const char *from = table_text; *from != '\0'; *to++ = *from++)
+        if (*from == '\n')
+            *to++ = '\r';
+    assert_int_equal(pt_shot_table_parse("t", text, (size_t)(to - text), &t, NULL), 0);
+    assert_int_equal(pt_shot_table_parse("t", table_text, sizeof table_text - 1, &plain, NULL), 0);
+    assert_string_equal(t.grid, plain.grid);
+    assert_int_equal(pt_shot_table_frame(&t, 12)[1], pt_shot_table_frame(&plain, 12)[1]);
+    assert_int_equal(t.frame_count, plain.frame_count);
+    pt_shot_table_release(&t);
+    pt_shot_table_release(&plain);
+}
+
 static void bad_tables_are_one_line(void **state)
 {
     static const struct {
@@ -242,6 +259,7 @@ int main(void)
         cmocka_unit_test(paths_of_the_camera),
         cmocka_unit_test(needs_between_pilots),
         cmocka_unit_test(tables_come_back),
+        cmocka_unit_test(tables_with_ends_of_windows),
         cmocka_unit_test(bad_tables_are_one_line),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
