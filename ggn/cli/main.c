@@ -24,9 +24,20 @@ struct job *ggn_cmd_job;
 
 static char last_words[512]; /* what a process other than rank 0 would have said */
 
+/* Is this a crop, and where does it begin in its picture? */
+static int crop_corner(const char *path, int corner[2])
+{
+    struct pic_window w;
+    if (pic_read_header(path, &w, NULL, 0, NULL) != 0)
+        return 0;
+    corner[0] = w.x0;
+    corner[1] = w.y0;
+    return w.x1 - w.x0 < w.width || w.y1 - w.y0 < w.height;
+}
+
 int ggn_cmd_read_pair(const char *command, const char *const paths[2], struct pic_image images[2], struct base_err *err)
 {
-    int rc = 0;
+    int rc = 0, at[2][2];
     for (int i = 0; i < 2 && !rc; i++)
         rc = pic_read_display(paths[i], &images[i], err);
     for (int i = 0; i < 2 && !rc; i++)
@@ -36,6 +47,9 @@ int ggn_cmd_read_pair(const char *command, const char *const paths[2], struct pi
     if (!rc && (images[0].width != images[1].width || images[0].height != images[1].height))
         rc = base_fail(err, BASE_EINVAL, "%s is %dx%d, %s is %dx%d: the sizes must be equal", paths[0], images[0].width,
                        images[0].height, paths[1], images[1].width, images[1].height);
+    if (!rc && crop_corner(paths[0], at[0]) && crop_corner(paths[1], at[1]) && memcmp(at[0], at[1], sizeof at[0]) != 0)
+        rc = base_fail(err, BASE_EINVAL, "%s begins at pixel %d,%d, %s at %d,%d: crops must show the same pixels", paths[0],
+                       at[0][0], at[0][1], paths[1], at[1][0], at[1][1]);
     return rc;
 }
 

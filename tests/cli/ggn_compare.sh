@@ -63,6 +63,11 @@ $ggn flip "$tmp/a.png" "$tmp/a.png" --json -o "$tmp/map.png" >"$tmp/out" 2>"$tmp
 check "flip of equal images is 0" $?
 fails "flip: sizes differ" 'sizes must be equal' $ggn flip "$tmp/a.png" "$tmp/b.png"
 head -c 100 "$tmp/a.png" >"$tmp/cut.png"
+oiiotool "$tmp/a.png" --crop 8x8+0+4 -d float -o "$tmp/one.exr" "$tmp/a.png" --crop 8x8+12+4 -d float -o "$tmp/other.exr" \
+    "$tmp/a.png" --cut 8x8+12+4 -d float -o "$tmp/cut.exr" >/dev/null 2>&1
+fails "flip: crops at two places" 'one.exr begins at pixel 0,4, .*other.exr at 12,4: crops must show the same' $ggn flip "$tmp/one.exr" "$tmp/other.exr"
+$ggn flip "$tmp/other.exr" "$tmp/other.exr" >/dev/null 2>&1 && $ggn flip "$tmp/other.exr" "$tmp/cut.exr" --json 2>&1 | grep -q '"max": 0.000000'
+check "  …but not a crop and a picture of its own" $?
 fails "flip: truncated image" 'cut.png' $ggn flip "$tmp/a.png" "$tmp/cut.png"
 fails "flip: not an image" 'm.csv' $ggn flip "$tmp/a.png" "$tmp/m.csv"
 $ggn flip "$tmp/a.png" "$tmp/a.png" -o "$tmp/nodir/map.png" >"$tmp/out" 2>"$tmp/err"; [ $? -ne 0 ] && [ -s "$tmp/err" ]
