@@ -548,8 +548,12 @@ def test_put_and_weights_not_finite():
     f.put(b, {"color": mean, "albedo": mean}, 48, mean, 24)
     assert (f.spp() == 48).all() and np.allclose(f.mean(), mean, rtol=1e-12) and b.dropped == f.totals.dropped == 0
     assert (f.waves == np.where(wrong, 0, 3)).all(), f.waves  # what came after a hole cannot be told from what is in it
-    was = copy.deepcopy(f.arrays())
-    for error, text, call in ((ValueError, "count -1", lambda: f.add(b, {"color": mean, "albedo": mean}, -1, True)),
+    was, other = copy.deepcopy(f.arrays()), lull.Frame(lull.load("observer"), 16, 16, block=16).blocks[0]
+    for error, text, call in ((ValueError, "another frame's", lambda: f.add(other, {"color": mean, "albedo": mean}, 16, True)),
+                              (ValueError, "another frame's", lambda: f.put(other, {"color": mean, "albedo": mean}, 16, mean, 8)),
+                              (TypeError, "reason 'time'", lambda: f.stop("time")),
+                              (lull.LullError, "reason 99", lambda: f.stop(99)),
+                              (ValueError, "count -1", lambda: f.add(b, {"color": mean, "albedo": mean}, -1, True)),
                               (TypeError, "count 1.5", lambda: f.add(b, {"color": mean, "albedo": mean}, 1.5, True)),
                               (ValueError, "count -1", lambda: f.put(b, {"color": mean, "albedo": mean}, -1, mean, 0)),
                               (TypeError, "count 8.0", lambda: f.put(b, {"color": mean, "albedo": mean}, 64, mean, 8.)),

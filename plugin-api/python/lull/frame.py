@@ -128,6 +128,8 @@ class Frame(HostFrame):
 
     def _parts(self, block: Block, sample: Sample) -> dict[str, np.ndarray]:
         """The planes of a host's sample, checked, in double precision."""
+        if block.frame is not self.handle:
+            raise ValueError(f"block {block.id} is another frame's")
         given = sample if isinstance(sample, Mapping) else {"color": sample}
         made = {"half"} | ({"moment2"} if self.waves is not None else set())
         wanted = [name for name in self.sums if name not in made] + ["weight"] * bool(self.weights)

@@ -213,7 +213,7 @@ class HostFrame:
     def stop(self, reason: int, planes: Optional[Mapping[str, Plane]] = None) -> None:
         """Closes the active blocks (reason: abi.REASON_TIME or REASON_INTERRUPT); the criterion is asked once more about
         them, for the report."""
-        view = self.view_of(planes)
+        reason, view = limits.checked("reason", reason), self.view_of(planes)
         with self._asking():
             call("host_stop", self.handle.pointer, reason, C.byref(view))
 
