@@ -388,6 +388,13 @@ cost: all ## measure what accuracy costs each criterion, from recordings in data
 train-demo: all ## train a tiny model on a tiny bundled data set and show that it learns
 	@scripts/train-demo
 
+DEST := '$(subst ','\'',$(DESTDIR))'# as the shell takes it
+ifneq ($(filter install uninstall,$(MAKECMDGOALS)),)
+ifneq ($(strip $(words $(PREFIX) $(LIBDIR))$(foreach c,: ' " | & ;,$(findstring $(c),$(PREFIX)$(LIBDIR)))),2)
+$(error PREFIX=$(PREFIX) LIBDIR=$(LIBDIR): expected folders without blanks, quotes and :|&;)
+endif
+endif
+
 # FOLDER:MODE:FILE of everything that install puts in place and uninstall takes away; links stay links.
 libdir := $(if $(filter /%,$(LIBDIR)),$(LIBDIR),$(PREFIX)/$(LIBDIR))
 share := $(PREFIX)/share
@@ -420,15 +427,15 @@ $(PC_FILES) $(CMAKE_FILES): $(OUT)/%: plugin-api/%.in
 
 install: all $(PC_FILES) $(CMAKE_FILES) ## install programs, libraries, headers, models, pages under $(DESTDIR)$(PREFIX)
 	@for i in $(INSTALLED); do \
-	    folder=$(DESTDIR)$${i%%:*} file=$${i##*:} mode=$${i#*:}; \
-	    install -d $$folder || exit 1; \
-	    if [ -h $$file ]; then cp -P $$file $$folder; else install -m $${mode%%:*} $$file $$folder; fi || exit 1; done
-	@$(if $(OWN_LINK),install -d $(DESTDIR)$(PREFIX)/lib && ln -srfn $(DESTDIR)$(libdir)/lull $(DESTDIR)$(OWN_LINK))
-	@echo "  installed $(words $(INSTALLED)) files under $(DESTDIR)$(PREFIX)"
+	    folder=$(DEST)$${i%%:*} file=$${i##*:} mode=$${i#*:}; \
+	    install -d "$$folder" || exit 1; \
+	    if [ -h $$file ]; then cp -P $$file "$$folder"; else install -m $${mode%%:*} $$file "$$folder"; fi || exit 1; done
+	@$(if $(OWN_LINK),install -d $(DEST)$(PREFIX)/lib && ln -srfn $(DEST)$(libdir)/lull $(DEST)$(OWN_LINK))
+	@echo "  installed $(words $(INSTALLED)) files under "$(DEST)$(PREFIX)
 uninstall: ## remove what install put under $(DESTDIR)$(PREFIX)
-	@for i in $(INSTALLED); do rm -f $(DESTDIR)$${i%%:*}/$${i##*/} || exit 1; done
-	@$(if $(OWN_LINK),[ ! -h $(DESTDIR)$(OWN_LINK) ] || rm $(DESTDIR)$(OWN_LINK))
-	@for f in $(OWN_FOLDERS); do [ ! -d $(DESTDIR)$$f ] || rmdir --ignore-fail-on-non-empty $(DESTDIR)$$f; done
+	@for i in $(INSTALLED); do rm -f $(DEST)$${i%%:*}/$${i##*/} || exit 1; done
+	@$(if $(OWN_LINK),[ ! -h $(DEST)$(OWN_LINK) ] || rm $(DEST)$(OWN_LINK))
+	@for f in $(OWN_FOLDERS); do [ ! -d $(DEST)$$f ] || rmdir --ignore-fail-on-non-empty $(DEST)$$f; done
 
 wheel: $(BUNDLED) ## make the Python package with host library, criteria and model in build/wheel
 	@scripts/packages/bundle wheel $(BUNDLED)

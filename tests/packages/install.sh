@@ -29,4 +29,11 @@ t "  …of every program" sh -c "for p in $at/bin/*; do [ -e $at/share/bash-comp
 t "uninstall" make uninstall
 t "  …leaves no file" sh -c "! find $tmp/root ! -type d | grep ." 
 t "  …and no folder of its own" sh -c "! find $at -mindepth 1 -name '*lull*' | grep ."
+t "a DESTDIR with a blank and a quote" make install DESTDIR="$tmp/it's a root"
+t "  …is found whole" "$tmp/it's a root/opt/lull/bin/lull-render" $room -c ggn -o "$tmp/d.exr"
+t "  …and emptied" make uninstall DESTDIR="$tmp/it's a root"
+t "  …of every file" sh -c '! find "$0" ! -type d | grep .' "$tmp/it's a root"
+refused() { ! make "$@" 2>"$tmp/err" && [ "$(wc -l <"$tmp/err")" = 1 ] && grep -q ': expected folders without blanks' "$tmp/err"; }
+t "a PREFIX that make would cut apart is refused" refused install PREFIX="/opt/lull too" DESTDIR="$tmp/cut"
+t "  …so is one for uninstall" refused uninstall PREFIX="/opt/lull too" DESTDIR="$tmp/cut"
 echo "1..$n"
