@@ -262,6 +262,8 @@ def test_region():
     assert abs(one_render(scene, 2 * WAVE)[5:23, 28:35] - mean).max() < SAME * 10  # two waves: the first check
     render.use_border, render.border_max_x = True, render.border_min_x
     raises(HostError, "holds no pixel", Cycles, scene, 4)
+    render.use_border, render.resolution_percentage = False, 1
+    raises(HostError, "1 % of its resolution are no pixel", Cycles, scene, 4)
 
 
 def test_no_cycles():

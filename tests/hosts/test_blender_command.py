@@ -399,6 +399,8 @@ def test_bad_input():
                               ([tmp("cube.blend"), "-c", "halfbuf", "--mask", tmp("none.png")], "none.png"),
                               ([tmp("cube.blend"), "-c", "halfbuf", "--frames", "b-a"], "--frames"),
                               ([tmp("cube.blend"), "-c", "halfbuf", "--frames", "1- 2"], "--frames"),
+                              ([tmp("cube.blend"), "-c", "halfbuf", "--frames", "1048575"], "--frames 1048575: expected FIRST-LAST, from"),
+                              ([tmp("cube.blend"), "-c", "halfbuf", "--frames", "1-99999999999"], "--frames 1-99999999999: expected"),
                               ([tmp("cube.blend"), "-c", "halfbuf", "--scene", "None"], "--scene"),
                               ([tmp("cube.blend"), "-c", "halfbuf", "--spp-min", "9", "--spp-max", "3"], "spp_min"),
                               ([tmp("none.blend")], "none.blend")):

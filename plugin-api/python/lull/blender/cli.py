@@ -30,6 +30,7 @@ if TYPE_CHECKING:  # launch() does without bpy
 
 # As Blender names them
 DEVICES = ("CPU", "CUDA", "OPTIX", "HIP", "ONEAPI", "METAL")
+LAST_FRAME = 1048574  # of Blender
 
 
 class _Parser(argparse.ArgumentParser):
@@ -131,10 +132,10 @@ def _frames(text: Optional[str], scene: bpy.types.Scene) -> list[Optional[int]]:
     if text == "all":
         return list(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
     ends = re.fullmatch(r"(-?[0-9]+)(?:-(-?[0-9]+))?", text)
-    frames: list[Optional[int]] = list(range(int(ends[1]), int(ends[2] or ends[1]) + 1)) if ends else []
-    if not frames:
-        raise ValueError(f"--frames {text}: expected FIRST-LAST or all")
-    return frames
+    first, last = (int(ends[1]), int(ends[2] or ends[1])) if ends else (0, -1)
+    if not -LAST_FRAME <= first <= last <= LAST_FRAME:  # for others frame_set() takes the last one that there is
+        raise ValueError(f"--frames {text}: expected FIRST-LAST, from {-LAST_FRAME} to {LAST_FRAME}, or all")
+    return list(range(first, last + 1))
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:

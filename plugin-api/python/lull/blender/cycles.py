@@ -144,6 +144,8 @@ class Cycles:
         self.seeds = (scene.cycles.seed ^ 0x3504F333, scene.cycles.seed)  # of half B, of half A
         self.width = render.resolution_x * render.resolution_percentage // 100
         self.height = render.resolution_y * render.resolution_percentage // 100
+        if not self.width * self.height:
+            raise HostError(f"scene '{scene.name}': {render.resolution_percentage} % of its resolution are no pixel")
         self.threads, self.crop = render.threads, self._region()
         self.notes: list[str] = []
         self.layer = scene.view_layers[view_layer] if view_layer else next(layer for layer in scene.view_layers if layer.use)
