@@ -560,6 +560,8 @@ def test_put_and_weights_not_finite():
                               (ValueError, "half_spp 9", lambda: f.put(b, {"color": mean, "albedo": mean}, 8, mean, 9))):
         raises(error, text, call)
         assert b.spp == 48 and all((now == was[name]).all() for name, now in f.arrays().items()), text
+    raises(TypeError, "threads 'all'", f.forecast, "all")
+    raises(TypeError, "threads 'all'", f.quote, "all", [], ("visible", .35))
     for value in (np.nan, np.inf):
         f, weight = lull.Frame(lull.load("observer"), 16, 16, block=16, weighted=True), np.ones((16, 16))
         f.add(f.blocks[0], {"color": mean, "weight": weight}, 16, True)

@@ -234,6 +234,7 @@ class HostFrame:
         """What the frame costs by other settings of the quality parameter, (name, value), `own` being the criterion's: struct
         lull_host_quote_row for each, without its blocks; also after close(). threads: of the renderer. other: has a row, too,
         the last one, and is used up."""
+        threads = limits.checked("threads", threads)
         view, rows, count = self.view_of(None), C.POINTER(abi.HostQuoteRow)(), C.c_uint32()
         with self._asking() if self._is_open() else contextlib.nullcontext():
             quote = Handle("lull_host_quote_end", self.handle)
@@ -253,7 +254,7 @@ class HostFrame:
 
     def forecast(self, threads: int) -> abi.HostForecast:
         """What is left: struct lull_host_forecast. threads: of the renderer."""
-        forecast = abi.HostForecast()
+        threads, forecast = limits.checked("threads", threads), abi.HostForecast()
         call("host_forecast_of", C.byref(self.layout), C.byref(self.totals), threads, C.byref(forecast))
         return forecast
 
