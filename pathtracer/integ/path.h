@@ -93,19 +93,30 @@ PT_KERNEL_INLINE int pt_passes_alpha(const struct pt_scene *scene, const struct 
     return alpha < 1.0f && (alpha <= 0.0f || pt_rng_float(rng) >= alpha);
 }
 
-/* Whether the path met anything that counts: goes on behind what it passes through by chance. */
-PT_KERNEL_INLINE int pt_path_found(pt_effects fx, struct pt_path *path)
+/* Whether a ray that passes through this shape by chance comes into the medium behind it. */
+PT_KERNEL_INLINE int pt_is_border(pt_effects fx, const struct pt_shape *shape)
+{
+    return (fx & PT_FX_MEDIA) && shape->has_opacity && shape->medium_in != shape->medium_out;
+}
+
+/* What a path's ray has met. */
+enum pt_found { PT_FOUND_NOTHING, PT_FOUND_SURFACE, PT_FOUND_BORDER /* a surface that lets it into another medium */ };
+
+/* What the path met that counts: goes on behind what it passes through by chance. */
+PT_KERNEL_INLINE enum pt_found pt_path_found(pt_effects fx, struct pt_path *path)
 {
     path->rays++;
     if (fx & PT_FX_ALPHA) {
         struct pt_rng rng = pt_sampler_stream(&path->sampler, PT_DIM_ALPHA);
         while (path->hit.shape >= 0 && pt_passes_alpha(path->scene, &path->ray, &path->hit, &rng)) {
+            if (pt_is_border(fx, &path->scene->shapes[path->hit.shape]))
+                return PT_FOUND_BORDER;
             path->ray.t_min = pt_ray_beyond(path->hit.t);
             path->rays++;
             pt_accel_intersect(path->scene, &path->ray, &path->hit);
         }
     }
-    return path->hit.shape >= 0;
+    return path->hit.shape >= 0 ? PT_FOUND_SURFACE : PT_FOUND_NOTHING;
 }
 
 /* Of a medium that fills the whole shadow ray; direction unnormalised, its length in `length`. */
@@ -141,7 +152,7 @@ PT_KERNEL_INLINE pt_vec3 pt_path_transmittance(pt_effects fx, struct pt_path *pa
                                                      unit, (end - ray->t_min) * length, &rng));
         if (!found || v3_is_black(through))
             return through;
-        if ((fx & PT_FX_MEDIA) && interface && !alpha) {
+        if ((fx & PT_FX_MEDIA) && (alpha ? pt_is_border(fx, &scene->shapes[hit.shape]) : interface)) {
             struct pt_place at;
             pt_place_at_hit(fx, scene, ray, &hit, &at);
             medium = pt_medium_towards(&at, ray->direction, medium);
@@ -269,15 +280,15 @@ PT_KERNEL_INLINE int pt_path_at_max_depth(const struct pt_path *path)
     return path->settings->max_depth >= 0 && path->depth >= path->settings->max_depth;
 }
 
-/* The way to the next surface through the current medium, from ray.t_min to t_end. 1: the path scattered on the way (its ray
+/* The way to the next surface through the current medium, from t_start to t_end. 1: the path scattered on the way (its ray
  * is the next one), 0: it reached t_end, -1: it is over. */
-PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, float t_end)
+PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, float t_start, float t_end)
 {
     const struct pt_medium *medium = &path->scene->media[path->medium];
     struct pt_rng rng = pt_sampler_stream(&path->sampler, PT_DIM_MEDIUM);
     struct pt_medium_event event;
-    pt_vec3 start = v3_madd(path->ray.origin, path->ray.t_min, path->ray.direction);
-    pt_medium_sample_distance(medium, start, path->ray.direction, t_end - path->ray.t_min, &rng, &event);
+    pt_vec3 start = v3_madd(path->ray.origin, t_start, path->ray.direction);
+    pt_medium_sample_distance(medium, start, path->ray.direction, t_end - t_start, &rng, &event);
     path->radiance = v3_add(path->radiance, v3_mul(path->throughput, event.emitted));
     path->throughput = v3_mul(path->throughput, event.weight);
     if (v3_is_black(path->throughput))
@@ -420,19 +431,21 @@ PT_KERNEL_INLINE int pt_path_vertex(pt_effects fx, struct pt_path *path)
     const struct pt_scene *scene = path->scene;
     struct pt_place at;
     path->plan.add = path->plan.light.target = v3_splat(0.0f);
-    int found = pt_path_found(fx, path);
+    float t_start = path->ray.t_min; /* the medium is also before what the ray passes through */
+    enum pt_found found = pt_path_found(fx, path);
     if ((fx & PT_FX_MEDIA) && path->medium >= 0) {
-        int crossed = pt_path_cross_medium(fx, path, found ? path->hit.t : INFINITY);
+        int crossed = pt_path_cross_medium(fx, path, t_start, found != PT_FOUND_NOTHING ? path->hit.t : INFINITY);
         if (crossed != 0)
             return crossed > 0;
     }
-    if (!found) {
+    if (found == PT_FOUND_NOTHING) {
         if (fx & PT_FX_ENVIRONMENT)
             pt_path_add_environment(path);
         return 0;
     }
     pt_place_at_hit(fx, scene, &path->ray, &path->hit, &at);
-    if ((fx & PT_FX_INTERFACE) && scene->materials[at.shape->material].kind == PT_MATERIAL_INTERFACE) {
+    if (found == PT_FOUND_BORDER ||
+        ((fx & PT_FX_INTERFACE) && scene->materials[at.shape->material].kind == PT_MATERIAL_INTERFACE)) {
         path->medium = pt_medium_towards(&at, path->ray.direction, path->medium);
         path->ray.t_min = pt_ray_beyond(path->hit.t);
         return 1;

@@ -56,6 +56,7 @@ static struct pt_shape common(struct pt_builder *b, struct pt_params *p)
         const struct pt_material_info *info = &((struct pt_material_info *)b->material_infos.items)[shape.material];
         if (info->has_opacity)
             shape.alpha = pt_input_product(b, shape.alpha, info->opacity);
+        shape.has_opacity = info->has_opacity;
     }
     shape.has_alpha = shape.alpha.texture || shape.alpha.value.x < 1;
     if (shape.has_alpha)

@@ -119,6 +119,7 @@ struct pt_shape {
                             of triangles by the right-hand rule (reverse orientation XOR a transform that swaps
                             handedness), of quadrics away from centre or axis, +z of a disk (reverse orientation) */
     int32_t has_alpha;     /* `alpha` is not constant 1 */
+    int32_t has_opacity;   /* the material lets rays through, and into the medium behind; `alpha` has its share */
     struct pt_input alpha; /* float: probability that a hit counts */
 };
 

@@ -279,6 +279,44 @@ static void masked_lamps(void **state)
                 both_sides_of_it, CHANCE_ERROR);
 }
 
+/* --- media around what lets rays through ------------------------------------------------------------------------------- */
+
+#define FOG \
+    " MakeNamedMedium \"fog\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [ .1 .1 .1 ] \"rgb sigma_s\" [ 0 0 0 ] "
+#define CARD(z) QUAD "[ -9 -9 " z " 9 -9 " z " 9 9 " z " -9 9 " z " ] "
+static double fog_of_8(int x, int y) { return (void)x, (void)y, exp(-0.8); }
+static double half(int x, int y) { return (void)x, (void)y, 0.5; }
+static double half_of_fog_of_8(int x, int y) { return (void)x, (void)y, 0.5 * exp(-0.8); }
+static double half_of_fog_of_3(int x, int y) { return (void)x, (void)y, 0.5 * exp(-0.3); }
+
+/* The medium is also before a card that a ray passes through. What is mixed with an interface borders on another medium where it lets
+ * rays through; what an alpha of the shape lets through keeps its medium. */
+static void media_behind_masks(void **state)
+{
+    (void)state;
+    static const char *const in_fog = FOG "MediumInterface \"\" \"fog\"", *const lamp = GLOW CARD("8");
+    static const char *const mixed = "MakeNamedMaterial \"none\" \"string type\" \"interface\" "
+                                     "MakeNamedMaterial \"black\" \"string type\" \"diffuse\" \"rgb reflectance\" [ 0 0 0 ] "
+                                     "Material \"mix\" \"string materials\" [ \"none\" \"black\" ] ";
+    static const char *const to_fog = "AttributeBegin MediumInterface \"fog\" \"\" ", *const end = " AttributeEnd ";
+    const struct {
+        const char *camera, *world[5];
+        expected_at *expected;
+    } cases[] = {
+        {in_fog, {BLACK CARD("3") "\"float alpha\" 0 ", lamp}, fog_of_8},
+        {in_fog, {BLACK CARD("3") "\"float alpha\" .5 ", lamp}, half_of_fog_of_8},
+        {FOG, {to_fog, mixed, CARD("5"), end, lamp}, half_of_fog_of_3},
+        {FOG, {to_fog, BLACK CARD("5"), "\"float alpha\" .5", end, lamp}, half},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[2500];
+        int n = snprintf(text, sizeof text, HEAD(BOX, "%s"), cases[i].camera);
+        for (int k = 0; k < 5 && cases[i].world[k]; k++)
+            n += snprintf(text + n, sizeof text - (size_t)n, "%s", cases[i].world[k]);
+        check_image(text, cases[i].expected, CHANCE_ERROR);
+    }
+}
+
 /* --- normals of sheared instances ---------------------------------------------------------------------------------------- */
 
 /* z' = z + x / 2 tilts the plane: its normal is (-1/2, 0, 1) whatever the matrix does to other vectors, so cos² = 4/5. The same with
@@ -331,6 +369,7 @@ int main(void)
         cmocka_unit_test(half_transparent_to_light),
         cmocka_unit_test(moving_shadow),
         cmocka_unit_test(masked_lamps),
+        cmocka_unit_test(media_behind_masks),
         cmocka_unit_test(sheared_instances),
         cmocka_unit_test(shadows_of_what_is_close_to_the_light),
     };
