@@ -289,14 +289,24 @@ int check_png(const char *name, const unsigned char *data, size_t size, base_err
     return base_fail(err, BASE_EINVAL, "%s: truncated PNG file", name);
 }
 
+/* The name of a file's format, which is in small letters whatever the file's own name has. */
+std::string format_of(const char *name)
+{
+    const char *dot = std::strrchr(name, '.');
+    std::string format = dot != nullptr ? dot + 1 : name;
+    for (char &c : format)
+        if (c >= 'A' && c <= 'Z')
+            c = static_cast<char>(c - 'A' + 'a');
+    return format;
+}
+
 int read_memory(const pic_request &q, pic_image *out, base_err *err)
 {
     if (base_file_has_ending(q.name, "png"))
         if (int rc = check_png(q.name, static_cast<const unsigned char *>(q.data), q.size, err))
             return rc;
     OIIO::Filesystem::IOMemReader reader(q.data, q.size);
-    const char *dot = std::strrchr(q.name, '.');
-    std::unique_ptr<ImageInput> input = ImageInput::create(dot != nullptr ? dot + 1 : q.name, false);
+    std::unique_ptr<ImageInput> input = ImageInput::create(format_of(q.name), false);
     if (!input || input->supports("ioproxy") == 0) {
         OIIO::geterror();
         return base_fail(err, BASE_EINVAL, "%s: this format cannot be read from memory", q.name);
