@@ -317,7 +317,7 @@ PT_KERNEL_INLINE void pt_path_aux(pt_effects fx, const struct pt_path *path, con
                                   const struct pt_frame *frame)
 {
     struct pt_path_result *out = path->out;
-    if (out->depth == INFINITY)
+    if (path->depth == 0) /* on the camera's ray, not where a medium sent it */
         out->depth = path->hit.t;
     if (!pt_bsdf_has_smooth(fx, bsdf) || !v3_is_black(out->albedo))
         return;

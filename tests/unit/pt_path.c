@@ -184,6 +184,17 @@ static void planes(void **state)
     assert_true(r.normal_world.z > 0.999f); /* towards the camera */
     assert_true(r.depth > 7.7f && r.depth < 8.0f);
     test_scene_end(&scene);
+    /* what scatters in fog before it meets a surface has no depth: the way from there to a wall is none */
+    test_cornell(&scene, 24, 1.0f, v3_splat(0.0f));
+    scene.camera.medium = test_add_medium(&scene, v3_splat(0.0f), v3_splat(0.1f), 0.0f);
+    int without = 0;
+    for (uint32_t i = 0; i < 64; i++) {
+        pt_kernel_all(&scene, &settings, 12, 3, 1, i, &r);
+        assert_true(isinf(r.depth) || (r.depth > 7.7f && r.depth < 8.0f));
+        without += isinf(r.depth);
+    }
+    assert_true(without > 20 && without < 50); /* 1 - exp(-0.78) of them */
+    test_scene_end(&scene);
 }
 
 /* The traced path ends with the value that the kernel returns. */
