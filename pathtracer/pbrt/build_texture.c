@@ -10,6 +10,7 @@
 #include "picture/read.h"
 #include "pbrt/build.h"
 #include "pbrt/number.h"
+#include "shade/texture.h"
 
 struct pt_input pt_input_grey(double value) { return (struct pt_input){0, v3_splat((float)value)}; }
 
@@ -322,7 +323,10 @@ static void make_imagemap(struct context *c, struct pt_texture *t)
     t->image = !c->b->diag.rc ? pt_build_image_map(c->b, named ? named->loc : p->loc, file, encoding) : -1;
     if (t->image >= 0 && c->is_float) {
         const struct pt_image_map *m = &((struct pt_image_map *)c->b->images.items)[t->image];
-        t->channel = m->channels == 4 ? 3 : m->channels == 3 ? -1 : 0;
+        if (c->b->is_v3) /* knows no alpha of images */
+            t->channel = m->channels >= 3 ? PT_CHANNEL_LUMINANCE : 0;
+        else
+            t->channel = m->channels == 4 ? PT_CHANNEL_ALPHA : m->channels == 3 ? PT_CHANNEL_MEAN : 0;
     }
 }
 

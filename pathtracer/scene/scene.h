@@ -74,7 +74,7 @@ struct pt_texture {
     int32_t wrap;          /* enum pt_wrap, IMAGE only */
     int32_t invert;        /* IMAGE only: 1 - value, before scale; never below 0 */
     int32_t is_signed;     /* IMAGE only, of floats that are not inverted (heights): else what is below 0 is 0 */
-    int32_t channel;       /* IMAGE: 0 = colour (rgb or grey); read as a float: -1 = average of rgb, 3 = alpha */
+    int32_t channel;       /* IMAGE: PT_CHANNEL_… (shade/texture.h) */
     float scale;           /* IMAGE only */
     float su, sv, du, dv;  /* s = su·u + du, t = sv·v + dv */
     struct pt_input in[4]; /* numbers below this texture's own: the array is in dependency order */

@@ -47,7 +47,7 @@ pt_vec3 pt_image_texel(const struct pt_image_map *image, int32_t wrap, int32_t c
     if (x < 0 || y < 0)
         return v3_splat(0.0f);
     size_t i = ((size_t)y * (size_t)image->width + (size_t)x) * (size_t)image->channels;
-    if (channel == 3) { /* alpha is stored linearly whatever the colours are */
+    if (channel == PT_CHANNEL_ALPHA) { /* alpha is stored linearly whatever the colours are */
         if (image->channels < 4)
             return v3_splat(1.0f);
         if (image->type == PT_PIXEL_FLOAT)
@@ -55,7 +55,9 @@ pt_vec3 pt_image_texel(const struct pt_image_map *image, int32_t wrap, int32_t c
         return v3_splat((float)((const uint8_t *)image->pixels)[i + 3] * (1.0f / 255.0f));
     }
     pt_vec3 colour = colour_at(image, i);
-    return channel == -1 && image->channels >= 3 ? v3_splat(v3_mean(colour)) : colour;
+    if (channel == PT_CHANNEL_RGB || image->channels < 3)
+        return colour;
+    return v3_splat(channel == PT_CHANNEL_MEAN ? v3_mean(colour) : v3_luminance(colour));
 }
 
 static inline pt_vec3 blend4(pt_vec3 a, pt_vec3 b, pt_vec3 c, pt_vec3 d, float dx, float dy)

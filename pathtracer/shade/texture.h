@@ -19,14 +19,13 @@ pt_vec3 pt_texture_eval(const struct pt_scene *scene, int32_t number, float u, f
 /* Step in u and v over which texture `number` is to be differenced: about one texel of the finest image in it. */
 void pt_texture_step(const struct pt_scene *scene, int32_t number, float *step_u, float *step_v);
 
-/* Texel (x, y), wrapped, as linear RGB (grey and float images: in x, y, z alike); alpha when channel is 3, the mean of RGB
- * when it is -1. */
+/* pt_texture.channel: what is read of an image's colours. Grey images have one value whatever it says. */
+enum { PT_CHANNEL_LUMINANCE = -2, PT_CHANNEL_MEAN = -1, PT_CHANNEL_RGB = 0, PT_CHANNEL_ALPHA = 3 };
+
+/* Texel (x, y), wrapped, linear (grey and float images: in x, y, z alike). */
 pt_vec3 pt_image_texel(const struct pt_image_map *image, int32_t wrap, int32_t channel, int64_t x, int64_t y);
 /* Bilinear; s to the right, t downwards, (0, 0) the upper left corner of the image, (1, 1) the lower right. */
 pt_vec3 pt_image_bilinear(const struct pt_image_map *image, int32_t wrap, int32_t channel, float s, float t);
-
-/* pt_texture.channel when the image is read as a colour; any value but -1 and 3. */
-#define PT_CHANNEL_RGB 0
 
 static inline pt_vec3 pt_input_rgb(pt_effects fx, const struct pt_scene *scene, const struct pt_input *in, float u, float v)
 {

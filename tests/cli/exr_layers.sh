@@ -45,6 +45,21 @@ refused "luminance and chroma" colour.pbrt -q --spp 1 -o x.exr
 make 1,2,3 N.X,N.Y,N.Z 3
 refused "t.exr: none of its channels is a picture: N.X, N.Y, N.Z" colour.pbrt -q --spp 1 -o x.exr
 
+# What pbrt-v3 reads of a float image is its luminance, whatever its alpha.
+cat >v3.pbrt <<'S'
+LookAt 0 0 -5  0 0 0  0 1 0
+Camera "orthographic"
+Film "image" "integer xresolution" 4 "integer yresolution" 4
+WorldBegin
+Texture "f" "float" "imagemap" "string filename" "t.exr"
+AreaLightSource "diffuse" "bool twosided" true
+Shape "disk" "float radius" 9 "texture alpha" "f"
+S
+make .2,.5,.8,.05 R,G,B,A 4
+t "a float image of v3" "$P" v3.pbrt -q --spp 64 -o up.exr
+make .45788 Y 1
+t "  …is its luminance" sh -c "'$P' v3.pbrt -q --spp 64 -o got.exr && idiff -q -fail .02 up.exr got.exr"
+
 # slope LEFT RIGHT SCALE PICTURE: a plane with a displacement that runs from LEFT to RIGHT
 slope() {
     oiiotool --pattern "fill:left=$1:right=$2" 64x4 1 --chnames Y -d float -o t.exr
