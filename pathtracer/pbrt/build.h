@@ -137,6 +137,8 @@ int32_t pt_build_image_texture(struct pt_builder *b, struct pt_loc loc, const ch
 struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct pt_input y);
 /* (1 - amount) x + amount y. */
 struct pt_input pt_input_mix(struct pt_builder *b, struct pt_input x, struct pt_input y, struct pt_input amount);
+/* The luminance of colours, exact for images and what is mixed of them by a number. */
+struct pt_input pt_input_luminance(struct pt_builder *b, struct pt_input in);
 
 /* build_material.c, build_material_v3.c: id, or -1. */
 int32_t pt_build_material(struct pt_builder *b, const char *kind, struct pt_params *p);

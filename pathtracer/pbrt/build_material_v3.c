@@ -49,7 +49,7 @@ static struct pt_input read_share(struct pt_making *c, const char *name, float f
 {
     struct pt_input in = pt_build_reflectance(c, name, fallback);
     if (in.texture)
-        return in;
+        return pt_input_luminance(c->b, in);
     if (in.value.x != in.value.y || in.value.y != in.value.z)
         pt_diag_warn(&c->b->diag, pt_params_loc(c->p, name), "a coloured %s is taken as a grey one", name);
     return pt_input_grey((double)v3_luminance(in.value));

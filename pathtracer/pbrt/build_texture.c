@@ -197,6 +197,18 @@ struct pt_input pt_input_mix(struct pt_builder *b, struct pt_input x, struct pt_
     return input_of(pt_list_add(b, &b->textures, &t));
 }
 
+struct pt_input pt_input_luminance(struct pt_builder *b, struct pt_input in)
+{
+    if (!in.texture)
+        return pt_input_grey((double)v3_luminance(in.value));
+    struct pt_texture t = ((struct pt_texture *)b->textures.items)[in.texture - 1];
+    if (t.kind == PT_TEXTURE_IMAGE)
+        t.channel = PT_CHANNEL_LUMINANCE;
+    for (int i = 0; i < 4; i++)
+        t.in[i] = pt_input_luminance(b, t.in[i]);
+    return input_of(pt_list_add(b, &b->textures, &t));
+}
+
 /* --- classes ---------------------------------------------------------------------------------------------------------- */
 
 struct context {

@@ -266,6 +266,14 @@ static void mixed_with_nothing(void **state)
     near(pt_texture_eval(s, s->shapes[0].alpha.texture, 0.5f, 0.5f).x, 0, 0);
     near(pt_texture_eval(s, s->shapes[0].alpha.texture, 1.5f, 0.5f).x, 1, 0);
     pt_scene_destroy(s);
+    /* of colours, the luminance */
+    s = world_scene("Texture \"half\" \"spectrum\" \"constant\" \"rgb value\" [ .5 .5 .5 ]\n"
+                    "Texture \"mask\" \"spectrum\" \"checkerboard\" \"rgb tex1\" [ 1 0 0 ] \"texture tex2\" \"half\"\n"
+                    "Texture \"less\" \"spectrum\" \"scale\" \"texture tex1\" \"mask\" \"rgb tex2\" [ .5 .5 .5 ]\n"
+                    "Material \"uber\" \"texture opacity\" \"less\" Shape \"sphere\"");
+    near(pt_texture_eval(s, s->shapes[0].alpha.texture, 0.5f, 0.5f).x, 0.5 * 0.2126, 1e-4);
+    near(pt_texture_eval(s, s->shapes[0].alpha.texture, 1.5f, 0.5f).x, 0.25, 1e-4);
+    pt_scene_destroy(s);
 }
 
 static void textures(void **state)
