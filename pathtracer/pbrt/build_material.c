@@ -139,11 +139,28 @@ static struct pt_input opacity_of(const struct pt_builder *b, int32_t id)
 
 static int is_all(struct pt_input in, float value) { return !in.texture && in.value.x == value; }
 
+/* Materials that a mix may be made of: they are asked one within the other. */
+enum { MAX_MIXED = 4096 };
+
+static void count_mixed(const struct pt_material *all, const struct pt_material *m, int *left)
+{
+    if (m->kind != PT_MATERIAL_MIX || --*left <= 0)
+        return;
+    count_mixed(all, &all[m->mix_a], left);
+    count_mixed(all, &all[m->mix_b], left);
+}
+
 void pt_build_mix_opacity(struct pt_making *c)
 {
     struct pt_material *m = c->m;
     if (c->b->diag.rc)
         return;
+    int left = MAX_MIXED;
+    count_mixed(c->b->materials.items, m, &left);
+    if (left <= 0) {
+        pt_diag_fail(&c->b->diag, c->p->loc, "a mix of more than %d mixes", MAX_MIXED - 1);
+        return;
+    }
     struct pt_input a = opacity_of(c->b, m->mix_a), b = opacity_of(c->b, m->mix_b);
     if (is_all(a, 1) && is_all(b, 1))
         return;

@@ -356,6 +356,18 @@ static void make_stand_in(struct context *c, struct pt_texture *t)
     pt_params_ignore(c->p, "octaves roughness scale variation filename encoding gamma invert");
 }
 
+/* Textures that one lookup may ask for: they are asked one within the other. */
+enum { MAX_LOOKUPS = 4096 };
+
+static void count_lookups(const struct pt_texture *all, const struct pt_texture *t, int *left)
+{
+    for (int i = 0; i < 4 && *left > 0; i++)
+        if (t->in[i].texture) {
+            --*left;
+            count_lookups(all, &all[t->in[i].texture - 1], left);
+        }
+}
+
 int pt_build_texture(struct pt_builder *b, const char *name, const char *class_name, struct pt_params *p)
 {
     static const struct {
@@ -394,6 +406,10 @@ int pt_build_texture(struct pt_builder *b, const char *name, const char *class_n
     pt_params_check_used(p);
     if (b->diag.rc)
         return b->diag.rc;
+    int left = MAX_LOOKUPS;
+    count_lookups(b->textures.items, &t, &left);
+    if (left == 0)
+        return pt_diag_fail(&b->diag, p->loc, "texture \"%.63s\" is made of more than %d others", name, MAX_LOOKUPS - 1);
     int32_t id = pt_list_add(b, &b->textures, &t);
     if (id < 0 || pt_names_set(is_float ? &b->float_textures : &b->colour_textures, name, id) != 0)
         return pt_diag_nomem(&b->diag, "textures");
