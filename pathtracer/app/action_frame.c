@@ -1,13 +1,30 @@
 #include "actions.h"
+
+#include <stdio.h>
+
 #include "agree.h"
 #include "base/interrupt.h"
 #include "render/farm.h"
+#include "render/host_find.h"
+
+/* What the scene asks for, and what decides when a block of it is done. */
+static int explain(struct pt_open *o, struct base_err *err)
+{
+    const struct lull_criterion *table;
+    int rc = pt_open_find_criterion(o, &table, err);
+    if (rc)
+        return rc;
+    pt_action_explain(o->scene, &o->config, o->frame->paths[PT_SCENE]);
+    printf("criterion: ");
+    pt_criterion_describe(table, stdout);
+    return 0;
+}
 
 static int act(struct pt_open *o, int *status, struct base_err *err)
 {
     const struct pt_cli *cli = o->cli;
     switch (cli->action) {
-    case PT_CLI_EXPLAIN: pt_action_explain(o->scene, &o->config, o->frame->paths[PT_SCENE]); return 0;
+    case PT_CLI_EXPLAIN: return explain(o, err);
     case PT_CLI_DEBUG_PATH: return pt_action_debug_path(o->scene, &o->config, cli->debug, err);
     case PT_CLI_QUOTE: return pt_action_quote(o, status, err);
     case PT_CLI_SEQUENCE: return pt_action_record(o, status, err);

@@ -151,12 +151,18 @@ static int open_denoiser(struct pt_open *o, struct base_err *err)
     return code == LULL_OK ? 0 : base_fail(err, BASE_EINVAL, "--denoise: %s", e.message);
 }
 
+int pt_open_find_criterion(struct pt_open *o, const struct lull_criterion **table, struct base_err *err)
+{
+    const struct pt_cli *cli = o->cli;
+    const char *usual = cli->picture == PT_PICTURE_NOISY ? PT_OPEN_NOISY_CRITERION : "denoised";
+    return pt_criterion_find(cli->criterion ? cli->criterion : usual, &o->judging, o->log, table, err);
+}
+
 static int open_criterion(struct pt_open *o, struct base_err *err)
 {
     const struct pt_cli *cli = o->cli;
-    const char *usual = o->picture == PT_PICTURE_NOISY ? PT_OPEN_NOISY_CRITERION : "denoised";
     const struct lull_criterion *table;
-    int rc = pt_criterion_find(cli->criterion ? cli->criterion : usual, &o->judging, o->log, &table, err);
+    int rc = pt_open_find_criterion(o, &table, err);
     if (!rc)
         rc = add_picture(o, table, err);
     if (!rc)

@@ -53,6 +53,8 @@ int pt_open_init(struct pt_open *out, const struct pt_cli *cli, struct job *job,
 int pt_open_scene(struct pt_open *open, const struct pt_shot_frame *frame, struct base_err *err);
 /* Then, of what draws samples, the rest, after a look at where outputs will go. */
 int pt_open_frame(struct pt_open *open, struct job *job, struct base_err *err);
+/* The criterion that the command line names, or the usual one for its picture: a table that lives for ever. */
+int pt_open_find_criterion(struct pt_open *open, const struct lull_criterion **table, struct base_err *err);
 /* What a next frame needs of its own. */
 void pt_open_end_frame(struct pt_open *open);
 void pt_open_release(struct pt_open *open);

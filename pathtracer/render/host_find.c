@@ -34,6 +34,16 @@ int pt_criterion_find(const char *spec, struct base_inputs *inputs, struct base_
     return rc;
 }
 
+void pt_criterion_describe(const struct lull_criterion *t, FILE *out)
+{
+    fprintf(out, "%s %s - %s\n", t->id, t->version, t->name);
+    for (const char *line = t->description; *line != '\0';) {
+        int n = (int)strcspn(line, "\n");
+        fprintf(out, "    %.*s\n", n, line);
+        line += n + (line[n] != '\0');
+    }
+}
+
 struct listing {
     FILE *out;
     int count;
@@ -43,12 +53,7 @@ static int32_t list_one(void *context, const struct lull_found *found)
 {
     struct listing *l = context;
     const struct lull_criterion *t = found->criterion;
-    fprintf(l->out, "%s %s - %s\n", t->id, t->version, t->name);
-    for (const char *line = t->description; *line != '\0';) {
-        int n = (int)strcspn(line, "\n");
-        fprintf(l->out, "    %.*s\n", n, line);
-        line += n + (line[n] != '\0');
-    }
+    pt_criterion_describe(t, l->out);
     fprintf(l->out, "    from %s\n", found->path);
     for (uint32_t i = 0; i < t->param_count; i++) {
         const struct lull_param *p = (const void *)((const char *)t->params + (size_t)i * t->param_stride);

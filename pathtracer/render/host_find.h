@@ -15,6 +15,9 @@
 int pt_criterion_find(const char *spec, struct base_inputs *inputs, struct base_log *log, const struct lull_criterion **out,
                       struct base_err *err);
 
+/* Its name and description, for people. */
+void pt_criterion_describe(const struct lull_criterion *table, FILE *out);
+
 /* Every criterion that can be found, with its parameters, for people. Returns the number listed. */
 int pt_criterion_list(FILE *out, struct base_log *log);
 

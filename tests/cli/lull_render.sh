@@ -173,6 +173,8 @@ t "--explain tells effects and kernel" sh -c "$P $scene --explain | grep -q '^ke
 t "--explain names the line" sh -c "$P $scene --explain | grep -q 'quadric *on .*room.pbrt:$(grep -n '"sphere"' "$scene" | cut -d: -f1) '"
 t "--explain times paths: some take more than 0.02 us" sh -c "$P $scene --explain | awk '/^time: / { n++; good = \$2 > 0.02 && \$(NF - 7) > 0 } END { exit !(n == 1 && good) }'"
 t "--explain lists what is off" sh -c "$P $scene --explain | grep -q 'grid-medium *off'"
+t "--explain tells what decides" sh -c "$P $scene --explain | grep -q '^criterion: observer '"
+t "  …or would of the denoised picture" sh -c "$P $scene --explain --denoise | grep -q '^criterion: denoised '"
 t "--explain measures a path" sh -c "$P $scene --explain | grep -q '^time: [0-9.]* us per path'"
 t "--debug-path tells the path" sh -c "test \$($P $scene --debug-path 30,20,1 | wc -l) -ge 2"
 
