@@ -4,12 +4,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void keep_message(struct lull_host_criterion *c, const char *line)
+/* Whether it is new. */
+static int keep_message(struct lull_host_criterion *c, const char *line)
 {
+    uint32_t i = 0;
     pthread_mutex_lock(&c->messages_lock);
-    if (c->message_count < LULL_HOST_MESSAGES)
+    const uint32_t count = c->message_count;
+    while (i < count && strcmp(c->messages[i], line) != 0)
+        i++;
+    if (i == count && count < LULL_HOST_MESSAGES)
         snprintf(c->messages[c->message_count++], LULL_HOST_LINE, "%s", line);
     pthread_mutex_unlock(&c->messages_lock);
+    return i == count;
 }
 
 void lull_host_say(struct lull_host_criterion *c, int32_t level, const char *text)
@@ -17,8 +23,8 @@ void lull_host_say(struct lull_host_criterion *c, int32_t level, const char *tex
     int none = LULL_WARNING_NONE;
     char line[LULL_HOST_LINE];
     snprintf(line, sizeof line, "criterion %s: %s", c->table->id, text);
-    if (level <= LULL_LOG_INFO)
-        keep_message(c, line);
+    if (level <= LULL_LOG_INFO && !keep_message(c, line) && level == LULL_LOG_INFO)
+        return; /* some say it at each check */
     if (c->offered.log)
         c->offered.log(c->offered.context, level, line);
     else if (level <= LULL_LOG_WARNING &&

@@ -632,10 +632,11 @@ static void reports_as_text(void **state)
     end();
 }
 
-/* What a criterion says in a frame stands in the report: the first lines, nothing of LULL_LOG_DEBUG, nothing of another frame. */
+/* What a criterion says in a frame stands in the report: the first lines, each once, nothing of LULL_LOG_DEBUG, nothing of another frame. */
 static void messages_in_reports(void **state)
 {
     (void)state;
+    char line[32];
     struct bytes b = {.size = 0};
     struct lull_writer writer = {.struct_size = sizeof writer, .context = &b, .write = gather};
     struct lull_host_report report = {
@@ -643,13 +644,15 @@ static void messages_in_reports(void **state)
     begin(0, 0);
     lull_host_say(criterion, LULL_LOG_DEBUG, "chatter");
     lull_host_say(criterion, LULL_LOG_INFO, "news");
-    for (int i = 0; i < 2 * LULL_HOST_MESSAGES; i++)
-        lull_host_say(criterion, LULL_LOG_WARNING, i < LULL_HOST_MESSAGES - 1 ? "trouble" : "too much");
+    for (int i = 0; i < 4 * LULL_HOST_MESSAGES; i++) { /* each twice */
+        snprintf(line, sizeof line, i / 2 < LULL_HOST_MESSAGES - 1 ? "trouble %d" : "too much %d", i / 2);
+        lull_host_say(criterion, LULL_LOG_WARNING, line);
+    }
     frame->blocks.count = 1; /* short */
     assert_int_equal(lull_host_report_text(frame, &report, &writer, &fault), LULL_OK);
     b.data[b.size] = '\0';
     const char *text = (const char *)b.data, *last = NULL;
-    assert_non_null(strstr(text, "\"messages\":\t[\"criterion told: news\", \"criterion told: trouble\""));
+    assert_non_null(strstr(text, "\"messages\":\t[\"criterion told: news\", \"criterion told: trouble 0\", "));
     assert_null(strstr(text, "chatter"));
     assert_null(strstr(text, "too much"));
     int count = 0;

@@ -195,7 +195,8 @@ static void services(void **state)
     assert_string_equal(alone->name, "lull-render " BASE_VERSION);
     alone->log(alone, LULL_LOG_DEBUG, "psst");
     assert_string_equal(messages.text, "");
-    alone->log(alone, LULL_LOG_INFO, "mind the gap");
+    for (int i = 0; i < 2; i++)
+        alone->log(alone, LULL_LOG_INFO, "mind the gap"); /* told once */
     assert_string_equal(messages.text, "criterion fake: mind the gap\n");
     many->log(many, LULL_LOG_ERROR, "nobody hears it");
     capture_end(&messages);
