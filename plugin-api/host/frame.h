@@ -122,8 +122,8 @@ struct lull_host_quote {
 int32_t lull_host_offer(struct lull_host_criterion *criterion, const struct lull_host_services *services,
                         struct lull_error *err);
 void lull_host_withdraw(struct lull_host_criterion *criterion);
-/* A line to the renderer's log, of LULL_LOG_INFO once a frame, and, of this or worse, for the report; the first warning without a log is kept for
- * lull_host_pass_warning. */
+/* A line to the renderer's log, of LULL_LOG_INFO once a frame, and, of this or worse, for the report; the first warning
+ * without a log is kept for lull_host_pass_warning. */
 void lull_host_say(struct lull_host_criterion *criterion, int32_t level, const char *text);
 /* Passes a warning that was logged nowhere to err, once, with the code LULL_OK; returns LULL_OK. */
 int32_t lull_host_pass_warning(struct lull_host_criterion *criterion, struct lull_error *err);
