@@ -10,7 +10,8 @@
  *
  * A block smaller than 200x200 pixels is little evidence that rare light was met. It stops only where the 200x200 pixels
  * about it show at most three times the limit. One smaller than 100x100 also waits until a sample as bright as its brightest
- * no longer matters to its mean (plugin/undersampled.h).
+ * no longer matters to its mean (plugin/undersampled.h). Where bright noise of the pixels beyond a block's edges may reach
+ * over them, the block stops only if it shows no more than the limit together with those pixels.
  *
  * `error` is the visible noise over the level at which people stop seeing it, `p_noisy` the share of viewers who still do; a
  * block stops when that is at most `visible`, or `error` at most the parameter of that name. With `fps` the noise is that of
@@ -34,6 +35,7 @@ enum {
 };
 enum { FLOATS = 9 };              /* a pixel, of struct worker */
 enum { WINDOW = 200 };            /* pixels, the side of a block that is evidence enough by itself */
+enum { BORDER = 2 };              /* pixels, the reach of the eye's blur (model/visibility.h) */
 static const double AROUND = 3.0; /* a smaller one stops only where its surroundings show at most so many times the limit */
 
 static const struct lull_param params[P_COUNT] = {
@@ -51,7 +53,7 @@ struct worker { /* [3][P] linear light of each half, its L*; [P]; [patches] */
     double *texture, *scratch;
 };
 
-struct largest { /* of the blocks of a frame */
+struct largest { /* of the blocks of a frame and what is read around them */
     size_t pixels, patches;
     int32_t width;
 };
@@ -93,6 +95,13 @@ static struct lull_rect window_of(const struct lull_rect *frame, struct lull_rec
     if (r.y1 - r.y0 < WINDOW)
         widen(&r.y0, &r.y1, frame->y0, frame->y1);
     return r;
+}
+
+/* A block and BORDER pixels about it, as far as the frame reaches. */
+static struct lull_rect border_of(const struct lull_rect *frame, struct lull_rect r)
+{
+    return (struct lull_rect){most(frame->x0, r.x0 - BORDER), most(frame->y0, r.y0 - BORDER),
+                              least(frame->x1, r.x1 + BORDER), least(frame->y1, r.y1 + BORDER)};
 }
 
 static void see_both(struct worker *w, size_t pixels)
@@ -191,19 +200,38 @@ static double error_of_halves(struct lull_instance *in, const struct lull_view *
                       w, tally);
 }
 
+/* The error of an area around a block; 0 where it is the block, or tells of no noise. */
+static double error_of_area(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                            struct lull_rect area, struct worker *w)
+{
+    const struct lull_rect own = gp_rect_of(b);
+    struct lull_kit_tally ignored = {0};
+
+    if (memcmp(&own, &area, sizeof own) == 0)
+        return 0;
+    const int differ = gp_pair_of_halves(&in->kit, view, b, area, w->rgb, &ignored);
+    const double error = error_of(in, view, b, area, differ, split_of(b), w);
+    return isnan(error) ? 0 : error;
+}
+
 /* What the surroundings of a block let expect of it: whether a few samples of a few pixels have met rare light is luck, and
  * those beside it had other luck. 0 where there are none. */
 static double error_around(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                            struct worker *w)
 {
-    const struct lull_rect own = gp_rect_of(b), area = window_of(&in->frame, own);
-    struct lull_kit_tally ignored = {0};
+    const struct lull_rect own = gp_rect_of(b);
+    return view->all ? error_of_area(in, view, b, window_of(&in->frame, own), w) / AROUND : 0;
+}
 
-    if (!view->all || memcmp(&own, &area, sizeof own) == 0)
+/* What a block shows together with the pixels at its edges, where light of those may reach over them unmet; 0 elsewhere. */
+static double error_at_edges(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
+                             struct worker *w)
+{
+    const struct lull_rect own = gp_rect_of(b), area = border_of(&in->frame, own);
+    if (!view->all || !lull_kit_plane(view, LULL_PLANE_MOMENT2) || b->spp < 2)
         return 0;
-    int differ = gp_pair_of_halves(&in->kit, view, b, area, w->rgb, &ignored);
-    double error = error_of(in, view, b, area, differ, split_of(b), w);
-    return isnan(error) ? 0 : error / AROUND;
+    gp_pair_of_moments(&in->kit, view, b, area, 1, w->rgb);
+    return gp_undersampled_edge(own, area, w->rgb) ? error_of_area(in, view, b, area, w) : 0;
 }
 
 static double error_of_means(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
@@ -238,7 +266,8 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
     /* What surrounds a block, and what it may not have met, is read where it matters: before a stop, and where the answer is
      * all that is wanted. */
     if (!in->means.count && (error <= in->stop_error || (b->flags & LULL_BLOCK_FINAL && !isnan(error)))) {
-        const double seen = fmax(error, error_around(in, view, b, w)), unmet = gp_undersampled_error(&in->kit, view, b);
+        const double around = fmax(error_around(in, view, b, w), error_at_edges(in, view, b, w));
+        const double seen = fmax(error, around), unmet = gp_undersampled_error(&in->kit, view, b);
         if (seen <= in->stop_error && unmet > in->stop_error)
             gp_say_once(&in->kit, LULL_LOG_INFO, &in->held,
                         "blocks below 100x100 pixels go on though no noise is seen: a few samples like their "
@@ -352,6 +381,15 @@ static struct lull_rect frame_of(const struct lull_frame *frame)
     return all;
 }
 
+static void make_room(struct largest *largest, struct lull_rect r)
+{
+    const int32_t width = r.x1 - r.x0, height = r.y1 - r.y0;
+    const size_t pixels = (size_t)width * (size_t)height, patches = ggn_visible_patches(width, height);
+    largest->pixels = pixels > largest->pixels ? pixels : largest->pixels;
+    largest->patches = patches > largest->patches ? patches : largest->patches;
+    largest->width = most(width, largest->width);
+}
+
 static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
 {
     int32_t status = lull_kit_frame_check(in, frame, err);
@@ -362,12 +400,9 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
         return status;
     all = frame_of(frame);
     for (uint32_t i = 0; i < frame->block_count; i++) {
-        const struct lull_rect r = window_of(&all, *lull_kit_rect(frame, i));
-        const int32_t width = r.x1 - r.x0, height = r.y1 - r.y0;
-        const size_t pixels = (size_t)width * (size_t)height, patches = ggn_visible_patches(width, height);
-        largest.pixels = pixels > largest.pixels ? pixels : largest.pixels;
-        largest.patches = patches > largest.patches ? patches : largest.patches;
-        largest.width = most(width, largest.width);
+        const struct lull_rect own = *lull_kit_rect(frame, i);
+        make_room(&largest, window_of(&all, own));
+        make_room(&largest, border_of(&all, own));
     }
     struct gp_means means = {0};
     if (!(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)))

@@ -276,6 +276,35 @@ static void one_bright_sample(void **state)
     assert_int_equal(held, 0);
 }
 
+/* A pixel with light in one of ten samples touches a black block from outside. The block waits, since its samples may have missed
+ * what is left of that light on its side. It does not where it has met some, where it is white anyway, where such noise would
+ * not be seen in it, and where the pixel stands further away. */
+static void light_beyond_an_edge(void **state)
+{
+    const double bright = 9, mean = 0.9;
+    static const struct {
+        int x;
+        double strength, inside, second; /* of the pixel beyond the edge; the block's pixels at the edge */
+        int action;
+    } cases[] = {{BLOCK, 1, 0, 0, LULL_CONTINUE},
+                 {BLOCK + 1, 1, 0, 0, LULL_STOP},
+                 {BLOCK, 1, 0.01, 1.1e-4, LULL_STOP},
+                 {BLOCK, 1, 1.5, 2.25, LULL_STOP},
+                 {BLOCK, 0.01, 0.2, 0.04, LULL_STOP}};
+    (void)state;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const double strength = cases[i].strength;
+        fill(0);
+        for (int y = 0; y < BLOCK; y++)
+            grey(BLOCK - 1, y, cases[i].inside, cases[i].inside, cases[i].second);
+        grey(5, 5, 0.2, 0.2001, 0.04); /* halves that differ */
+        grey(cases[i].x, 20, strength * mean, 0.8 * strength * mean, strength * strength * mean * bright);
+        const struct lull_decision d = ask(0, 1, 0);
+        assert_int_equal(d.action, cases[i].action);
+        assert_true(d.action == LULL_STOP || (d.error > 1.2 && d.error < 3)); /* its own and that beyond */
+    }
+}
+
 static uint8_t *codes_of(const struct seq_block *b, const struct seq_record *r, struct pic_image *image)
 {
     uint8_t *codes = malloc(3 * (size_t)SIDE * SIDE);
@@ -335,9 +364,9 @@ static void one_unit(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(two_equal_halves), cmocka_unit_test(even_light),   cmocka_unit_test(gaussian_noise),
-        cmocka_unit_test(skewed_noise),     cmocka_unit_test(surroundings), cmocka_unit_test(one_bright_sample),
-        cmocka_unit_test(one_unit),
+        cmocka_unit_test(two_equal_halves),     cmocka_unit_test(even_light),   cmocka_unit_test(gaussian_noise),
+        cmocka_unit_test(skewed_noise),         cmocka_unit_test(surroundings), cmocka_unit_test(one_bright_sample),
+        cmocka_unit_test(light_beyond_an_edge), cmocka_unit_test(one_unit),
     };
     return cmocka_run_group_tests_name("evidence", tests, NULL, NULL);
 }
