@@ -9,6 +9,8 @@ t "blocks stop, at different counts" sh -c '[ "$(tr ";" "\n" <den.csv | grep "^[
 t "same bytes for 1 thread and another order" sh -c "$P $den -t 1 --order-seed 4 -o den1.exr && cmp den.exr den1.exr"
 interrupted den.ckp $den -o part.exr
 t "same bytes after interrupt and resume" sh -c "$P $den --checkpoint den.ckp --resume -o den2.exr && cmp den.exr den2.exr"
+"$P" $scene -q --size 150x100 --block 50 -c denoised -p first-spp=16 -p error=50 --spp-max 300 -o clear.exr --stop-map clear.csv
+t "an error far below the limit needs no second look" test "$(tr ';,' '\n\n' <clear.csv | grep '^[0-9]' | sort -u)" = 16
 "$P" $den -p fps=0 -o still.exr --stop-map still.csv
 "$P" $den -p fps=24 -o moving.exr --stop-map moving.csv
 t "0 frames per second: a still" cmp still.csv den.csv
