@@ -10,7 +10,7 @@ import statistics
 
 from lablib import peers, tables, tool
 
-SCENES = "cornell-box soft-shadow glossy corridor chess".split()
+SCENES = "cornell-box soft-shadow chess plaza".split()
 SAMPLES, ERRORS, MOST, THRESHOLD = (64, 128, 256), (1, 2, 3), 4096, 0.01
 TIMED = "%d samples" % SAMPLES[1]  # whose seconds the ways with a limit of time get
 PHASES = ("samples", "synchronisation", "copies", "looks", "denoising")
@@ -18,9 +18,9 @@ PHASES = ("samples", "synchronisation", "copies", "looks", "denoising")
 
 def options(parser):
     parser.add_argument("--scenes", nargs="+", default=SCENES, metavar="SCENE", help="names of scenes/, or files (%s)" % " ".join(SCENES))
-    parser.add_argument("--size", default="320x180", metavar="WxH", help="of the pictures (320x180)")
-    parser.add_argument("--block", type=int, default=80, help="side of the blocks (80, as the add-on takes for 320x180)")
-    parser.add_argument("--reference-spp", type=int, default=1024, metavar="N", help="of each of the two references (1024)")
+    parser.add_argument("--size", default="640x360", metavar="WxH", help="of the pictures (640x360)")
+    parser.add_argument("--block", type=int, default=160, help="side of the blocks (160, as the add-on takes for 640x360)")
+    parser.add_argument("--reference-spp", type=int, default=512, metavar="N", help="of each of the two references (512)")
     parser.add_argument("--only-references", action="store_true", help="make these and nothing else")
     parser.add_argument("--blender", default=peers.BPY, metavar="PROGRAM", help="a Python with bpy (that of build/hosts)")
     parser.add_argument("--work", type=tool.path, default=os.path.join(tool.BUILD, "artists"), metavar="DIR",
