@@ -16,7 +16,9 @@ static pt_vec3 normal_from_map(const struct pt_scene *scene, const struct pt_mat
 {
     pt_vec3 n = v3_sub(v3_scale(pt_texture_eval(scene, m->normal_map, s->u, s->v), 2.0f), v3_splat(1.0f));
     pt_vec3 tangent = v3_norm(v3_madd(s->dpdu, -v3_dot(s->dpdu, s->n_shading), s->n_shading));
-    struct pt_frame frame = {tangent, v3_cross(s->n_shading, tangent), s->n_shading};
+    /* green points where v grows, on whichever side of the surface dpdu × dpdv is */
+    pt_vec3 across = v3_cross(s->n_shading, tangent);
+    struct pt_frame frame = {tangent, v3_dot(across, s->dpdv) < 0.0f ? v3_neg(across) : across, s->n_shading};
     return keep_side(pt_frame_to_world(&frame, v3_norm(n)), s->n_geometric, s->n_shading);
 }
 

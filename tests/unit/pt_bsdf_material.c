@@ -314,6 +314,27 @@ static void normal_maps_are_in_tangent_space(void **state)
     assert_true(v3_is_finite(pt_material_frame(PT_FX_ALL, &scene, &m, &s).n));
 }
 
+/* Red tips the normal the way u grows and green the way v grows: also where texture coordinates or shapes are mirrored, and on the
+ * side that ReverseOrientation chooses. */
+static void normal_maps_follow_mirrored_coordinates(void **state)
+{
+    (void)state;
+    static const float texel[3] = {0.5f * (1.0f + 0.48f), 0.5f * (1.0f + 0.64f), 0.8f}; /* (0.48, 0.64, 0.6) */
+    struct pt_image_map image = {
+        .width = 1, .height = 1, .channels = 3, .type = PT_PIXEL_FLOAT, .gamma = 1, .pixels = texel};
+    struct pt_texture texture = {.kind = PT_TEXTURE_IMAGE, .wrap = PT_WRAP_REPEAT, .scale = 1, .su = 1, .sv = 1};
+    struct pt_scene scene = {.images = &image, .textures = &texture, .image_count = 1, .texture_count = 1};
+    struct pt_material m = {.kind = PT_BSDF_DIFFUSE, PLAIN, ROUGH(0.0f)};
+    m.normal_map = 1;
+    for (int k = 0; k < 8; k++) {
+        float u = k & 1 ? -1.0f : 1.0f, v = k & 2 ? -1.0f : 1.0f, side = k & 4 ? -1.0f : 1.0f;
+        struct pt_surface s = {
+            .n_geometric = {0, 0, side}, .n_shading = {0, 0, side}, .dpdu = {3 * u, 0, 0}, .dpdv = {u, 2 * v, 0}};
+        pt_vec3 n = pt_material_frame(PT_FX_ALL, &scene, &m, &s).n;
+        assert_true(near(n.x, 0.48f * u) && near(n.y, 0.64f * v) && near(n.z, 0.6f * side));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -327,6 +348,7 @@ int main(void)
         cmocka_unit_test(mixes_choose_by_amount),
         cmocka_unit_test(bump_tips_the_normal),
         cmocka_unit_test(normal_maps_are_in_tangent_space),
+        cmocka_unit_test(normal_maps_follow_mirrored_coordinates),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
