@@ -134,11 +134,15 @@ static int sample_cone(const struct pt_light *light, const struct pt_shape *shap
     pt_vec3 to_centre = v3_sub(centre, p_ref);
     float dist = v3_len(to_centre), h = u0 * one_minus_cos, cos_theta = 1.0f - h, sin2 = h * (2.0f - h),
           phi = 2.0f * PT_PI * u1;
-    float sin_theta = sqrtf(sin2);
+    float sin_theta = sqrtf(sin2), cos_phi = cosf(phi), sin_phi = sinf(phi);
     struct pt_frame frame = pt_frame_from_normal(v3_scale(to_centre, 1.0f / dist));
-    out->wi = pt_frame_to_world(&frame, v3(sin_theta * cosf(phi), sin_theta * sinf(phi), cos_theta));
-    float t = dist * cos_theta - sqrtf(fmaxf(0.0f, radius * radius - dist * dist * sin2));
-    pt_vec3 n = v3_norm(v3_sub(v3_madd(p_ref, t, out->wi), centre)), p = v3_madd(centre, radius, n);
+    out->wi = pt_frame_to_world(&frame, v3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta));
+    /* wi meets the surface at β to its normal, sin β = sin θ dist / radius, which is α = β - θ off the way back from the centre.
+     * From that and not from the point that wi meets, in which a far and small sphere would be lost. */
+    float sin_beta = fminf(1.0f, sin_theta * dist / radius), cos_beta = sqrtf(1.0f - sin_beta * sin_beta);
+    float sin_alpha = sin_beta * cos_theta - cos_beta * sin_theta, cos_alpha = cos_beta * cos_theta + sin_beta * sin_theta;
+    pt_vec3 n = pt_frame_to_world(&frame, v3(sin_alpha * cos_phi, sin_alpha * sin_phi, -cos_alpha)),
+            p = v3_madd(centre, radius, n);
     pt_vec3 error = v3(PT_OFFSET_ERROR * (fabsf(centre.x) + radius), PT_OFFSET_ERROR * (fabsf(centre.y) + radius),
                        PT_OFFSET_ERROR * (fabsf(centre.z) + radius));
     out->inv_pdf_solid = 2.0f * PT_PI * one_minus_cos;

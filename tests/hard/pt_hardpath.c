@@ -50,8 +50,8 @@ static void closed_furnace(void **state)
 static void sphere_light(void **state)
 {
     (void)state;
-    static const float radii[] = {1e-4f, 1e-2f, 1.0f, 1.9f};
-    for (int i = 0; i < 4; i++) {
+    static const float radii[] = {1e-8f, 1e-7f, 1e-6f, 1e-4f, 1e-2f, 1.0f, 1.9f};
+    for (size_t i = 0; i < sizeof radii / sizeof *radii; i++) {
         struct pt_scene scene;
         test_scene_begin(&scene);
         test_camera(&scene, v3(0, 1e-2f, 0), v3(0, 0, 0), v3(0, 0, 1), 1.0f, 8);
