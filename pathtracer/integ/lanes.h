@@ -43,7 +43,7 @@ struct pt_lane_dims {
 /* Where paths have met diffuse surfaces, and emitters that were selected there: triangles. */
 struct pt_lane_hits {
     struct pt_lane_vec3 p, error, n_geometric, n_shading, reflectance; /* struct pt_place, struct pt_bsdf */
-    struct pt_lane_vec3 p0, e1, e2, n, emission;                       /* struct pt_emitter, struct pt_light; … */
+    struct pt_lane_vec3 p0, e1, e2, n, side, emission;                 /* struct pt_emitter, struct pt_light; … */
     float area_over_pmf[PT_RUN];                                       /* … 0: none */
     float by_tree[PT_RUN]; /* probability of the selection by power over that with which the emitter was selected */
     int32_t two_sided[PT_RUN];

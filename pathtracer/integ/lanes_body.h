@@ -69,6 +69,7 @@ static void plan_lights(const struct pt_lane_hits *restrict hits, const float *r
                                .e1 = pt_lane_get(&hits->e1, i),
                                .e2 = pt_lane_get(&hits->e2, i),
                                .n = pt_lane_get(&hits->n, i),
+                               .side = pt_lane_get(&hits->side, i),
                                .area_over_pmf = hits->area_over_pmf[i]};
         struct pt_light_sample light;
         int lit = pt_light_triangle_towards(&e, hits->two_sided[i], p, u0[i], u1[i], &light);

@@ -140,6 +140,7 @@ static inline void pt_lane_emitters(struct pt_lane_run *run, int count)
         pt_lane_put(&at->e1, i, e->e1);
         pt_lane_put(&at->e2, i, e->e2);
         pt_lane_put(&at->n, i, e->n);
+        pt_lane_put(&at->side, i, e->side);
         pt_lane_put(&at->emission, i, run->scene->lights[e->light].emission);
     }
 }

@@ -176,7 +176,8 @@ struct pt_emitter {
     float pmf;           /* by power; > 0 for all that can emit */
     float area_over_pmf; /* AREA on a mesh: of the triangle, units² */
     pt_vec3 p0, e1, e2;  /* AREA on a mesh: corner and edges to the other two */
-    pt_vec3 n;           /* AREA on a mesh: unit normal of the emitting side */
+    pt_vec3 n;           /* AREA on a mesh: unit normal of the emitting side … */
+    pt_vec3 side; /* … where side.x + b1 side.y + b2 side.z >= 0 at the point p0 + b1 e1 + b2 e2, else of the other */
 };
 
 /*

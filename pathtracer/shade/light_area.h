@@ -24,6 +24,7 @@ static inline int pt_light_triangle_towards(const struct pt_emitter *e, int two_
     float half = 0.5f * (u0 < u1 ? u0 : u1), b1 = u0 - half, b2 = u1 - half;
     pt_vec3 p = v3_madd(v3_madd(e->p0, b1, e->e1), b2, e->e2), d = v3_sub(p, p_ref);
     float dist2 = v3_dot(d, d), towards = -v3_dot(e->n, d);
+    towards = e->side.x + b1 * e->side.y + b2 * e->side.z < 0.0f ? -towards : towards;
     towards = two_sided ? fabsf(towards) : towards;
     float inv_dist = 1.0f / sqrtf(dist2);
     out->wi = v3_scale(d, inv_dist);

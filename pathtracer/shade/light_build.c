@@ -43,6 +43,18 @@ static int32_t emitters_of(const struct pt_scene *scene, const struct pt_light *
     return (int32_t)scene->meshes[scene->shapes[light->shape].data].triangle_count;
 }
 
+/* Corners whose normals are on both sides of their triangle: each point of it emits to the side of its interpolated normal, as
+ * pt_place_mesh has it. */
+static void point_sides(pt_vec3 a, pt_vec3 b, pt_vec3 c, struct pt_emitter *e)
+{
+    float at_a = v3_dot(a, e->n), at_b = v3_dot(b, e->n), at_c = v3_dot(c, e->n);
+    if (fminf(at_a, fminf(at_b, at_c)) < 0.0f && fmaxf(at_a, fmaxf(at_b, at_c)) > 0.0f)
+        e->side = v3(at_a, at_b - at_a, at_c - at_a);
+}
+
+/* Whether a triangle emits to one side here and to the other there. */
+static int has_two_sides(const struct pt_emitter *e) { return e->side.y != 0.0f || e->side.z != 0.0f; }
+
 /* Geometry of one triangle of a mesh light; returns its area. */
 static double triangle_emitter(const struct pt_scene *scene, const struct pt_shape *shape, int32_t primitive,
                                struct pt_emitter *e)
@@ -60,6 +72,9 @@ static double triangle_emitter(const struct pt_scene *scene, const struct pt_sha
     float side = mesh->has_normals ? v3_dot(v3_add(a->n, v3_add(b->n, c->n)), n) : 0.0f;
     if (side != 0.0f ? side < 0.0f : shape->flip_normal)
         e->n = v3_neg(e->n);
+    e->side = v3(1.0f, 0.0f, 0.0f);
+    if (mesh->has_normals)
+        point_sides(a->n, b->n, c->n, e);
     return isfinite(e->area_over_pmf) ? area : 0.0;
 }
 
@@ -206,6 +221,7 @@ static int bound_emitter(const struct pt_scene *scene, const struct pt_emitter *
         out->upper = v3_most(e->p0, v3_most(b, c));
         out->axis = e->n;
         out->normals_rad = 0.0f;
+        out->two_sided |= has_two_sides(e);
     } else if (shape) {
         bound_quadric(shape, &scene->quadrics[shape->data], out);
     } else if (light->kind == PT_LIGHT_SPOT) {

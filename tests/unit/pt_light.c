@@ -164,6 +164,29 @@ static void build_quad(struct pt_scene *s)
     test_add_area_light(s, test_add_quad(s, black, v3(-1, -1, -2), v3(2, 0, 0), v3(0, 2, 0)), v3(5, 1, 3), 0);
 }
 
+/* Of the corners of a triangle those in `down` have normals that point down, the others up. */
+static void turn_normals(struct pt_scene *s, int32_t shape, int triangle, int down, struct pt_vertex vertices[4])
+{
+    struct pt_mesh *mesh = &s->meshes[s->shapes[shape].data];
+    memcpy(vertices, mesh->vertices, 4 * sizeof *vertices);
+    for (int i = 0; i < 3; i++)
+        vertices[mesh->indices[3 * triangle + i]].n = v3(0, 0.3f, down >> i & 1 ? -1.0f : 1.0f + 0.5f * (float)i);
+    mesh->vertices = vertices;
+    mesh->has_normals = 1;
+}
+
+static void build_turned_normals(struct pt_scene *s)
+{
+    static struct pt_vertex above[4], below[4];
+    int32_t black = test_add_diffuse(s, v3_splat(0.0f));
+    int32_t up = test_add_quad(s, black, v3(-1, -1, 1), v3(0, 2, 0), v3(2, 0, 0)),
+            down = test_add_quad(s, black, v3(-1, -1, -2), v3(2, 0, 0), v3(0, 2, 0));
+    turn_normals(s, up, 0, 2, above);
+    turn_normals(s, down, 0, 5, below);
+    test_add_area_light(s, up, v3(1, 2, 3), 0);
+    test_add_area_light(s, down, v3(5, 1, 3), 0);
+}
+
 static void build_sphere(struct pt_scene *s)
 {
     int32_t black = test_add_diffuse(s, v3_splat(0.0f));
@@ -247,6 +270,11 @@ static void quads(void **state)
     (void)state;
     run(build_quad, 1);
 }
+static void normals_of_both_sides(void **state)
+{
+    (void)state;
+    run(build_turned_normals, 0);
+}
 static void sphere_outside(void **state)
 {
     (void)state;
@@ -322,6 +350,30 @@ static void normals_say_which_side_emits(void **state)
         assert_true(scene.emitters[0].n.z == (down > 1 ? -1.0f : 1.0f));
         test_scene_end(&scene);
     }
+}
+
+/* Also by the hierarchy: of many lamps, one in a corner of which another side emits than elsewhere. */
+static void turned_triangles_are_selected_from_both_sides(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    struct pt_vertex vertices[4];
+    test_scene_begin(&scene);
+    scene.light_selection = PT_LIGHT_SELECTION_HIERARCHY;
+    int32_t black = test_add_diffuse(&scene, v3_splat(0.0f));
+    for (int i = 0; i < 40; i++) { /* more than are looked at whether the hierarchy is worth it */
+        int32_t quad = test_add_quad(&scene, black, v3(3.0f * (float)i, 0, 0), v3(1, 0, 0), v3(0, 1, 0));
+        if (i == 20)
+            turn_normals(&scene, quad, 0, 1, vertices);
+        test_add_area_light(&scene, quad, v3(1, 1, 1), 0);
+    }
+    test_scene_finish(&scene);
+    assert_non_null(scene.light_tree);
+    for (int i = 0; i < 2; i++) {
+        const struct pt_receiver at = {v3(60.3f, 0.3f, i ? -1.0f : 1.0f), {0, 0, 0}, PT_RECEIVER_VOLUME};
+        assert_true(pt_light_tree_pmf(&scene, &at, 40) > 0.1f); /* the nearest by far */
+    }
+    test_scene_end(&scene);
 }
 
 /* Only whole spheres that are still spheres after their transform are sampled by the cone that they fill. */
@@ -625,6 +677,8 @@ int main(void)
         cmocka_unit_test(alias_tables_of_any_weights),
         cmocka_unit_test(lamps_without_power),
         cmocka_unit_test(quads),
+        cmocka_unit_test(normals_of_both_sides),
+        cmocka_unit_test(turned_triangles_are_selected_from_both_sides),
         cmocka_unit_test(sphere_outside),
         cmocka_unit_test(sphere_inside),
         cmocka_unit_test(ellipsoid),
