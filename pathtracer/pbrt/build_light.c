@@ -99,19 +99,36 @@ static void make_distant(struct context *c)
     pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
 }
 
-/* Render → light: the inverse without translation and uniform scale. */
+/* How far a transform may be from a rotation before its inverse is no longer taken to be its transpose. */
+static const double rotation_slack = 1e-6;
+
+/* Without translation, of determinant 1 or -1. */
+static struct pt_xform unscaled(struct pt_xform t)
+{
+    double size = cbrt(fabs(pt_xform_det(&t)));
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++)
+            t.m[i][j] /= size;
+        t.m[i][3] = 0;
+    }
+    return t;
+}
+
+/* Render → light: as in pbrt-v4 the image is looked up where the inverse transform takes a direction, stretched if it is. */
 static int light_space(struct context *c)
 {
     struct pt_xform inverse;
     if (!pt_xform_invert(&c->ctm, &inverse))
         return pt_diag_fail(&c->b->diag, c->p->loc, "singular transform of a light");
-    double size = cbrt(fabs(pt_xform_det(&inverse)));
-    for (int i = 0; i < 3; i++) {
+    inverse = unscaled(inverse);
+    struct pt_xform back = unscaled(c->ctm);
+    double off = 0;
+    for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
-            inverse.m[i][j] /= size;
-        inverse.m[i][3] = 0;
-    }
+            off = fmax(off, fabs(back.m[i][j] - inverse.m[j][i]));
     c->light->from_render = pt_xform_to_mat34(&inverse);
+    c->light->to_render = pt_xform_to_mat34(&back);
+    c->light->is_stretched = off > rotation_slack;
     return 0;
 }
 

@@ -159,7 +159,9 @@ struct pt_light {
     pt_vec3 position;  /* POINT, SPOT */
     pt_vec3 direction; /* SPOT: axis; DISTANT: the way the light travels; unit */
     float cos_total, cos_start;         /* SPOT: full darkness beyond, full light within */
-    struct pt_mat34 from_render;        /* ENV_IMAGE: render → light space, rotation only */
+    struct pt_mat34 from_render;        /* ENV_IMAGE: render → light space, of determinant 1 or -1 … */
+    int32_t is_stretched;               /* … not a rotation, perhaps mirrored: to_render counts */
+    struct pt_mat34 to_render;          /* … its inverse */
     int32_t has_portal;                 /* ENV: … through which its light mostly comes */
     pt_vec3 portal, portal_u, portal_v; /* a corner of it and its edges, render space */
     /* derived by pt_lights_build */

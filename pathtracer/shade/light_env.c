@@ -41,6 +41,15 @@ static void sphere_to_square(pt_vec3 w, float *s, float *t)
     *t = 0.5f * (copysignf(v, w.y) + 1.0f);
 }
 
+/* Solid angle in light space per solid angle in render space around the direction w: |det M| / |M w|³. */
+static float stretch(const struct pt_light *light, pt_vec3 w)
+{
+    if (!light->is_stretched)
+        return 1.0f;
+    float len = v3_len(pt_mat34_vector(&light->from_render, w));
+    return 1.0f / (len * len * len);
+}
+
 static void direction_to_map(const struct pt_light *light, pt_vec3 w, float *s, float *t, float *sin_theta)
 {
     pt_vec3 l = v3_norm(pt_mat34_vector(&light->from_render, w));
@@ -146,7 +155,7 @@ static float image_pdf(const struct pt_scene *scene, const struct pt_light *ligh
     int32_t x = cell(s, map->width), y = cell(t, map->height);
     if (px)
         *px = pixel(map, x, y);
-    return to_solid(light, pixel_pdf(scene, light, x, y), sin_theta);
+    return to_solid(light, pixel_pdf(scene, light, x, y), sin_theta) * stretch(light, w);
 }
 
 static double sum_of_row(const struct pt_image_map *map, struct span columns, int32_t y)
@@ -212,10 +221,10 @@ static float image_sample(const struct pt_scene *scene, const struct pt_light *l
         pt_sincos_turn(s, &sin_phi, &cos_phi);
         l = v3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta);
     }
-    /* from_render is a rotation (perhaps mirrored): its transpose is its inverse */
-    *w = v3_norm(pt_mat34_normal(&light->from_render, l));
+    /* the transpose of a rotation (perhaps mirrored) is its inverse */
+    *w = v3_norm(light->is_stretched ? pt_mat34_vector(&light->to_render, l) : pt_mat34_normal(&light->from_render, l));
     *px = pixel(map, x, y);
-    return to_solid(light, pixel_pdf(scene, light, x, y), sin_theta);
+    return to_solid(light, pixel_pdf(scene, light, x, y), sin_theta) * stretch(light, *w);
 }
 
 /* One density of two ways: through the portal, and by the image's importance. */

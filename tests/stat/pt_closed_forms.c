@@ -4,10 +4,13 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 #include <math.h>
 
+#include "base/pi.h"
 #include "integ/integrator.h"
 #include "support/pt_text_scene.h"
 
@@ -359,6 +362,61 @@ static void shadows_of_what_is_close_to_the_light(void **state)
     check_image(HEAD(BOX, "") FLOOR SUN SHUTTER("-1e6"), dark, 0.0);
 }
 
+/* The image of a stretched sky where pbrt-v4 looks it up: at the direction that the inverse transform gives. */
+static double sky_at(const struct pt_image_map *map, double x, double y, double z)
+{
+    const double l[3] = {x, y - 0.5 * z, z / 3}, len = sqrt(l[0] * l[0] + l[1] * l[1] + l[2] * l[2]);
+    double turn = atan2(l[1], l[0]) / (2 * BASE_PI);
+    int32_t column = (int32_t)((turn < 0 ? turn + 1 : turn) * map->width),
+            row = (int32_t)(acos(l[2] / len) / BASE_PI * map->height);
+    column = column < map->width ? column : map->width - 1;
+    row = row < map->height ? row : map->height - 1;
+    return (double)((const float *)map->pixels)[3 * (row * map->width + column) + 1];
+}
+
+/* From a file: pictures are read from the disk only. */
+static struct pt_scene *stretched_sky_scene(struct pt_scene_defaults *defaults)
+{
+    char path[] = "/tmp/pt_closed_forms_XXXXXX", here[2048];
+    int fd = mkstemp(path);
+    FILE *file = fd >= 0 ? fdopen(fd, "w") : NULL;
+    struct base_err err = {0};
+    struct pt_scene *scene = NULL;
+    assert_true(file && getcwd(here, sizeof here));
+    fprintf(file,
+            HEAD(BOX, "") "AttributeBegin ConcatTransform [ 1 0 0 0 0 1 0 0 0 1.5 3 0 0 0 0 1 ] LightSource \"infinite\" "
+                          "\"string filename\" \"%s/scenes/textures/evening.pfm\" AttributeEnd " WHITE QUAD
+                          "[ -9 -9 1 9 -9 1 9 9 1 -9 9 1 ]",
+            here);
+    assert_int_equal(fclose(file), 0);
+    int rc = pt_scene_load(path, NULL, &scene, defaults, &err);
+    unlink(path);
+    if (rc)
+        fail_msg("%s", err.text);
+    return scene;
+}
+
+/* A white floor under a sky that is stretched and sheared: ∫ L cos θ / π over the half of directions before it. */
+static void stretched_sky(void **state)
+{
+    (void)state;
+    enum { STEPS = 1000 };
+    struct pt_scene_defaults defaults;
+    struct pt_scene *scene = stretched_sky_scene(&defaults);
+    double want = 0.0;
+    for (int i = 0; i < STEPS; i++)
+        for (int k = 0; k < STEPS; k++) { /* even over the disk that the floor sees */
+            double r2 = (i + 0.5) / STEPS, phi = 2 * BASE_PI * (k + 0.5) / STEPS;
+            want += sky_at(&scene->images[scene->lights[0].image], sqrt(r2) * cos(phi), sqrt(r2) * sin(phi), -sqrt(1 - r2)) /
+                    STEPS / STEPS;
+        }
+    defaults.integrator.sampler = PT_SAMPLER_SOBOL;
+    double got = pixel_mean(scene, &defaults.integrator, 3, 3);
+    printf("# figure stretched sky: %.5f instead of %.5f\n", got, want);
+    assert_true(fabs(got - want) < 0.01 * want); /* of 4096 points, half of them chosen by the image */
+    pt_scene_destroy(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -372,6 +430,7 @@ int main(void)
         cmocka_unit_test(media_behind_masks),
         cmocka_unit_test(sheared_instances),
         cmocka_unit_test(shadows_of_what_is_close_to_the_light),
+        cmocka_unit_test(stretched_sky),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -240,6 +240,18 @@ static void build_env(struct pt_scene *s, int32_t mapping, int32_t width, int32_
     test_add_light(s, &light);
 }
 
+/* A shear and scale of determinant 1. */
+static void build_stretched(struct pt_scene *s, int32_t mapping)
+{
+    build_env(s, mapping, 24, 24);
+    struct pt_light *light = &s->lights[s->light_count - 1];
+    light->is_stretched = 1;
+    light->from_render = (struct pt_mat34){{0, 0.5f, 0, 0, 2, 1, 0, 0, 0, 0, 1, 0}};
+    light->to_render = (struct pt_mat34){{-1, 0.5f, 0, 0, 2, 0, 0, 0, 0, 0, 1, 0}};
+}
+static void build_stretched_latlong(struct pt_scene *s) { build_stretched(s, PT_ENV_LATLONG); }
+static void build_stretched_equal_area(struct pt_scene *s) { build_stretched(s, PT_ENV_EQUAL_AREA); }
+
 static void build_latlong(struct pt_scene *s) { build_env(s, PT_ENV_LATLONG, 32, 16); }
 static void build_equal_area(struct pt_scene *s) { build_env(s, PT_ENV_EQUAL_AREA, 24, 24); }
 
@@ -269,6 +281,12 @@ static void quads(void **state)
 {
     (void)state;
     run(build_quad, 1);
+}
+static void stretched_skies(void **state)
+{
+    (void)state;
+    run(build_stretched_latlong, 1);
+    run(build_stretched_equal_area, 1);
 }
 static void normals_of_both_sides(void **state)
 {
@@ -677,6 +695,7 @@ int main(void)
         cmocka_unit_test(alias_tables_of_any_weights),
         cmocka_unit_test(lamps_without_power),
         cmocka_unit_test(quads),
+        cmocka_unit_test(stretched_skies),
         cmocka_unit_test(normals_of_both_sides),
         cmocka_unit_test(turned_triangles_are_selected_from_both_sides),
         cmocka_unit_test(sphere_outside),
