@@ -137,8 +137,8 @@ static int sample_cone(const struct pt_light *light, const struct pt_shape *shap
     float sin_theta = sqrtf(sin2), cos_phi = cosf(phi), sin_phi = sinf(phi);
     struct pt_frame frame = pt_frame_from_normal(v3_scale(to_centre, 1.0f / dist));
     out->wi = pt_frame_to_world(&frame, v3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta));
-    /* wi meets the surface at β to its normal, sin β = sin θ dist / radius, which is α = β - θ off the way back from the centre.
-     * From that and not from the point that wi meets, in which a far and small sphere would be lost. */
+    /* wi meets the surface at β to its normal, sin β = sin θ dist / radius, which is α = β - θ off the way back from the
+     * centre. From that and not from the point that wi meets, in which a far and small sphere would be lost. */
     float sin_beta = fminf(1.0f, sin_theta * dist / radius), cos_beta = sqrtf(1.0f - sin_beta * sin_beta);
     float sin_alpha = sin_beta * cos_theta - cos_beta * sin_theta, cos_alpha = cos_beta * cos_theta + sin_beta * sin_theta;
     pt_vec3 n = pt_frame_to_world(&frame, v3(sin_alpha * cos_phi, sin_alpha * sin_phi, -cos_alpha)),

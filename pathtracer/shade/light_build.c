@@ -43,8 +43,8 @@ static int32_t emitters_of(const struct pt_scene *scene, const struct pt_light *
     return (int32_t)scene->meshes[scene->shapes[light->shape].data].triangle_count;
 }
 
-/* Corners whose normals are on both sides of their triangle: each point of it emits to the side of its interpolated normal, as
- * pt_place_mesh has it. */
+/* Corners whose normals are on both sides of their triangle: each point of it emits to the side of its interpolated normal,
+ * as pt_place_mesh has it. */
 static void point_sides(pt_vec3 a, pt_vec3 b, pt_vec3 c, struct pt_emitter *e)
 {
     float at_a = v3_dot(a, e->n), at_b = v3_dot(b, e->n), at_c = v3_dot(c, e->n);
