@@ -84,18 +84,16 @@ static double lerp2(const double *c00, const double *c10, const double *c01, con
     return (1 - v) * ((1 - u) * c00[k] + u * c10[k]) + v * ((1 - u) * c01[k] + u * c11[k]);
 }
 
-static int is_planar(const double *a, const double *b, const double *c, const double *d)
+/* Whether what four corners have, `size` numbers each, runs evenly over the patch, so that two triangles have it exactly. */
+static int is_even(const double *const c[4], size_t size)
 {
-    double e1[3], e2[3], e3[3], size = 0;
-    for (int k = 0; k < 3; k++) {
-        e1[k] = b[k] - a[k];
-        e2[k] = c[k] - a[k];
-        e3[k] = d[k] - a[k];
-        size = fmax(size, fmax(fabs(e1[k]), fmax(fabs(e2[k]), fabs(e3[k]))));
+    double off = 0, extent = 0;
+    for (size_t k = 0; k < size; k++) {
+        off = fmax(off, fabs(c[0][k] - c[1][k] - c[2][k] + c[3][k]));
+        for (int i = 1; i < 4; i++)
+            extent = fmax(extent, fabs(c[i][k] - c[0][k]));
     }
-    double volume = e1[0] * (e2[1] * e3[2] - e2[2] * e3[1]) - e1[1] * (e2[0] * e3[2] - e2[2] * e3[0]) +
-                    e1[2] * (e2[0] * e3[1] - e2[1] * e3[0]);
-    return fabs(volume) <= 1e-6 * size * size * size;
+    return off <= 1e-5 * extent; /* rectangles of floats count */
 }
 
 int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
@@ -126,8 +124,7 @@ int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
             t[k] = uv ? uv + 2 * (size_t)v : square + 2 * k;
             n[k] = N ? N + 3 * (size_t)v : NULL;
         }
-        /* A flat patch is two triangles exactly; a twisted one gets a grid. */
-        size_t cuts = is_planar(c[0], c[1], c[2], c[3]) ? 1 : 8, first = g.vertices;
+        size_t cuts = is_even(c, 3) && is_even(t, 2) && (!N || is_even(n, 3)) ? 1 : 8, first = g.vertices;
         for (size_t y = 0; y <= cuts && ok; y++)
             for (size_t x = 0; x <= cuts && ok; x++) {
                 double u = (double)x / (double)cuts, v = (double)y / (double)cuts, q[3], m[3] = {0, 0, 0};

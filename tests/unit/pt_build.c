@@ -10,6 +10,8 @@
 
 #include <cmocka.h>
 
+#include "geom/accel.h"
+#include "integ/surface.h"
 #include "pt_text_scene.h"
 #include "shade/texture.h"
 
@@ -445,6 +447,47 @@ static void tessellated(void **state)
     pt_scene_destroy(s);
 }
 
+/* Flat or not, two triangles have a patch only where positions, uv and normals run evenly over it. */
+static void patches_of_two_triangles(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *patch;
+        uint32_t triangles;
+    } cases[] = {{"\"point3 P\" [ 0 0 0 2 0 1 1 1 0 3 1 1 ]", 2},
+                 {"\"point3 P\" [ 7.1 0 0 7.4 0 0 7.1 .3 0 7.3999999 .3 0 ]", 2},
+                 {"\"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ] \"point2 uv\" [ 0 0 2 0 1 3 3 3 ]", 2},
+                 {"\"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ] \"normal N\" [ 0 0 1 .1 0 1 0 .1 1 .1 .1 1 ]", 2},
+                 {"\"point3 P\" [ 0 0 0 1 0 0 0 1 0 2 1 0 ]", 128},
+                 {"\"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ] \"point2 uv\" [ 0 0 1 0 0 1 2 1 ]", 128},
+                 {"\"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ] \"normal N\" [ 0 0 1 .1 0 1 0 .1 1 -.1 -.1 1 ]", 128}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[300];
+        snprintf(text, sizeof text, "Shape \"bilinearmesh\" %s", cases[i].patch);
+        struct pt_scene *s = world_scene(text);
+        assert_int_equal(s->meshes[0].triangle_count, cases[i].triangles);
+        pt_scene_destroy(s);
+    }
+}
+
+/* Texture coordinates of a flat trapezoid: x = (2u - 1)(2 - v). */
+static void trapezoid(void **state)
+{
+    (void)state;
+    struct pt_scene *s = world_scene("Shape \"bilinearmesh\" \"point3 P\" [ -2 0 5 2 0 5 -1 1 5 1 1 5 ]");
+    for (int i = 0; i < 20; i++) {
+        float u = 0.03f + 0.047f * (float)i, v = 0.52f + 0.02f * (float)i;
+        struct pt_ray ray = {{(2 * u - 1) * (2 - v), v, 0}, {0, 0, 1}, 0.0f, INFINITY, 0.0f};
+        struct pt_hit hit;
+        struct pt_place at;
+        assert_true(pt_accel_intersect(s, &ray, &hit));
+        pt_place_at_hit(PT_FX_ALL, s, &ray, &hit, &at);
+        near(at.s.u, (double)u, 5e-3); /* within a cell of an eighth: |d²u/dx dv| / 64 at most */
+        near(at.s.v, (double)v, 1e-5);
+    }
+    pt_scene_destroy(s);
+}
+
 static void pixel_bounds(void **state)
 {
     (void)state;
@@ -498,6 +541,8 @@ int main(void)
                                        cmocka_unit_test(mixed_with_nothing),
                                        cmocka_unit_test(warnings_come_once_and_strict_refuses),
                                        cmocka_unit_test(tessellated),
+                                       cmocka_unit_test(patches_of_two_triangles),
+                                       cmocka_unit_test(trapezoid),
                                        cmocka_unit_test(pixel_bounds),
                                        cmocka_unit_test(portals)};
     return cmocka_run_group_tests(tests, NULL, NULL);
