@@ -182,15 +182,49 @@ static void spline_to_bezier(const double *c, int degree, double out[12])
     }
 }
 
-static int add_ring(struct grower *g, const double p[3], const double d[3], double width, double v)
+/* The way from a to b, unit; 0 where they are too near each other for the curve's size. */
+static int way(const double a[3], const double b[3], double size, pt_vec3 *out)
 {
-    pt_vec3 axis = v3_norm(v3((float)d[0], (float)d[1], (float)d[2]));
-    if (v3_is_black(axis))
-        axis = v3(0, 0, 1);
-    struct pt_frame f = pt_frame_from_normal(axis);
+    const double d[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, len = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    if (!(len > 1e-9 * size))
+        return 0;
+    *out = v3((float)(d[0] / len), (float)(d[1] / len), (float)(d[2] / len));
+    return 1;
+}
+
+/* Which way a segment runs at t, whose derivative there is d. Where control points coincide at an end that is zero, and the
+ * curve leaves towards the next that differs. Else, at a turning point, *axis stays. */
+static void direct(const double *c, int degree, double t, const double d[3], pt_vec3 *axis)
+{
+    const double zero[3] = {0, 0, 0};
+    const double *end = t < 1 ? c : c + 3 * degree;
+    double size = 0;
+    for (int i = 3; i < 3 * (degree + 1); i++)
+        size = fmax(size, fabs(c[i] - c[i % 3]));
+    if (way(zero, d, size, axis) || (t > 0 && t < 1))
+        return;
+    for (int i = 1; i <= degree; i++)
+        if (t < 1 ? way(end, end + 3 * i, size, axis) : way(end - 3 * i, end, size, axis))
+            return;
+}
+
+/* Turns the frame of a ring so that its normal is `axis`, and no further (parallel transport). */
+static void turn_frame(struct pt_frame *f, pt_vec3 axis)
+{
+    pt_vec3 about = v3_cross(f->n, axis);
+    float c = v3_dot(f->n, axis);
+    /* Rodrigues' rotation of s; there is no one shortest turn to the opposite way */
+    pt_vec3 s =
+        c > -0.999f ? v3_madd(v3_madd(v3_cross(about, f->s), c, f->s), v3_dot(about, f->s) / (1.0f + c), about) : f->s;
+    s = v3_norm(v3_madd(s, -v3_dot(s, axis), axis));
+    *f = (struct pt_frame){s, v3_cross(axis, s), axis};
+}
+
+static int add_ring(struct grower *g, const double p[3], const struct pt_frame *f, double width, double v)
+{
     for (int i = 0; i < CURVE_SIDES; i++) {
         double a = 2 * BASE_PI * i / CURVE_SIDES;
-        pt_vec3 out = v3_add(v3_scale(f.s, (float)cos(a)), v3_scale(f.t, (float)sin(a)));
+        pt_vec3 out = v3_add(v3_scale(f->s, (float)cos(a)), v3_scale(f->t, (float)sin(a)));
         const double n[3] = {(double)out.x, (double)out.y, (double)out.z};
         const double q[3] = {p[0] + width / 2 * n[0], p[1] + width / 2 * n[1], p[2] + width / 2 * n[2]};
         if (!add_vertex(g, q, n, (double)i / CURVE_SIDES, v))
@@ -220,6 +254,8 @@ int pt_build_curve(struct pt_builder *b, struct pt_params *p)
                             "a curve of degree %d needs %zu points and %zu more per segment", degree, corners, step);
     pt_diag_warn(&b->diag, p->loc, "curves are rendered as tubes of %d sides", (int)CURVE_SIDES);
     size_t segments = (count - corners) / step + 1;
+    pt_vec3 axis = v3(0, 0, 1);
+    struct pt_frame frame = {0};
     for (size_t i = 0; i < segments && ok; i++) {
         double c[12];
         if (spline)
@@ -230,7 +266,12 @@ int pt_build_curve(struct pt_builder *b, struct pt_params *p)
         for (int k = i > 0; k <= CURVE_CUTS && ok; k++) {
             double t = (double)k / CURVE_CUTS, v = ((double)i + t) / (double)segments, q[3], d[3] = {0, 0, 0};
             bezier(c, degree, t, q, d);
-            ok = add_ring(&g, q, d, (1 - v) * w0 + v * w1, v);
+            direct(c, degree, t, d, &axis);
+            if (i == 0 && k == 0)
+                frame = pt_frame_from_normal(axis);
+            else
+                turn_frame(&frame, axis);
+            ok = add_ring(&g, q, &frame, (1 - v) * w0 + v * w1, v);
         }
     }
     for (size_t ring = 0; ok && (ring + 1) * CURVE_SIDES < g.vertices; ring++)

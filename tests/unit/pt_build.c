@@ -488,6 +488,50 @@ static void trapezoid(void **state)
     pt_scene_destroy(s);
 }
 
+/* The vertices of ring k of a tube of six sides. */
+static pt_vec3 middle_of(const struct pt_mesh *tube, uint32_t ring)
+{
+    pt_vec3 sum = v3_splat(0.0f);
+    for (uint32_t i = 0; i < 6; i++)
+        sum = v3_madd(sum, 1.0f / 6.0f, tube->vertices[6 * ring + i].p);
+    return sum;
+}
+
+/* Tubes keep their width: rings turn with the curve, and no further; control points that coincide turn none. */
+static void tubes(void **state)
+{
+    (void)state;
+    static const char *const curves[] = {
+        "\"point3 P\" [ -.8 0 -.6 -.8 0 .8 .8 0 .8 .8 0 -.6 ]", /* upwards, then down */
+        "\"point3 P\" [ -.8 .1 -.6 -.7 0 .8 .8 .3 .8 .8 0 -.6 ]",
+        "\"point3 P\" [ -.6 0 0 -.6 0 0 .6 0 0 .6 0 0 ]",
+        "\"point3 P\" [ -.6 0 0 -.6 0 0 -.6 0 0 .6 0 0 ]",
+        "\"point3 P\" [ -.6 0 0 .6 0 0 .6 0 0 .6 0 0 ]",
+        "\"integer degree\" 2 \"point3 P\" [ -.6 0 0 -.6 0 0 .6 0 0 ]",
+        "\"string basis\" \"bspline\" \"point3 P\" [ -.6 0 0 -.6 0 0 -.6 0 0 -.2 .1 .3 .6 0 0 .6 0 0 .6 0 0 ]"};
+    const float radius = 0.15f;
+    for (size_t i = 0; i < sizeof curves / sizeof *curves; i++) {
+        char text[300];
+        snprintf(text, sizeof text, "Shape \"curve\" \"float width\" 0.3 %s", curves[i]);
+        struct pt_scene *s = world_scene(text);
+        const struct pt_mesh *tube = &s->meshes[0];
+        for (uint32_t ring = 0; 6 * (ring + 1) < tube->vertex_count; ring++) {
+            pt_vec3 a = middle_of(tube, ring), b = middle_of(tube, ring + 1), between = v3_scale(v3_add(a, b), 0.5f);
+            for (uint32_t k = 0; k < 6; k++) {
+                pt_vec3 p = tube->vertices[6 * ring + k].p, q = tube->vertices[6 * (ring + 1) + k].p;
+                near(v3_len(v3_sub(p, a)), (double)radius, 1e-5);
+                float half_way = v3_len(v3_sub(v3_scale(v3_add(p, q), 0.5f), between));
+                if (!(half_way > 0.85f * radius)) /* cos of half the turn from ring to ring, which is below 60 degrees */
+                    fail_msg("%s: %g instead of %g behind ring %u", curves[i], (double)half_way, (double)radius,
+                             (unsigned)ring);
+            }
+        }
+        for (uint32_t k = 0; k < tube->vertex_count && i >= 2 && i <= 5; k++)
+            assert_true(fabsf(tube->vertices[k].p.x) < 0.6f + 1e-5f);
+        pt_scene_destroy(s);
+    }
+}
+
 static void pixel_bounds(void **state)
 {
     (void)state;
@@ -543,6 +587,7 @@ int main(void)
                                        cmocka_unit_test(tessellated),
                                        cmocka_unit_test(patches_of_two_triangles),
                                        cmocka_unit_test(trapezoid),
+                                       cmocka_unit_test(tubes),
                                        cmocka_unit_test(pixel_bounds),
                                        cmocka_unit_test(portals)};
     return cmocka_run_group_tests(tests, NULL, NULL);
