@@ -1,4 +1,5 @@
 /* Participating media. */
+#include <math.h>
 #include <string.h>
 
 #include "pbrt/build.h"
@@ -22,6 +23,46 @@ int32_t pt_build_medium_ref(struct pt_builder *b, const char *name, struct pt_lo
     return id;
 }
 
+/* Whether an instance puts its object where ObjectBegin had it, at all times. */
+static int stays(const struct pt_builder *b, const struct pt_instance *instance)
+{
+    if (instance->animated) /* perhaps a moving shape of its own, which has no offset */
+        return 0;
+    const double *offset = b->object_offsets[instance->object];
+    struct pt_xform shift = pt_xform_translate(offset[0], offset[1], offset[2]), at = pt_builder_to_render(b, &shift);
+    struct pt_mat34 there = pt_xform_to_mat34(&at);
+    int same = 1;
+    for (int i = 0; i < 12; i++) /* but for the rounding of turns there and back */
+        same &= fabsf(instance->to_render[0].m[i] - there.m[i]) <= 1e-6f * fmaxf(1.0f, fabsf(there.m[i]));
+    return same;
+}
+
+static void say_stays(struct pt_builder *b, int32_t medium)
+{
+    const struct pt_medium_info *info = medium >= 0 ? &((struct pt_medium_info *)b->medium_infos.items)[medium] : NULL;
+    if (info && ((struct pt_medium *)b->media.items)[medium].kind == PT_MEDIUM_GRID)
+        pt_diag_warn(&b->diag, info->defined, "grid medium \"%.40s\" stays where it was made while its object does not",
+                     info->name);
+}
+
+/* The densities of a grid are looked up in the world, whatever the surface that the path went in by. */
+static void check_placed_grids(struct pt_builder *b)
+{
+    for (size_t i = 0; i < b->instances.count; i++) {
+        const struct pt_instance *instance = (struct pt_instance *)b->instances.items + i;
+        const struct pt_object *object = (struct pt_object *)b->objects.items + instance->object;
+        if (stays(b, instance))
+            continue;
+        for (int32_t k = 0; k < object->shape_count; k++) {
+            const struct pt_shape *shape = (struct pt_shape *)b->object_shapes.items + object->first_shape + k;
+            if (shape->medium_in != shape->medium_out) {
+                say_stays(b, shape->medium_in);
+                say_stays(b, shape->medium_out);
+            }
+        }
+    }
+}
+
 int pt_build_media_check(struct pt_builder *b)
 {
     const struct pt_medium_info *infos = b->medium_infos.items;
@@ -29,7 +70,8 @@ int pt_build_media_check(struct pt_builder *b)
         if (infos[i].defined.line == 0)
             return pt_diag_fail(&b->diag, infos[i].first_use, "unknown medium \"%s\" (expected one made by MakeNamedMedium)",
                                 infos[i].name);
-    return 0;
+    check_placed_grids(b);
+    return b->diag.rc;
 }
 
 /* Jensen, Marschner, Levoy and Hanrahan 2001, "A Practical Model for Subsurface Light Transport", table 1; 1/mm. */
@@ -92,6 +134,8 @@ static int place_grid(struct pt_builder *b, struct pt_params *p, struct pt_mediu
         if (p0[i] > p1[i]) { /* any two corners name the box; the densities always run upwards */
             double swap = p0[i];
             p0[i] = p1[i];
+    if (!pt_xform_equal(&at[0], &at[1]))
+        pt_diag_warn(&b->diag, p->loc, "grid media do not move: the transform at shutter open is used");
             p1[i] = swap;
         }
     struct pt_xform box = pt_xform_translate(p0[0], p0[1], p0[2]);

@@ -325,6 +325,41 @@ static void media(void **state)
     pt_scene_destroy(s);
 }
 
+/* A grid medium has one place, where it was made: that it does not follow an object is said once, and refused by --strict. */
+static void grids_that_stay(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *world;
+        int warnings;
+    } cases[] = {{"ObjectBegin \"o\" MediumInterface \"smoke\" \"\" Shape \"sphere\" ObjectEnd\n"
+                  "ObjectInstance \"o\" Translate 5 0 0 ObjectInstance \"o\" Translate 5 0 0 ObjectInstance \"o\"",
+                  1},
+                 {"ObjectBegin \"o\" MediumInterface \"smoke\" \"\" Shape \"sphere\" ObjectEnd ObjectInstance \"o\"", 0},
+                 {"Translate 3 1 2e5 ObjectBegin \"o\" MediumInterface \"smoke\" \"\" Shape \"sphere\" ObjectEnd\n"
+                  "Identity ObjectInstance \"o\"",
+                  0},
+                 {"ObjectBegin \"o\" MediumInterface \"fog\" \"\" Shape \"sphere\" ObjectEnd\n"
+                  "Translate 5 0 0 ObjectInstance \"o\" MediumInterface \"smoke\" \"\" Shape \"sphere\"",
+                  0},
+                 {"MediumInterface \"\" \"smoke\" ActiveTransform EndTime Translate 0 1 0 Shape \"sphere\"", 1},
+                 {"MediumInterface \"\" \"fog\" ActiveTransform EndTime Translate 0 1 0 Shape \"sphere\"", 0}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[800];
+        int warnings = 0;
+        struct base_err err;
+        snprintf(text, sizeof text,
+                 "Camera \"perspective\" WorldBegin MakeNamedMedium \"fog\"\n"
+                 "MakeNamedMedium \"smoke\" \"string type\" \"uniformgrid\" \"float density\" 1\n%s",
+                 cases[i].world);
+        pt_scene_destroy(text_scene(text, NULL, &warnings));
+        assert_int_equal(warnings, cases[i].warnings);
+        assert_int_equal(text_scene_error(text, 1, &err), warnings ? BASE_EINVAL : 0);
+        if (warnings)
+            assert_memory_equal(err.text, "t.pbrt:2:", 9);
+    }
+}
+
 static void instances_and_motion(void **state)
 {
     (void)state;
@@ -588,6 +623,7 @@ int main(void)
                                        cmocka_unit_test(patches_of_two_triangles),
                                        cmocka_unit_test(trapezoid),
                                        cmocka_unit_test(tubes),
+                                       cmocka_unit_test(grids_that_stay),
                                        cmocka_unit_test(pixel_bounds),
                                        cmocka_unit_test(portals)};
     return cmocka_run_group_tests(tests, NULL, NULL);
