@@ -91,6 +91,12 @@ static const struct {
                {"Spectralon", {11.6f, 20.4f, 14.9f}, {0, 0, 0}},
                {"Wholemilk", {2.55f, 3.21f, 3.77f}, {0.0011f, 0.0024f, 0.014f}}};
 
+static int has_many(struct pt_params *p, const char *name)
+{
+    const struct pt_param *param = pt_params_find(p, name);
+    return param && param->count > 1;
+}
+
 static void read_coefficients(struct pt_builder *b, struct pt_params *p, int is_grid, struct pt_medium *m)
 {
     const char *preset = pt_params_string(p, "preset", "");
@@ -110,7 +116,8 @@ static void read_coefficients(struct pt_builder *b, struct pt_params *p, int is_
     pt_build_colour(b, p, "sigma_s", PT_USE_UNBOUNDED, &m->sigma_s);
     m->g = (float)pt_params_float_in(p, "g", 0, -0.9999, 0.9999);
     pt_vec3 emission = v3_splat(0);
-    if (pt_build_colour(b, p, "Le", PT_USE_LIGHT, &emission))
+    int emits = pt_build_colour(b, p, "Le", PT_USE_LIGHT, &emission);
+    if (emits && !(is_grid && has_many(p, "Lescale"))) /* else by read_glow */
         emission = v3_scale(emission, (float)pt_params_float_in(p, "Lescale", 1, 0, 1e12));
     pt_params_ignore(p, "Lescale");
     float scale = (float)pt_params_float_in(p, "scale", 1, 0, 1e12);
@@ -127,6 +134,8 @@ static int place_grid(struct pt_builder *b, struct pt_params *p, struct pt_mediu
     pt_params_point(p, "p0", p0);
     pt_params_point(p, "p1", p1);
     pt_builder_at_shutter(b, b->state->ctm, at);
+    if (!pt_xform_equal(&at[0], &at[1]))
+        pt_diag_warn(&b->diag, p->loc, "grid media do not move: the transform at shutter open is used");
     if (!(p0[0] != p1[0] && p0[1] != p1[1] && p0[2] != p1[2]))
         return pt_diag_fail(&b->diag, pt_params_loc(p, pt_params_find(p, "p1") ? "p1" : "p0"),
                             "the box of a grid medium is empty (expected p0 and p1 apart in all axes)");
@@ -134,8 +143,6 @@ static int place_grid(struct pt_builder *b, struct pt_params *p, struct pt_mediu
         if (p0[i] > p1[i]) { /* any two corners name the box; the densities always run upwards */
             double swap = p0[i];
             p0[i] = p1[i];
-    if (!pt_xform_equal(&at[0], &at[1]))
-        pt_diag_warn(&b->diag, p->loc, "grid media do not move: the transform at shutter open is used");
             p1[i] = swap;
         }
     struct pt_xform box = pt_xform_translate(p0[0], p0[1], p0[2]);
@@ -147,6 +154,38 @@ static int place_grid(struct pt_builder *b, struct pt_params *p, struct pt_mediu
         return pt_diag_fail(&b->diag, p->loc, "singular transform of a medium");
     m->from_render = pt_xform_to_mat34(&inverse);
     return 0;
+}
+
+/* v4's Lescale of a grid, one for each density. There is one emission for all here: that of the same whole. */
+static void read_glow(struct pt_builder *b, struct pt_params *p, size_t expected, struct pt_medium *m)
+{
+    const struct pt_param *temperature = pt_params_find(p, "temperature"), *given = pt_params_find(p, "Lescale");
+    size_t n;
+    if (temperature)
+        pt_diag_warn(&b->diag, temperature->loc, "the temperature of a grid medium is ignored: it does not glow");
+    pt_params_ignore(p, "temperature temperaturecutoff temperatureoffset temperaturescale");
+    if (!has_many(p, "Lescale"))
+        return;
+    const double *scales = pt_params_floats(p, "Lescale", 1, &n);
+    double sum = 0, weights = 0;
+    if (n != expected) {
+        pt_diag_fail(&b->diag, given->loc, "Lescale has %zu values (expected 1 or nx·ny·nz = %zu)", n, expected);
+        return;
+    }
+    int varies = 0;
+    for (size_t i = 0; i < n; i++) {
+        double density = (double)m->density[i];
+        if (!(scales[i] >= 0 && scales[i] <= 1e12)) {
+            pt_diag_fail(&b->diag, given->loc, "Lescale %zu is %g (expected 0 to 1e+12)", i, scales[i]);
+            return;
+        }
+        sum += density * scales[i];
+        weights += density;
+        varies |= scales[i] != scales[0];
+    }
+    if (varies && !v3_is_black(m->emission))
+        pt_diag_warn(&b->diag, given->loc, "Lescale of a grid medium is replaced by its mean");
+    m->emission = v3_scale(m->emission, (float)(weights > 0 ? sum / weights : scales[0]));
 }
 
 /* The number of densities is checked before memory is taken: a file may say anything of nx, ny and nz. */
@@ -176,7 +215,7 @@ static int read_grid(struct pt_builder *b, struct pt_params *p, struct pt_medium
         kept[i] = (float)density[i];
     }
     m->density = kept;
-    pt_params_ignore(p, "temperature temperaturecutoff temperatureoffset temperaturescale");
+    read_glow(b, p, expected, m);
     return place_grid(b, p, m);
 }
 

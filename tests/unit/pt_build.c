@@ -360,6 +360,35 @@ static void grids_that_stay(void **state)
     }
 }
 
+/* "Lescale" for each density: as one emission, which is right where all are the same, of the same whole where they differ. */
+static void glow_of_grids(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *more;
+        int warnings;
+        double emission;
+    } cases[] = {{"\"float Lescale\" 3", 0, 3},
+                 {"\"float Lescale\" [ 3 3 ]", 0, 3},
+                 {"\"float Lescale\" [ 2 6 ]", 1, 5},
+                 {"\"float temperature\" [ 2000 3000 ] \"float temperaturescale\" 1", 1, 1}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[600];
+        int warnings = 0;
+        struct base_err err;
+        snprintf(text, sizeof text,
+                 "Camera \"perspective\" WorldBegin MakeNamedMedium \"m\" \"string type\" \"uniformgrid\" \"integer nx\" 2 "
+                 "\"float density\" [ 1 3 ] \"rgb Le\" [ 1 1 1 ] \"rgb sigma_a\" [ 1 1 1 ] %s MediumInterface \"m\" \"\" "
+                 "Shape \"sphere\"",
+                 cases[i].more);
+        struct pt_scene *s = text_scene(text, NULL, &warnings);
+        assert_int_equal(warnings, cases[i].warnings);
+        near(s->media[0].emission.y, cases[i].emission, 1e-5);
+        pt_scene_destroy(s);
+        assert_int_equal(text_scene_error(text, 1, &err), warnings ? BASE_EINVAL : 0);
+    }
+}
+
 static void instances_and_motion(void **state)
 {
     (void)state;
@@ -624,6 +653,7 @@ int main(void)
                                        cmocka_unit_test(trapezoid),
                                        cmocka_unit_test(tubes),
                                        cmocka_unit_test(grids_that_stay),
+                                       cmocka_unit_test(glow_of_grids),
                                        cmocka_unit_test(pixel_bounds),
                                        cmocka_unit_test(portals)};
     return cmocka_run_group_tests(tests, NULL, NULL);
