@@ -343,10 +343,11 @@ static int add_quadric(struct pt_builder *b, struct pt_params *p, struct pt_quad
 static int make_sphere(struct pt_builder *b, struct pt_params *p)
 {
     double r = pt_params_float_in(p, "radius", 1, 1e-30, 1e30);
-    double z0 = fmax(pt_params_float(p, "zmin", -r), -r), z1 = fmin(pt_params_float(p, "zmax", r), r);
+    double zmin = pt_params_float(p, "zmin", -r), zmax = pt_params_float(p, "zmax", r);
+    double z0 = fmax(fmin(zmin, zmax), -r), z1 = fmin(fmax(zmin, zmax), r);
     if (!(z0 < z1))
         return pt_diag_fail(&b->diag, pt_params_loc(p, pt_params_find(p, "zmin") ? "zmin" : "zmax"),
-                            "zmin %g is not below zmax %g", z0, z1);
+                            "nothing of the sphere of radius %g is between zmin %g and zmax %g", r, zmin, zmax);
     struct pt_quadric q = {.kind = PT_QUADRIC_SPHERE, .radius = (float)r, .z_min = (float)z0, .z_max = (float)z1};
     return add_quadric(b, p, &q);
 }

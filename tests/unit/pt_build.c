@@ -389,6 +389,17 @@ static void glow_of_grids(void **state)
     }
 }
 
+/* pbrt takes the smaller of zmin and zmax as the lower limit. */
+static void spheres_of_any_limits(void **state)
+{
+    (void)state;
+    struct pt_scene *s = world_scene("Shape \"sphere\" \"float zmin\" 0.5 \"float zmax\" -0.25\n"
+                                     "Shape \"sphere\" \"float zmin\" 7 \"float zmax\" -0.25");
+    assert_true(s->quadrics[0].z_min == -0.25f && s->quadrics[0].z_max == 0.5f);
+    assert_true(s->quadrics[1].z_min == -0.25f && s->quadrics[1].z_max == 1.0f);
+    pt_scene_destroy(s);
+}
+
 static void instances_and_motion(void **state)
 {
     (void)state;
@@ -654,6 +665,7 @@ int main(void)
                                        cmocka_unit_test(tubes),
                                        cmocka_unit_test(grids_that_stay),
                                        cmocka_unit_test(glow_of_grids),
+                                       cmocka_unit_test(spheres_of_any_limits),
                                        cmocka_unit_test(pixel_bounds),
                                        cmocka_unit_test(portals)};
     return cmocka_run_group_tests(tests, NULL, NULL);
