@@ -7,7 +7,8 @@
 #include "pbrt/number.h"
 #include "pbrt/spectra.h"
 
-/* Pairs of a .spd file: numbers separated by blanks, # to the end of the line is a comment. */
+/* Pairs of a .spd file: numbers separated by blanks, # to the end of the line is a comment. The text may begin with a mark
+ * (U+FEFF), and its lines end in LF, CR LF or CR, as those of scenes. */
 static int read_spd_file(struct pt_builder *b, const struct pt_param *param, const char *name, struct pt_spd *out)
 {
     char path[2048];
@@ -19,12 +20,14 @@ static int read_spd_file(struct pt_builder *b, const struct pt_param *param, con
     pt_builder_path(b, name, path, sizeof path);
     if (b->source->read(b->source->data, path, &bytes, &size, &err) != 0)
         return pt_diag_fail(&b->diag, param->loc, "spectrum \"%s\" is neither a known name nor a readable file", name);
-    for (const char *at = bytes, *end = bytes + size; at < end && !b->diag.rc;) {
+    const char *end = bytes + size;
+    for (const char *at = size >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0 ? bytes + 3 : bytes; at < end && !b->diag.rc;) {
         if (*at == '#') {
-            while (at < end && *at != '\n')
+            while (at < end && *at != '\n' && *at != '\r')
                 at++;
         } else if (strchr(" \t\r\n,", *at)) {
-            line += *at++ == '\n';
+            line += *at == '\n' || (*at == '\r' && at[1] != '\n');
+            at++;
         } else {
             const char *start = at;
             while (at < end && *at != '#' && !strchr(" \t\r\n,", *at))

@@ -36,13 +36,13 @@ static void skip_blanks(struct pt_lexer_file *f)
     char *at = f->at, *end = f->end;
     while (at < end) {
         char c = *at;
-        if (c == '\n') {
+        if (c == '\n' || (c == '\r' && at[1] != '\n')) { /* at[1]: the bytes end in a NUL */
             f->loc.line++;
             f->line_start = ++at;
         } else if (c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f') {
             at++;
         } else if (c == '#') {
-            while (at < end && *at != '\n')
+            while (at < end && *at != '\n' && *at != '\r')
                 at++;
         } else {
             break;
@@ -60,7 +60,7 @@ static struct pt_token bad(const struct pt_token *t)
 static struct pt_token read_string(struct pt_lexer *lexer, struct pt_lexer_file *f, struct pt_token t)
 {
     char *out = f->at, *start = f->at;
-    for (; f->at < f->end && *f->at != '"' && *f->at != '\n'; f->at++) {
+    for (; f->at < f->end && *f->at != '"' && *f->at != '\n' && *f->at != '\r'; f->at++) {
         char c = *f->at;
         if (c == '\\' && f->at + 1 < f->end) {
             c = *++f->at;

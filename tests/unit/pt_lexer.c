@@ -84,6 +84,25 @@ static void tokens_and_places(void **state)
     close_files(&x);
 }
 
+/* A line ends at LF, at CR LF and at a CR alone, and a comment with it. */
+static void line_ends(void **state)
+{
+    (void)state;
+    struct files files = {{"a"}, {"# 1\ra # 2\r\n b\r\r# 4\n\rc\r"}};
+    struct fixture x;
+    open_files(&x, &files);
+    expect(&x, PT_TOKEN_WORD, "a", 2, 1);
+    expect(&x, PT_TOKEN_WORD, "b", 3, 2);
+    expect(&x, PT_TOKEN_WORD, "c", 7, 1);
+    expect(&x, PT_TOKEN_END, "", 8, 1);
+    close_files(&x);
+    files = (struct files){{"a"}, {"\r\"open\rb"}};
+    open_files(&x, &files);
+    assert_int_equal(pt_lexer_next(&x.lexer).kind, PT_TOKEN_BAD);
+    assert_string_equal(x.err.text, "a:2:1: string without a closing quote on its line");
+    close_files(&x);
+}
+
 /* cloud-v3 does this: the medium of an included file goes on with parameters in the file that includes it. */
 static void list_across_files(void **state)
 {
@@ -172,12 +191,12 @@ static void characters(void **state)
     expect(&x, PT_TOKEN_WORD, "k", 2, 2);
     expect(&x, PT_TOKEN_WORD, "l", 2, 4);
     expect(&x, PT_TOKEN_WORD, "m", 2, 6);
-    expect(&x, PT_TOKEN_WORD, "n", 2, 8);
-    expect(&x, PT_TOKEN_STRING, "\n\r\t\b\f\\'\"", 3, 1);
+    expect(&x, PT_TOKEN_WORD, "n", 3, 1);
+    expect(&x, PT_TOKEN_STRING, "\n\r\t\b\f\\'\"", 4, 1);
     assert_int_equal(pt_lexer_peek(&x.lexer).loc.column, 20);
-    expect(&x, PT_TOKEN_WORD, "o", 3, 20);
+    expect(&x, PT_TOKEN_WORD, "o", 4, 20);
     struct pt_token end = pt_lexer_next(&x.lexer);
-    assert_true(end.kind == PT_TOKEN_END && end.loc.line == 3 && end.loc.column == 21 && end.length == 0);
+    assert_true(end.kind == PT_TOKEN_END && end.loc.line == 4 && end.loc.column == 21 && end.length == 0);
     close_files(&x);
     static const char *const bad[][2] = {{"\"a", "a:1:1: string without a closing quote on its line"},
                                          {" \"a\nb\"", "a:1:2: string without a closing quote on its line"},
@@ -306,7 +325,7 @@ static void numbers_in_other_locales(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(tokens_and_places),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(tokens_and_places), cmocka_unit_test(line_ends),
                                        cmocka_unit_test(list_across_files),
                                        cmocka_unit_test(include_loops),
                                        cmocka_unit_test(characters),
