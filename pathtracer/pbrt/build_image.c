@@ -21,7 +21,35 @@ static struct pt_params *begin(struct pt_builder *b, enum pt_header which, const
     return p;
 }
 
-/* --- film ------------------------------------------------------------------------------------------------------------- */
+/* --- shutter and film ------------------------------------------------------------------------------------------------- */
+
+static struct pt_loc shutter_loc(const struct pt_params *camera)
+{
+    return pt_params_loc(camera, pt_params_find(camera, "shutterclose") ? "shutterclose" : "shutteropen");
+}
+
+/* The camera's, but the film depends on it. */
+static void build_shutter(struct pt_builder *b)
+{
+    struct pt_params *p = begin(b, PT_HEADER_CAMERA, "perspective");
+    b->shutter[0] = pt_params_float(p, "shutteropen", 0);
+    b->shutter[1] = pt_params_float(p, "shutterclose", 1);
+    if (!(b->shutter[1] >= b->shutter[0]))
+        pt_diag_fail(&b->diag, shutter_loc(p), "the shutter closes at %g, before it opens at %g", b->shutter[1],
+                     b->shutter[0]);
+}
+
+/* Of v4: as long as the shutter is open, unless the film says it, as early files did. */
+static double exposure_time(struct pt_builder *b, struct pt_params *film)
+{
+    if (b->is_v3 || pt_params_find(film, "exposuretime"))
+        return pt_params_float_in(film, "exposuretime", 1, 0, 1e6);
+    const double open_s = b->shutter[1] - b->shutter[0];
+    if (!(open_s > 0 && open_s <= 1e6))
+        pt_diag_fail(&b->diag, shutter_loc(&b->header[PT_HEADER_CAMERA]),
+                     "the shutter is open for %g s (expected more than 0, at most 1e6)", open_s);
+    return open_s;
+}
 
 /* A window in pixels is of the file's own size: as shares it fits the size that the options ask for. */
 static void set_crop(struct pt_builder *b, struct pt_params *p, const int file_size[2])
@@ -71,7 +99,7 @@ static void build_film(struct pt_builder *b)
                      d->height);
     set_crop(b, p, file_size);
     snprintf(d->film_path, sizeof d->film_path, "%s", pt_params_string(p, "filename", ""));
-    double exposure = pt_params_float_in(p, "exposuretime", 1, 0, 1e6), iso = pt_params_float_in(p, "iso", 100, 0, 1e9);
+    double exposure = exposure_time(b, p), iso = pt_params_float_in(p, "iso", 100, 0, 1e9);
     double scale = pt_params_float_in(p, "scale", 1, 0, 1e12);
     b->scene->radiance_scale = (float)(b->is_v3 ? scale : exposure * iso / 100);
     const char *sensor = pt_params_string(p, "sensor", "cie1931");
@@ -240,11 +268,6 @@ static void build_camera(struct pt_builder *b)
     set_screen(b, p, c);
     c->lens_radius = (float)pt_params_float_in(p, "lensradius", 0, 0, 1e9);
     c->focal_distance = (float)pt_params_float_in(p, "focaldistance", 1e6, 1e-9, 1e30);
-    b->shutter[0] = pt_params_float(p, "shutteropen", 0);
-    b->shutter[1] = pt_params_float(p, "shutterclose", 1);
-    if (!(b->shutter[1] >= b->shutter[0]))
-        pt_diag_fail(&b->diag, pt_params_loc(p, pt_params_find(p, "shutterclose") ? "shutterclose" : "shutteropen"),
-                     "the shutter closes at %g, before it opens at %g", b->shutter[1], b->shutter[0]);
     place_camera(b, p, c);
     c->medium = b->camera_medium;
     if (c->lens_radius > 0)
@@ -256,6 +279,7 @@ static void build_camera(struct pt_builder *b)
 
 int pt_build_header(struct pt_builder *b)
 {
+    build_shutter(b);
     build_film(b);
     if (b->diag.rc)
         return b->diag.rc;

@@ -62,6 +62,13 @@ static void film_filter_and_sampler(void **state)
          PT_FILTER_GAUSSIAN, 1.5, 1.5, 0.5, 1},
         {"Film \"rgb\" \"float iso\" 200 \"float exposuretime\" 0.25 \"float scale\" 7 WorldBegin", 1280, 720, 16,
          PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 1.5, 1.5, 0.5, 0.5},
+        {"Film \"rgb\" \"float iso\" 200 Camera \"perspective\" \"float shutteropen\" 0.1 \"float shutterclose\" 0.4 "
+         "WorldBegin",
+         1280, 720, 16, PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 1.5, 1.5, 0.5, 0.6},
+        {"Camera \"perspective\" \"float shutterclose\" 0.5 Film \"rgb\" \"float exposuretime\" 2 WorldBegin", 1280, 720, 16,
+         PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 1.5, 1.5, 0.5, 2},
+        {"Film \"image\" Camera \"perspective\" \"float shutterclose\" 0.5 WorldBegin", 640, 480, 16, PT_SAMPLER_SOBOL,
+         PT_FILTER_BOX, 0.5, 0.5, 0.5, 1},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct pt_scene_defaults d;
@@ -460,7 +467,10 @@ static void ends_of_ranges(void **state)
         {"PixelFilter \"box\" \"float ywidth\" %s WorldBegin", "100", "101"},
         {"Camera \"perspective\" \"float fov\" %s WorldBegin", "179.9", "180"},
         {"Camera \"perspective\" \"float lensradius\" %s WorldBegin", "0", "-0.1"},
-        {"Camera \"perspective\" \"float shutterclose\" %s WorldBegin", "0", "-0.1"},
+        {"Camera \"perspective\" \"float shutterclose\" %s WorldBegin", "1e-9", "0"},
+        {"Camera \"perspective\" \"float shutterclose\" %s WorldBegin", "1e6", "1.1e6"},
+        {"Film \"image\" Camera \"perspective\" \"float shutterclose\" %s WorldBegin", "0", "-0.1"},
+        {"Film \"rgb\" \"float exposuretime\" 1 Camera \"perspective\" \"float shutterclose\" %s WorldBegin", "0", "-0.1"},
         {"WorldBegin LightSource \"spot\" \"float coneangle\" %s", "180", "181"},
         {"WorldBegin LightSource \"spot\" \"float conedeltaangle\" %s", "0", "-1"},
         {"WorldBegin LightSource \"point\" \"float scale\" %s", "0", "-1"},
