@@ -1,5 +1,6 @@
 #include "pbrt/pbrt.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -322,8 +323,72 @@ static int do_color_space(struct parser *p)
     return 0;
 }
 
+/* `"type name"`, as parameters have it; v4 has the name alone. */
+static int has_type(const struct pt_token *t)
+{
+    size_t at = 0;
+    while (at < t->length && (t->text[at] == ' ' || t->text[at] == '\t'))
+        at++;
+    while (at < t->length && t->text[at] != ' ' && t->text[at] != '\t')
+        at++;
+    while (at < t->length && (t->text[at] == ' ' || t->text[at] == '\t'))
+        at++;
+    return at < t->length;
+}
+
+/* A number, true, false or a string. `value`: NULL, or where a whole number from 0 to 2^31 - 1 goes. */
+static int read_option_value(struct parser *p, const char *name, uint32_t *value)
+{
+    struct pt_token t = pt_lexer_next(&p->lexer);
+    double number = -1;
+    if (t.kind == PT_TOKEN_BAD)
+        return p->b->diag.rc;
+    int is_number = t.kind == PT_TOKEN_WORD && pt_number_parse(t.text, t.length, &number);
+    if (value && is_number && number >= 0 && number <= INT32_MAX && number == floor(number)) {
+        *value = (uint32_t)number;
+        return 0;
+    }
+    static const char *const words[] = {"true", "false", NULL};
+    if (!value && (is_number || t.kind == PT_TOKEN_STRING ||
+                   (t.kind == PT_TOKEN_WORD && base_word_index(words, t.text, t.length) >= 0)))
+        return 0;
+    if (t.kind == PT_TOKEN_OPEN || t.kind == PT_TOKEN_CLOSE || pt_lexer_has_ended(&p->lexer, &t))
+        return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "Option \"%.40s\" has no value", name);
+    return pt_diag_fail(&p->b->diag, t.loc, "Option \"%.40s\" is \"%.*s\" (expected %s)", name,
+                        t.length < 40 ? (int)t.length : 40, t.text,
+                        value ? "a whole number from 0 to 2147483647" : "a number, true, false or a string");
+}
+
+/* pbrt-v4's: a name, of which it ignores case, '-' and '_', and one value. */
+static int read_option(struct parser *p)
+{
+    static const char known[] = " disablepixeljitter disabletexturefiltering disablewavelengthjitter displacementedgescale "
+                                "forcediffuse msereferenceimage msereferenceout pixelstats rendercoordsys wavefront ";
+    char name[NAME_MAX_BYTES], plain[NAME_MAX_BYTES + 2] = " ";
+    size_t n = 1;
+    int rc = pt_parser_read_string(p, "option", name, sizeof name);
+    if (rc)
+        return rc;
+    for (const char *at = name; *at; at++)
+        if (*at != '-' && *at != '_' && *at != ' ' && *at != '\t')
+            plain[n++] = *at >= 'A' && *at <= 'Z' ? (char)(*at - 'A' + 'a') : *at;
+    plain[n] = ' ';
+    plain[n + 1] = '\0';
+    if (strcmp(plain, " seed ") == 0)
+        return read_option_value(p, name, &p->b->defaults->integrator.seed);
+    if (n == 1 || !strstr(known, plain))
+        return pt_diag_fail(&p->b->diag, p->loc, "unknown option \"%.40s\"", name);
+    rc = read_option_value(p, name, NULL);
+    if (!rc)
+        pt_diag_warn(&p->b->diag, p->loc, "Option \"%s\" is ignored", name);
+    return rc ? rc : p->b->diag.rc;
+}
+
 static int do_option(struct parser *p)
 {
+    const struct pt_token first = pt_lexer_peek(&p->lexer);
+    if (first.kind != PT_TOKEN_STRING || !has_type(&first))
+        return read_option(p);
     pt_params_clear(&p->params, &p->b->diag, p->loc);
     int rc = pt_params_read(&p->params, &p->lexer);
     for (size_t i = 0; i < p->params.count && !rc; i++) {
