@@ -32,13 +32,14 @@ void pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_sce
     b->lights.size = sizeof(struct pt_light);
     b->media.size = sizeof(struct pt_medium);
     b->medium_infos.size = sizeof(struct pt_medium_info);
+    b->name_undo.size = sizeof(struct pt_name_undo);
 }
 
 void pt_builder_release(struct pt_builder *b)
 {
     struct pt_list *lists[] = {&b->images,   &b->textures,     &b->materials,     &b->material_infos, &b->meshes,
                                &b->quadrics, &b->world_shapes, &b->object_shapes, &b->objects,        &b->instances,
-                               &b->lights,   &b->media,        &b->medium_infos};
+                               &b->lights,   &b->media,        &b->medium_infos,  &b->name_undo};
     struct pt_names *names[] = {&b->float_textures, &b->colour_textures, &b->named_materials,
                                 &b->media_names,    &b->object_names,    &b->image_names};
     for (size_t i = 0; i < sizeof lists / sizeof lists[0]; i++)
@@ -64,6 +65,28 @@ int32_t pt_list_add(struct pt_builder *b, struct pt_list *list, const void *item
 void pt_builder_path(struct pt_builder *b, const char *name, char *path, size_t room)
 {
     snprintf(path, room, "%s%s", name[0] == '/' ? "" : b->directory, name);
+}
+
+int pt_builder_name(struct pt_builder *b, struct pt_names *names, const char *name, int32_t value)
+{
+    if (b->name_scopes > 0) {
+        struct pt_name_undo undo = {names, pt_arena_strndup(&b->scene->arena, name, strlen(name)),
+                                    pt_names_get(names, name)};
+        if (!undo.name)
+            return pt_diag_nomem(&b->diag, "names");
+        if (pt_list_add(b, &b->name_undo, &undo) < 0)
+            return b->diag.rc;
+    }
+    return pt_names_set(names, name, value) == 0 ? 0 : pt_diag_nomem(&b->diag, "names");
+}
+
+void pt_builder_forget_names(struct pt_builder *b, size_t count)
+{
+    const struct pt_name_undo *undo = b->name_undo.items;
+    for (; b->name_undo.count > count; b->name_undo.count--) {
+        const struct pt_name_undo *last = &undo[b->name_undo.count - 1];
+        pt_names_set(last->names, last->name, last->value); /* it is there: nothing can fail */
+    }
 }
 
 void pt_builder_effect(struct pt_builder *b, pt_effects bits, struct pt_loc loc)

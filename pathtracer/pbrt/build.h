@@ -65,6 +65,13 @@ struct pt_medium_info {
     const char *name;                 /* in the scene's arena */
 };
 
+/* What a name meant. */
+struct pt_name_undo {
+    struct pt_names *names;
+    const char *name; /* in the scene's arena */
+    int32_t value;
+};
+
 struct pt_builder {
     struct pt_scene *scene; /* being made; its arena is in use from the start */
     struct pt_scene_defaults *defaults;
@@ -84,6 +91,8 @@ struct pt_builder {
     struct pt_list images, textures, materials, material_infos, meshes, quadrics, world_shapes, object_shapes, objects,
         instances, lights, media, medium_infos;
     struct pt_names float_textures, colour_textures, named_materials, media_names, object_names, image_names;
+    int name_scopes;          /* of v3: blocks that are open and at whose end names mean again what they did before */
+    struct pt_list name_undo; /* struct pt_name_undo: what names meant that were set in those */
 
     int32_t open_object;         /* between ObjectBegin and ObjectEnd, else -1 */
     double (*object_offsets)[3]; /* owns: origin of each object's space in the space it was defined in */
@@ -101,6 +110,10 @@ int pt_builder_finish(struct pt_builder *b);
 int32_t pt_list_add(struct pt_builder *b, struct pt_list *list, const void *item);
 /* Joins a scene-relative file name to the main file's folder. */
 void pt_builder_path(struct pt_builder *b, const char *name, char *path, size_t room);
+/* Names a material or texture. pbrt-v3 keeps these in the graphics state, pbrt-v4 has one meaning for all of the scene. */
+int pt_builder_name(struct pt_builder *b, struct pt_names *names, const char *name, int32_t value);
+/* Takes back what was named since name_undo had `count` entries. */
+void pt_builder_forget_names(struct pt_builder *b, size_t count);
 /* Turns on an effect; the first caller's place is the reason. */
 void pt_builder_effect(struct pt_builder *b, pt_effects bits, struct pt_loc loc);
 /* Transforms at shutter open and close. */

@@ -411,7 +411,5 @@ int pt_build_texture(struct pt_builder *b, const char *name, const char *class_n
     if (left == 0)
         return pt_diag_fail(&b->diag, p->loc, "texture \"%.63s\" is made of more than %d others", name, MAX_LOOKUPS - 1);
     int32_t id = pt_list_add(b, &b->textures, &t);
-    if (id < 0 || pt_names_set(is_float ? &b->float_textures : &b->colour_textures, name, id) != 0)
-        return pt_diag_nomem(&b->diag, "textures");
-    return b->diag.rc;
+    return id < 0 ? b->diag.rc : pt_builder_name(b, is_float ? &b->float_textures : &b->colour_textures, name, id);
 }

@@ -47,18 +47,19 @@ static int grow(struct pt_names *names)
 
 int pt_names_set(struct pt_names *names, const char *name, int32_t value)
 {
+    uint32_t hash = hash_of(name);
+    struct pt_names_entry *e = names->room > 0 ? slot_of(names->entries, names->room, name, hash) : NULL;
+    if (e && e->name) {
+        e->value = value;
+        return 0;
+    }
     if ((names->count + 1) * 4 > names->room * 3 && grow(names) != 0)
         return BASE_ENOMEM;
-    uint32_t hash = hash_of(name);
-    struct pt_names_entry *e = slot_of(names->entries, names->room, name, hash);
-    if (!e->name) {
-        char *copy = strdup(name);
-        if (!copy)
-            return BASE_ENOMEM;
-        *e = (struct pt_names_entry){copy, hash, value};
-        names->count++;
-    }
-    e->value = value;
+    char *copy = strdup(name);
+    if (!copy)
+        return BASE_ENOMEM;
+    *slot_of(names->entries, names->room, name, hash) = (struct pt_names_entry){copy, hash, value};
+    names->count++;
     return 0;
 }
 

@@ -73,12 +73,18 @@ static int read_entity(struct parser *p, int target)
 
 /* --- blocks ----------------------------------------------------------------------------------------------------------- */
 
+/* Whether names that are given in such a block end with it. */
+static int has_names(const struct parser *p, char kind) { return p->b->is_v3 && (kind == 'A' || kind == 'O'); }
+
 static int push(struct parser *p, char kind)
 {
-    struct frame f = {p->state, kind, p->loc};
+    struct frame f = {p->state, kind, p->loc, p->b->name_undo.count};
     if (p->frames.count >= STATE_DEPTH)
         return pt_diag_fail(&p->b->diag, p->loc, "blocks nested more than %d deep", STATE_DEPTH);
-    return pt_list_add(p->b, &p->frames, &f) < 0 ? p->b->diag.rc : 0;
+    if (pt_list_add(p->b, &p->frames, &f) < 0)
+        return p->b->diag.rc;
+    p->b->name_scopes += has_names(p, kind);
+    return 0;
 }
 
 static const char *begin_name(char kind)
@@ -112,6 +118,10 @@ static int pop(struct parser *p, char kind, const char *end_name)
         p->state.active = top->state.active;
     } else {
         p->state = top->state;
+    }
+    if (has_names(p, kind)) {
+        pt_builder_forget_names(p->b, top->named);
+        p->b->name_scopes--;
     }
     p->frames.count--;
     return 0;
@@ -244,9 +254,7 @@ static int do_make_named_material(struct parser *p)
     if (!type)
         return pt_diag_fail(&p->b->diag, p->loc, "MakeNamedMaterial \"%s\" without \"string type\"", name);
     int32_t id = pt_build_material(p->b, type, &p->params);
-    if (id >= 0 && pt_names_set(&p->b->named_materials, name, id) != 0)
-        return pt_diag_nomem(&p->b->diag, "materials");
-    return p->b->diag.rc;
+    return id < 0 ? p->b->diag.rc : pt_builder_name(p->b, &p->b->named_materials, name, id);
 }
 
 static int do_named_material(struct parser *p)

@@ -12,6 +12,7 @@ struct frame {
     struct pt_state state;
     char kind; /* 'A'ttribute, 'T'ransform, 'O'bject, 'I'mport */
     struct pt_loc loc;
+    size_t named; /* pt_builder.name_undo.count when it was opened */
 };
 
 struct parser {
