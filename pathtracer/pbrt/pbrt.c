@@ -113,7 +113,8 @@ static int pop(struct parser *p, char kind, const char *end_name)
         return pt_diag_fail(&p->b->diag, p->loc, "%s without %s", end_name, begin_name(kind));
     if (top->kind != kind)
         return fail_open(p, end_name);
-    if (kind == 'T') {
+    /* In v4 TransformBegin is an old name of AttributeBegin, which belongs into the world. */
+    if (kind == 'T' && (p->b->is_v3 || !p->in_world)) {
         memcpy(p->state.ctm, top->state.ctm, sizeof p->state.ctm);
         p->state.active = top->state.active;
     } else {
