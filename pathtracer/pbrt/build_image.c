@@ -51,7 +51,15 @@ static double exposure_time(struct pt_builder *b, struct pt_params *film)
     return open_s;
 }
 
-/* A window in pixels is of the file's own size: as shares it fits the size that the options ask for. */
+static void sort_pair(double edges[2])
+{
+    const double low = fmin(edges[0], edges[1]);
+    edges[1] = fmax(edges[0], edges[1]);
+    edges[0] = low;
+}
+
+/* A window in pixels is of the file's own size: as shares it fits the size that the options ask for. Of both kinds of window
+ * pbrt takes the shares, and either may be given backwards (FilmBaseParameters). */
 static void set_crop(struct pt_builder *b, struct pt_params *p, const int file_size[2])
 {
     struct pt_scene_defaults *d = b->defaults;
@@ -59,17 +67,20 @@ static void set_crop(struct pt_builder *b, struct pt_params *p, const int file_s
     size_t n;
     const double *window = pt_params_floats(p, "cropwindow", 1, &n);
     double edges[4] = {0, 1, 0, 1};
-    if (window && n == 4) {
-        memcpy(edges, window, sizeof edges);
-    } else if (window) {
+    if (window && n != 4)
         pt_diag_fail(&b->diag, pt_params_find(p, "cropwindow")->loc, "cropwindow has %zu values (expected 4)", n);
-    }
+    else if (window)
+        memcpy(edges, window, sizeof edges);
     const double *bounds = pt_params_ints(p, "pixelbounds", &n);
-    if (bounds && n == 4)
+    if (bounds && n != 4)
+        pt_diag_fail(&b->diag, pt_params_find(p, "pixelbounds")->loc, "pixelbounds has %zu values (expected 4)", n);
+    else if (bounds && window)
+        pt_diag_warn(&b->diag, pt_params_find(p, "pixelbounds")->loc, "pixelbounds give way to the cropwindow");
+    else if (bounds)
         for (int i = 0; i < 4; i++)
             edges[i] = bounds[i] / file_size[i / 2];
-    else if (bounds)
-        pt_diag_fail(&b->diag, pt_params_find(p, "pixelbounds")->loc, "pixelbounds has %zu values (expected 4)", n);
+    sort_pair(edges);
+    sort_pair(edges + 2);
     int at[4];
     for (int i = 0; i < 4; i++)
         at[i] = (int)ceil(fmin(fmax(edges[i], 0), 1) * size[i / 2] - 1e-6);
@@ -78,7 +89,7 @@ static void set_crop(struct pt_builder *b, struct pt_params *p, const int file_s
     d->crop[2] = at[1];
     d->crop[3] = at[3];
     if (at[0] >= at[1] || at[2] >= at[3])
-        pt_diag_fail(&b->diag, pt_params_loc(p, bounds ? "pixelbounds" : "cropwindow"),
+        pt_diag_fail(&b->diag, pt_params_loc(p, window ? "cropwindow" : "pixelbounds"),
                      "the crop window holds no pixel (expected x0 < x1 and y0 < y1 in it)");
 }
 
