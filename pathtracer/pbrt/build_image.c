@@ -255,6 +255,17 @@ static void place_camera(struct pt_builder *b, struct pt_params *p, struct pt_ca
     }
 }
 
+/* v3 knows half of it, too, for exporters that write that (cameras/perspective.cpp). */
+static double read_fov(struct pt_builder *b, struct pt_params *p)
+{
+    double fov = pt_params_float_in(p, "fov", 90, 1e-3, 179.9);
+    double half = b->is_v3 ? pt_params_float(p, "halffov", 0) : 0;
+    if (half > 179.9 / 2)
+        pt_diag_fail(&b->diag, pt_params_loc(p, "halffov"), "parameter \"halffov\" is %g (expected at most %g)", half,
+                     179.9 / 2);
+    return half > 0 ? fmax(2 * half, 1e-3) : fov;
+}
+
 /* What the options replace is read all the same: it is checked, and counts as used. */
 static void build_camera(struct pt_builder *b)
 {
@@ -270,7 +281,7 @@ static void build_camera(struct pt_builder *b)
     } else if (c->kind == PT_CAMERA_PERSPECTIVE && strcmp(kind, "perspective") != 0) {
         pt_diag_fail(&b->diag, p->loc, "unknown camera \"%s\" (expected perspective or orthographic)", kind);
     }
-    c->fov_deg = c->kind == PT_CAMERA_PERSPECTIVE ? (float)pt_params_float_in(p, "fov", 90, 1e-3, 179.9) : 0;
+    c->fov_deg = c->kind == PT_CAMERA_PERSPECTIVE ? (float)read_fov(b, p) : 0;
     if (b->options->view.fov_deg > 0) {
         if (c->kind == PT_CAMERA_ORTHOGRAPHIC)
             pt_diag_fail(&b->diag, p->loc, "the camera is orthographic, which --fov cannot change");

@@ -26,7 +26,7 @@ static const char known_names[] =
     "conductor.uroughness conductor.vroughness coneangle conedeltaangle crop cropwindow ctm degree density detaillevel "
     "diagonal dimension displacement displayserver edgelength emissionfilename encoding eta eumelanin eta.eta "
     "exposuretime faceIndices filename filter filteradius filtertype flatness focaldistance focallength fov "
-    "frameaspectratio from g gamma height illuminance imagefile index indices inside innerradius interface.eta "
+    "frameaspectratio from g gamma halffov height illuminance imagefile index indices inside innerradius interface.eta "
     "interface.roughness interface.uroughness interface.vroughness invert iso k lensfile lensradius levels "
     "lightsamplestrategy lightsampler mapname mapping materials maxanisotropy maxcomponentvalue maxdepth maxnodeprims "
     "maxprims maxsampleluminance mediumname mfp minsamples namedmaterial1 namedmaterial2 nlevels nsamples normalmap "
