@@ -23,6 +23,10 @@ int pt_lexer_include(struct pt_lexer *lexer, const char *path, struct pt_loc fro
         free(file.bytes);
         return pt_diag_nomem(lexer->diag, "file names");
     }
+    if (size >= 2 && (memcmp(file.bytes, "\xff\xfe", 2) == 0 || memcmp(file.bytes, "\xfe\xff", 2) == 0)) {
+        free(file.bytes);
+        return pt_diag_fail(lexer->diag, file.loc, "the text is UTF-16 (expected UTF-8)");
+    }
     file.at = file.line_start = file.bytes;
     file.end = file.bytes + size;
     if (size >= 3 && memcmp(file.bytes, "\xef\xbb\xbf", 3) == 0)

@@ -4,6 +4,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <zlib.h>
 
 #include "base/files.h"
@@ -94,7 +95,7 @@ static int read_file(void *data, const char *path, char **bytes, size_t *size, s
     int rc = note_file(data, path, err);
     if (!rc)
         rc = base_file_read(path, max_file_bytes, &raw, &n, err);
-    if (rc || length < 3 || strcmp(path + length - 3, ".gz") != 0) {
+    if (rc || length < 3 || strcasecmp(path + length - 3, ".gz") != 0) {
         if (!rc) {
             *bytes = raw;
             *size = n;

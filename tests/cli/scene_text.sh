@@ -1,5 +1,6 @@
 #!/bin/sh
-# Scenes and spectra as editors of other systems write them: line ends of CR and of CR LF, a mark (U+FEFF) at the beginning.
+# Scenes and spectra as editors of other systems write them: line ends of CR and of CR LF, a mark (U+FEFF) at the beginning; UTF-16 is
+# refused. Packed files may have names in capitals.
 . "$(dirname "$0")/lull_render_setup"
 
 cat >lf.pbrt <<'S'
@@ -35,4 +36,34 @@ printf '400 1\r\n500 1\r600 x\r' >s.spd
 refused 's.spd:3: "x" (expected a number)' cr.pbrt -q --spp 1 -o x.exr
 refused 'cr.pbrt:7:20: ' cr.pbrt -q --spp 1 -o x.exr
 refused 'crlf.pbrt:7:20: ' crlf.pbrt -q --spp 1 -o x.exr
+
+{ printf '\377\376'; sed 's/./&\x00/g; s/$/\r\x00/' lf.pbrt; } >u16.pbrt
+refused 'u16.pbrt:1:1: the text is UTF-16 (expected UTF-8)' u16.pbrt -q --spp 1 -o x.exr
+{ printf '\376\377'; sed 's/./\x00&/g' lf.pbrt; } >u16.part
+printf 'WorldBegin\nInclude "u16.part"\n' >u16.pbrt
+refused 'u16.part:1:1: the text is UTF-16 (expected UTF-8)' u16.pbrt -q --spp 1 -o x.exr
+
+cp lf.spd s.spd
+cat >m.ply <<'S'
+ply
+format ascii 1.0
+element vertex 3
+property float x
+property float y
+property float z
+element face 1
+property list uchar int vertex_indices
+end_header
+-9 -9 0
+9 -9 0
+0 9 0
+3 0 1 2
+S
+gzip -c m.ply >M.PLY.GZ
+sed 's/^Shape .*/Shape "plymesh" "string filename" "m.ply"/' lf.pbrt >ply.pbrt
+sed 's/m\.ply/M.PLY.GZ/' ply.pbrt | gzip -c >L.PBRT.GZ
+t "a mesh" picture ply lf.exr
+sed 's/m\.ply/M.PLY.GZ/' ply.pbrt >packed.pbrt
+t "the same in .PLY.GZ" same packed
+t "a scene in .PBRT.GZ" "$P" L.PBRT.GZ -q --spp 1 --strict -o x.exr
 exit $bad
