@@ -120,14 +120,14 @@ int pt_build_colour(struct pt_builder *b, struct pt_params *p, const char *name,
         return 0;
     param->used = 1;
     const double *v = values_of(p, param);
+    const int space = param->colour_space > 0 ? param->colour_space - 1 : b->state->colour_space;
     switch (param->type) {
     case PT_PARAM_RGB:
     case PT_PARAM_XYZ:
         if (!pt_param_has(p, param, 3))
             return 0;
-        rgb = param->type == PT_PARAM_XYZ
-                  ? pt_xyz_to_rgb(v[0], v[1], v[2])
-                  : pt_colour_to_rec709(b->state->colour_space, v3((float)v[0], (float)v[1], (float)v[2]));
+        rgb = param->type == PT_PARAM_XYZ ? pt_xyz_to_rgb(v[0], v[1], v[2])
+                                          : pt_colour_to_rec709(space, v3((float)v[0], (float)v[1], (float)v[2]));
         break;
     case PT_PARAM_FLOAT: /* a grey, as v2 files and quick tests have it */
         if (!pt_param_has(p, param, 1))

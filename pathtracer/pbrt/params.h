@@ -35,6 +35,7 @@ struct pt_param {
     int is_text; /* values are strings (always for STRING, TEXTURE; SPECTRUM by name) */
     int used;
     int inherited;       /* from an Attribute directive: not an error when unused */
+    int colour_space;    /* 1 + enum pt_colour_space, where an Attribute was given; 0: that of the directive */
     size_t first, count; /* range in numbers, or in strings */
     struct pt_loc loc;
 };

@@ -305,6 +305,8 @@ static int do_attribute(struct parser *p)
     if (target < 0)
         return pt_diag_fail(&p->b->diag, p->loc, "Attribute \"%s\" (expected shape, light, material, medium or texture)",
                             kind);
+    for (size_t i = 0; i < p->params.count; i++)
+        p->params.items[i].colour_space = 1 + p->state.colour_space;
     /* New values win over those set before. */
     if (p->state.attributes[target] && (rc = pt_params_append(&p->params, p->state.attributes[target])) != 0)
         return rc;
