@@ -126,6 +126,17 @@ static void make_translucent(struct pt_making *c)
         pt_diag_warn(&c->b->diag, pt_params_loc(c->p, "Ks"), "Ks of a translucent material is ignored");
 }
 
+/* pbrt-v3 mixes matte where there is no material of that name. */
+static int32_t mixed(struct pt_making *c, const char *parameter)
+{
+    const struct pt_param *param = pt_params_find(c->p, parameter);
+    const char *name = pt_params_string(c->p, parameter, "");
+    if (!c->b->is_v3 || pt_names_get(&c->b->named_materials, name) >= 0)
+        return pt_build_material_named(c->b, param->loc, name);
+    pt_diag_warn(&c->b->diag, param->loc, "unknown material \"%s\": matte in its stead", name);
+    return pt_build_default_material(c->b);
+}
+
 /* v3 gives the share of the first material, v4 that of the second. */
 static void make_mix(struct pt_making *c)
 {
@@ -135,8 +146,8 @@ static void make_mix(struct pt_making *c)
         pt_diag_fail(&c->b->diag, c->p->loc, "mix needs \"string namedmaterial1\" and \"string namedmaterial2\"");
         return;
     }
-    c->m->mix_b = pt_build_material_named(c->b, first->loc, pt_params_string(c->p, "namedmaterial1", ""));
-    c->m->mix_a = pt_build_material_named(c->b, second->loc, pt_params_string(c->p, "namedmaterial2", ""));
+    c->m->mix_b = mixed(c, "namedmaterial1");
+    c->m->mix_a = mixed(c, "namedmaterial2");
     struct pt_param *amount = pt_params_find(c->p, "amount");
     c->m->mix_amount = amount && amount->type == PT_PARAM_FLOAT ? pt_build_float_input(c->b, c->p, "amount", 0.5)
                                                                 : read_share(c, "amount", 0.5f);

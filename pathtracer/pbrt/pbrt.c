@@ -264,7 +264,11 @@ static int do_named_material(struct parser *p)
     int rc = pt_parser_read_string(p, "material name", name, sizeof name);
     if (rc)
         return rc;
-    p->state.material = pt_build_material_named(p->b, p->loc, name);
+    /* pbrt-v3 says so and goes on. */
+    if (p->b->is_v3 && pt_names_get(&p->b->named_materials, name) < 0)
+        pt_diag_warn(&p->b->diag, p->loc, "unknown material \"%s\": the one of before stays", name);
+    else
+        p->state.material = pt_build_material_named(p->b, p->loc, name);
     return p->b->diag.rc;
 }
 
