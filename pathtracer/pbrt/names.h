@@ -19,7 +19,8 @@ struct pt_names {
 
 /* The number of `name`, -1 when there is none. */
 int32_t pt_names_get(const struct pt_names *names, const char *name);
-/* Sets or replaces; value >= 0, or -1: as if there were none. BASE_ENOMEM on failure, *names then as before; a name that is there never fails. */
+/* Sets or replaces; value >= 0, or -1: as if there were none. BASE_ENOMEM on failure, *names then as before; replacing never
+ * fails. */
 int pt_names_set(struct pt_names *names, const char *name, int32_t value);
 void pt_names_release(struct pt_names *names);
 

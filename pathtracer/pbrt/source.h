@@ -18,8 +18,8 @@ struct pt_source {
     int files; /* 1: paths are real files that other libraries may open */
 };
 
-/* The file system. Names that end in .gz, in small letters or capitals, are unpacked. Files above 2 GiB are refused. Every file read is put into `inputs`
- * (borrowed; may be NULL). */
+/* The file system. Names that end in .gz, in small letters or capitals, are unpacked. Files above 2 GiB are refused. Every
+ * file read is put into `inputs` (borrowed; may be NULL). */
 struct pt_source pt_source_files(struct base_inputs *inputs);
 
 /* What a gzip file holds, all of its members after each other; as pt_source.read. BASE_EINVAL when one is damaged, or when
