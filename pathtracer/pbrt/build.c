@@ -42,6 +42,12 @@ void pt_builder_release(struct pt_builder *b)
                                &b->lights,   &b->media,        &b->medium_infos,  &b->name_undo};
     struct pt_names *names[] = {&b->float_textures, &b->colour_textures, &b->named_materials,
                                 &b->media_names,    &b->object_names,    &b->image_names};
+    const struct pt_material_info *infos = b->material_infos.items;
+    for (size_t i = 0; i < b->material_infos.count; i++) {
+        if (infos[i].params)
+            pt_params_release(infos[i].params);
+        free(infos[i].params);
+    }
     for (size_t i = 0; i < sizeof lists / sizeof lists[0]; i++)
         free(lists[i]->items);
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)

@@ -59,6 +59,8 @@ struct pt_material_info {
     int has_opacity; /* of v3's uber, of what is mixed with an interface: becomes the alpha of shapes */
     struct pt_input opacity;
     int used;
+    struct pt_params
+        *params; /* owns; what it was made of, its kind included: of v3, where shapes may change it; else NULL */
 };
 struct pt_medium_info {
     struct pt_loc defined, first_use; /* line 0: not yet */
@@ -156,6 +158,9 @@ struct pt_input pt_input_luminance(struct pt_builder *b, struct pt_input in);
 /* build_material.c, build_material_v3.c: id, or -1. */
 int32_t pt_build_material(struct pt_builder *b, const char *kind, struct pt_params *p);
 int32_t pt_build_default_material(struct pt_builder *b);
+/* v3: parameters of a shape that are of its material (`id`, -1: the default) go before the material's own. Marks them as
+ * used; the id of the material with them, `id` when there are none, -1 after a failure. */
+int32_t pt_build_shape_material(struct pt_builder *b, int32_t id, struct pt_params *shape);
 /* A material while its parameters are read. */
 struct pt_making {
     struct pt_builder *b;

@@ -2,8 +2,10 @@
  * simulated. */
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "base/options.h"
 #include "pbrt/build.h"
 #include "shade/bsdf_models.h"
 
@@ -269,7 +271,7 @@ static int32_t add(struct pt_builder *b, const struct pt_material *m, const stru
     return pt_list_add(b, &b->materials, m);
 }
 
-int32_t pt_build_material(struct pt_builder *b, const char *kind, struct pt_params *p)
+static int32_t build(struct pt_builder *b, const char *kind, struct pt_params *p)
 {
     struct pt_material m = {.kind = PT_BSDF_DIFFUSE, .eta = 1.5f};
     struct pt_material_info info = {.loc = p->loc, .opacity = pt_input_grey(1)};
@@ -291,6 +293,106 @@ int32_t pt_build_material(struct pt_builder *b, const char *kind, struct pt_para
         m.normal_map = pt_build_image_texture(b, map->loc, pt_params_string(p, "normalmap", ""), "linear");
     pt_params_check_used(p);
     return !b->diag.rc ? add(b, &m, &info) : -1;
+}
+
+static void keep_params(struct pt_builder *b, int32_t id, const char *kind, const struct pt_params *p)
+{
+    struct pt_params *copy = calloc(1, sizeof *copy);
+    if (!copy) {
+        pt_diag_nomem(&b->diag, "materials");
+        return;
+    }
+    ((struct pt_material_info *)b->material_infos.items)[id].params = copy;
+    pt_params_clear(copy, &b->diag, p->loc);
+    copy->kind = pt_params_keep(copy, kind, strlen(kind));
+    pt_params_append(copy, p);
+}
+
+int32_t pt_build_material(struct pt_builder *b, const char *kind, struct pt_params *p)
+{
+    int32_t id = build(b, kind, p);
+    if (id >= 0 && b->is_v3)
+        keep_params(b, id, kind, p);
+    return id;
+}
+
+/* What v3's materials know and its shapes do not. */
+static int is_of_materials(const char *name)
+{
+    static const char *const names[] = {"Kd",
+                                        "Ks",
+                                        "Kr",
+                                        "Kt",
+                                        "amount",
+                                        "anisotropic",
+                                        "beta_m",
+                                        "beta_n",
+                                        "bsdffile",
+                                        "bumpmap",
+                                        "clearcoat",
+                                        "clearcoatgloss",
+                                        "color",
+                                        "difftrans",
+                                        "eta",
+                                        "eumelanin",
+                                        "flatness",
+                                        "g",
+                                        "index",
+                                        "k",
+                                        "metallic",
+                                        "mfp",
+                                        "namedmaterial1",
+                                        "namedmaterial2",
+                                        "opacity",
+                                        "pheomelanin",
+                                        "reflect",
+                                        "remaproughness",
+                                        "roughness",
+                                        "scale",
+                                        "scatterdistance",
+                                        "sheen",
+                                        "sheentint",
+                                        "sigma",
+                                        "sigma_a",
+                                        "sigma_s",
+                                        "spectrans",
+                                        "speculartint",
+                                        "thin",
+                                        "transmit",
+                                        "uroughness",
+                                        "vroughness",
+                                        NULL};
+    return base_word_index(names, name, strlen(name)) >= 0;
+}
+
+int32_t pt_build_shape_material(struct pt_builder *b, int32_t id, struct pt_params *shape)
+{
+    struct pt_params both = {0};
+    size_t asked = 0, taken = 0;
+    for (size_t i = 0; i < shape->count; i++)
+        asked += (size_t)is_of_materials(pt_param_name(shape, &shape->items[i]));
+    if (asked == 0)
+        return id;
+    const struct pt_params *own = id >= 0 ? ((struct pt_material_info *)b->material_infos.items)[id].params : NULL;
+    const char *kind = own ? pt_params_kind(own) : "matte";
+    pt_params_clear(&both, &b->diag, shape->loc);
+    both.kind = pt_params_keep(&both, kind, strlen(kind));
+    pt_params_append(&both, shape);
+    if (own)
+        pt_params_append(&both, own);
+    int32_t made = b->diag.rc ? -1 : build(b, pt_params_kind(&both), &both);
+    for (size_t i = 0; i < shape->count && made >= 0; i++) {
+        const char *name = pt_param_name(shape, &shape->items[i]);
+        if (!is_of_materials(name) || !pt_params_find(&both, name)->used)
+            continue;
+        shape->items[i].used = 1;
+        taken++;
+    }
+    pt_params_release(&both);
+    if (b->diag.rc || taken > 0)
+        return b->diag.rc ? -1 : made;
+    b->materials.count = b->material_infos.count = (size_t)made; /* it is the last, and nobody has it */
+    return id;
 }
 
 int32_t pt_build_default_material(struct pt_builder *b)

@@ -237,7 +237,15 @@ static int do_world_end(struct parser *p)
 
 /* --- world ------------------------------------------------------------------------------------------------------------ */
 
-static int do_shape(struct parser *p) { return pt_build_shape(p->b, &p->params); }
+static int do_shape(struct parser *p)
+{
+    const int32_t material = p->state.material;
+    if (p->b->is_v3)
+        p->state.material = pt_build_shape_material(p->b, material, &p->params);
+    int rc = p->b->diag.rc ? p->b->diag.rc : pt_build_shape(p->b, &p->params);
+    p->state.material = material;
+    return rc;
+}
 
 static int do_light_source(struct parser *p) { return pt_build_light(p->b, &p->params); }
 
