@@ -326,13 +326,9 @@ static void numbers_in_other_locales(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(tokens_and_places), cmocka_unit_test(line_ends),
-                                       cmocka_unit_test(list_across_files),
-                                       cmocka_unit_test(include_loops),
-                                       cmocka_unit_test(characters),
-                                       cmocka_unit_test(names),
-                                       cmocka_unit_test(include_depth),
-                                       cmocka_unit_test(parameter_spellings),
-                                       cmocka_unit_test(numbers),
-                                       cmocka_unit_test(numbers_in_other_locales)};
+                                       cmocka_unit_test(list_across_files), cmocka_unit_test(include_loops),
+                                       cmocka_unit_test(characters),        cmocka_unit_test(names),
+                                       cmocka_unit_test(include_depth),     cmocka_unit_test(parameter_spellings),
+                                       cmocka_unit_test(numbers),           cmocka_unit_test(numbers_in_other_locales)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
