@@ -29,12 +29,23 @@ static const char text[] =
     "ActiveTransform EndTime Translate 1 0 0 ActiveTransform All Shape \"disk\" CoordinateSystem \"here\" Material "
     "\"hair\"\n";
 
+/* v3: names end with their block, shapes set parameters of their material. */
+static const char v3_text[] =
+    "Film \"image\" \"integer xresolution\" 8 Option \"seed\" 5 WorldBegin Material \"matte\" Shape \"disk\" \"rgb Kd\" [ 0 "
+    "1 0 ]\n"
+    "AttributeBegin MakeNamedMaterial \"m\" \"string type\" \"uber\" \"spectrum Kd\" [ 400 0.1 700 0.2 ] NamedMaterial "
+    "\"m\" "
+    "Texture \"t\" \"float\" \"constant\" Shape \"disk\" \"rgb opacity\" [ 0.5 0.5 0.5 ] \"texture bumpmap\" \"t\" "
+    "AttributeEnd\n"
+    "Shape \"sphere\" \"rgb Kr\" [ 1 1 1 ] NamedMaterial \"m\" Material \"mix\" \"string namedmaterial1\" \"x\" "
+    "\"string namedmaterial2\" \"y\" Shape \"disk\"\n";
+
 enum { MORE_THAN_IT_TAKES = 20000 };
 
-static int read_once(struct base_err *err)
+static int read_once(const char *scene_text, struct base_err *err)
 {
     static const struct pt_load_options options;
-    struct pt_source_single single = {"t.pbrt", text, sizeof text - 1};
+    struct pt_source_single single = {"t.pbrt", scene_text, strlen(scene_text)};
     struct pt_source source = pt_source_from_memory(&single);
     struct pt_scene_defaults defaults = {0};
     struct pt_scene scene = {0};
@@ -46,16 +57,15 @@ static int read_once(struct base_err *err)
     return rc;
 }
 
-static void reading(void **state)
+static void fail_each(const char *scene_text)
 {
-    (void)state;
     int failures = 0;
     struct base_err err = {0};
-    assert_int_equal(read_once(&err), 0);
+    assert_int_equal(read_once(scene_text, &err), 0);
     for (long k = 1; k < MORE_THAN_IT_TAKES; k++) {
         err = (struct base_err){0};
         fail_arm(k);
-        int rc = read_once(&err);
+        int rc = read_once(scene_text, &err);
         int reached = fail_disarm();
         if (!reached) {
             assert_int_equal(rc, 0);
@@ -66,6 +76,18 @@ static void reading(void **state)
             fail_msg("allocation %ld: code %d, \"%s\"", k, rc, err.text);
     }
     assert_true(failures > 50);
+}
+
+static void reading(void **state)
+{
+    (void)state;
+    fail_each(text);
+}
+
+static void reading_v3(void **state)
+{
+    (void)state;
+    fail_each(v3_text);
 }
 
 static void ply(void **state)
@@ -94,6 +116,6 @@ static void ply(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(reading), cmocka_unit_test(ply)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(reading), cmocka_unit_test(reading_v3), cmocka_unit_test(ply)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
