@@ -59,8 +59,8 @@ struct pt_material_info {
     int has_opacity; /* of v3's uber, of what is mixed with an interface: becomes the alpha of shapes */
     struct pt_input opacity;
     int used;
-    struct pt_params
-        *params; /* owns; what it was made of, its kind included: of v3, where shapes may change it; else NULL */
+    const char *wanted;       /* of v4: the name that it is used by before it is made, in the scene's arena; else NULL */
+    struct pt_params *params; /* owns; of v3: its kind and parameters, which shapes may change; else NULL */
 };
 struct pt_medium_info {
     struct pt_loc defined, first_use; /* line 0: not yet */
@@ -178,8 +178,14 @@ void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallba
 int32_t pt_build_bump(struct pt_builder *b, struct pt_params *p, const char *name);
 /* For a mix whose materials and amount are read: what of them lets rays through becomes its opacity. */
 void pt_build_mix_opacity(struct pt_making *making);
-/* Material by the name that string i of a parameter gives; -1 after a failure. */
+/* A material of a mix by its name, made before; -1 after a failure. */
 int32_t pt_build_material_named(struct pt_builder *b, struct pt_loc loc, const char *name);
+/* The material of NamedMaterial, `before` where a v3 scene names none. v4 may make it further down. -1 after a failure. */
+int32_t pt_build_named_material(struct pt_builder *b, struct pt_loc loc, const char *name, int32_t before);
+/* MakeNamedMaterial. */
+int pt_build_make_named_material(struct pt_builder *b, const char *name, const char *kind, struct pt_params *p);
+/* Fails for a name that was used and never given. */
+int pt_build_materials_check(struct pt_builder *b);
 
 /* build_light.c */
 int pt_build_light(struct pt_builder *b, struct pt_params *p);

@@ -63,12 +63,18 @@ int32_t pt_build_bump(struct pt_builder *b, struct pt_params *p, const char *nam
     return pt_build_float_input(b, p, name, 0).texture; /* a constant displaces nothing */
 }
 
+static struct pt_material_info *info_of(const struct pt_builder *b, int32_t id)
+{
+    return (struct pt_material_info *)b->material_infos.items + id;
+}
+
 int32_t pt_build_material_named(struct pt_builder *b, struct pt_loc loc, const char *name)
 {
     int32_t id = pt_names_get(&b->named_materials, name);
-    if (id < 0)
-        pt_diag_fail(&b->diag, loc, "unknown material \"%s\" (expected one made by MakeNamedMaterial before)", name);
-    return id;
+    if (id >= 0 && !info_of(b, id)->wanted)
+        return id;
+    pt_diag_fail(&b->diag, loc, "unknown material \"%s\" (expected one made by MakeNamedMaterial before)", name);
+    return -1;
 }
 
 /* --- kinds ------------------------------------------------------------------------------------------------------------ */
@@ -136,7 +142,7 @@ static void read_model(struct pt_making *c, const struct pt_bsdf_model *model)
 static struct pt_input opacity_of(const struct pt_builder *b, int32_t id)
 {
     int is_interface = ((struct pt_material *)b->materials.items)[id].kind == PT_MATERIAL_INTERFACE;
-    return is_interface ? pt_input_grey(0) : ((struct pt_material_info *)b->material_infos.items)[id].opacity;
+    return is_interface ? pt_input_grey(0) : info_of(b, id)->opacity;
 }
 
 static int is_all(struct pt_input in, float value) { return !in.texture && in.value.x == value; }
@@ -302,7 +308,7 @@ static void keep_params(struct pt_builder *b, int32_t id, const char *kind, cons
         pt_diag_nomem(&b->diag, "materials");
         return;
     }
-    ((struct pt_material_info *)b->material_infos.items)[id].params = copy;
+    info_of(b, id)->params = copy;
     pt_params_clear(copy, &b->diag, p->loc);
     copy->kind = pt_params_keep(copy, kind, strlen(kind));
     pt_params_append(copy, p);
@@ -314,6 +320,53 @@ int32_t pt_build_material(struct pt_builder *b, const char *kind, struct pt_para
     if (id >= 0 && b->is_v3)
         keep_params(b, id, kind, p);
     return id;
+}
+
+int32_t pt_build_named_material(struct pt_builder *b, struct pt_loc loc, const char *name, int32_t before)
+{
+    int32_t id = pt_names_get(&b->named_materials, name);
+    if (id >= 0)
+        return id;
+    if (b->is_v3) { /* pbrt-v3 says so and goes on */
+        pt_diag_warn(&b->diag, loc, "unknown material \"%s\": the one of before stays", name);
+        return before;
+    }
+    const struct pt_material unmade = {.kind = PT_BSDF_DIFFUSE, .eta = 1.5f};
+    struct pt_material_info info = {.loc = loc, .opacity = pt_input_grey(1)};
+    info.wanted = pt_arena_strndup(&b->scene->arena, name, strlen(name));
+    id = info.wanted ? add(b, &unmade, &info) : -1;
+    if (id < 0 || pt_names_set(&b->named_materials, name, id) != 0)
+        pt_diag_nomem(&b->diag, "materials");
+    return b->diag.rc ? -1 : id;
+}
+
+int pt_build_make_named_material(struct pt_builder *b, const char *name, const char *kind, struct pt_params *p)
+{
+    const int32_t id = pt_build_material(b, kind, p), wanted = pt_names_get(&b->named_materials, name);
+    if (id < 0 || b->diag.rc)
+        return b->diag.rc;
+    if (wanted < 0 || !info_of(b, wanted)->wanted)
+        return pt_builder_name(b, &b->named_materials, name, id);
+    struct pt_material *all = b->materials.items;
+    /* The shapes that have it took it for a surface. */
+    if (all[id].kind == PT_MATERIAL_INTERFACE || info_of(b, id)->has_opacity)
+        return pt_diag_fail(&b->diag, info_of(b, wanted)->loc,
+                            "material \"%s\" lets rays through (expected it to be made before)", name);
+    all[wanted] = all[id];
+    *info_of(b, wanted) = *info_of(b, id);
+    b->materials.count = b->material_infos.count = (size_t)id; /* it is the last, and nobody has it */
+    return 0;
+}
+
+int pt_build_materials_check(struct pt_builder *b)
+{
+    for (size_t i = 0; i < b->material_infos.count; i++) {
+        const struct pt_material_info *info = info_of(b, (int32_t)i);
+        if (info->wanted)
+            return pt_diag_fail(&b->diag, info->loc, "unknown material \"%s\" (expected one made by MakeNamedMaterial)",
+                                info->wanted);
+    }
+    return b->diag.rc;
 }
 
 /* What v3's materials know and its shapes do not. */
@@ -373,7 +426,7 @@ int32_t pt_build_shape_material(struct pt_builder *b, int32_t id, struct pt_para
         asked += (size_t)is_of_materials(pt_param_name(shape, &shape->items[i]));
     if (asked == 0)
         return id;
-    const struct pt_params *own = id >= 0 ? ((struct pt_material_info *)b->material_infos.items)[id].params : NULL;
+    const struct pt_params *own = id >= 0 ? info_of(b, id)->params : NULL;
     const char *kind = own ? pt_params_kind(own) : "matte";
     pt_params_clear(&both, &b->diag, shape->loc);
     both.kind = pt_params_keep(&both, kind, strlen(kind));

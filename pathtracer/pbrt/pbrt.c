@@ -262,8 +262,7 @@ static int do_make_named_material(struct parser *p)
     const char *name = pt_params_kind(&p->params), *type = pt_params_string(&p->params, "type", NULL);
     if (!type)
         return pt_diag_fail(&p->b->diag, p->loc, "MakeNamedMaterial \"%s\" without \"string type\"", name);
-    int32_t id = pt_build_material(p->b, type, &p->params);
-    return id < 0 ? p->b->diag.rc : pt_builder_name(p->b, &p->b->named_materials, name, id);
+    return pt_build_make_named_material(p->b, name, type, &p->params);
 }
 
 static int do_named_material(struct parser *p)
@@ -272,11 +271,7 @@ static int do_named_material(struct parser *p)
     int rc = pt_parser_read_string(p, "material name", name, sizeof name);
     if (rc)
         return rc;
-    /* pbrt-v3 says so and goes on. */
-    if (p->b->is_v3 && pt_names_get(&p->b->named_materials, name) < 0)
-        pt_diag_warn(&p->b->diag, p->loc, "unknown material \"%s\": the one of before stays", name);
-    else
-        p->state.material = pt_build_material_named(p->b, p->loc, name);
+    p->state.material = pt_build_named_material(p->b, p->loc, name, p->state.material);
     return p->b->diag.rc;
 }
 
@@ -515,7 +510,8 @@ static int finish(struct parser *p, struct pt_loc loc)
         return pt_diag_fail(&p->b->diag, top->loc, "%s is never closed", begin_name(top->kind));
     if (!p->in_world)
         return pt_diag_fail(&p->b->diag, loc, "the file ends without WorldBegin");
-    return pt_build_media_check(p->b);
+    int rc = pt_build_materials_check(p->b);
+    return rc ? rc : pt_build_media_check(p->b);
 }
 
 static int run(struct parser *p)

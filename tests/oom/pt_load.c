@@ -23,6 +23,7 @@ static const char text[] =
     "ObjectBegin \"o\" Shape \"trianglemesh\" \"integer indices\" [ 0 1 2 ] \"point3 P\" [ 0 0 0 1 0 0 0 1 0 ] \"normal N\" "
     "[ 0 0 1 0 0 1 0 0 1 ] "
     "\"point2 uv\" [ 0 0 1 0 0 1 ] ObjectEnd ObjectInstance \"o\"\n"
+    "NamedMaterial \"late\" Shape \"disk\" MakeNamedMaterial \"late\" \"string type\" \"conductor\"\n"
     "Shape \"loopsubdiv\" \"integer levels\" 1 \"integer indices\" [ 0 1 2 ] \"point3 P\" [ 0 0 0 1 0 0 0 1 0 ]\n"
     "Shape \"curve\" \"point3 P\" [ 0 0 0 1 0 0 1 1 0 0 1 1 ] Shape \"cone\" Shape \"bilinearmesh\" \"point3 P\" [ 0 0 0 1 "
     "0 0 0 1 0 1 1 1 ]\n"
