@@ -138,7 +138,8 @@ int32_t pt_build_image_texture(struct pt_builder *b, struct pt_loc loc, const ch
 
 /* --- inputs ----------------------------------------------------------------------------------------------------------- */
 
-static struct pt_input named_texture(struct pt_builder *b, struct pt_params *p, struct pt_param *param, int is_float)
+static struct pt_input named_texture(struct pt_builder *b, struct pt_params *p, struct pt_param *param, int is_float,
+                                     pt_vec3 fallback)
 {
     param->used = 1;
     if (param->count != 1) {
@@ -147,6 +148,11 @@ static struct pt_input named_texture(struct pt_builder *b, struct pt_params *p, 
     }
     const char *name = pt_params_string_at(p, param, 0);
     int32_t id = pt_names_get(is_float ? &b->float_textures : &b->colour_textures, name);
+    if (id < 0 && b->is_v3) { /* pbrt-v3 says so and goes on (TextureParams) */
+        pt_diag_warn(&b->diag, param->loc, "unknown %s texture \"%s\": \"%s\" keeps its default",
+                     is_float ? "float" : "spectrum", name, pt_param_name(p, param));
+        return (struct pt_input){0, fallback};
+    }
     if (id < 0) {
         int other = pt_names_get(is_float ? &b->colour_textures : &b->float_textures, name) >= 0;
         pt_diag_fail(&b->diag, param->loc, other ? "texture \"%s\" is a %s texture (expected %s)" : "unknown texture \"%s\"",
@@ -162,7 +168,7 @@ struct pt_input pt_build_float_input(struct pt_builder *b, struct pt_params *p, 
 {
     struct pt_param *param = pt_params_find(p, name);
     if (param && param->type == PT_PARAM_TEXTURE)
-        return named_texture(b, p, param, 1);
+        return named_texture(b, p, param, 1, v3_splat((float)fallback));
     return pt_input_grey(pt_params_float(p, name, fallback));
 }
 
@@ -171,7 +177,7 @@ struct pt_input pt_build_colour_input(struct pt_builder *b, struct pt_params *p,
 {
     struct pt_param *param = pt_params_find(p, name);
     if (param && param->type == PT_PARAM_TEXTURE)
-        return named_texture(b, p, param, 0);
+        return named_texture(b, p, param, 0, fallback);
     pt_build_colour(b, p, name, use, &fallback);
     return (struct pt_input){0, fallback};
 }
