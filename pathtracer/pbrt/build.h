@@ -144,9 +144,12 @@ struct pt_input pt_build_float_input(struct pt_builder *b, struct pt_params *p, 
 struct pt_input pt_build_colour_input(struct pt_builder *b, struct pt_params *p, const char *name, enum pt_colour_use use,
                                       pt_vec3 fallback);
 struct pt_input pt_input_grey(double value);
-/* Image map by file name; encoding: NULL = by file kind, "sRGB", "linear", "gamma X". -1 on failure. */
-int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding);
-/* A colour image as texture (normal maps): its number, or 0 after a failure. */
+/* Image map by file name; encoding: NULL = by file kind, "sRGB", "linear", "gamma X". -1 on failure. Colours of an EXR are
+ * made Rec. 709's, by its chromaticities; numbers stay as they are. */
+enum pt_image_use { PT_IMAGE_COLOUR, PT_IMAGE_DATA };
+int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding,
+                           enum pt_image_use use);
+/* An image of numbers as texture (normal maps): its number, or 0 after a failure. */
 int32_t pt_build_image_texture(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding);
 /* Product of two inputs; constants fold. */
 struct pt_input pt_input_product(struct pt_builder *b, struct pt_input x, struct pt_input y);

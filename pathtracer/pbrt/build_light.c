@@ -204,7 +204,7 @@ static void make_infinite(struct context *c)
         return;
     }
     struct pt_loc loc = pt_params_find(p, key)->loc;
-    int32_t id = pt_build_image_map(c->b, loc, file, NULL);
+    int32_t id = pt_build_image_map(c->b, loc, file, NULL, PT_IMAGE_COLOUR);
     if (id < 0 || (id = float_rgb(c->b, id)) < 0)
         return;
     const struct pt_image_map *map = &((struct pt_image_map *)c->b->images.items)[id];

@@ -81,9 +81,16 @@ static int convert(struct pt_builder *b, const struct pic_image *image, double e
     return out->pixels ? 0 : pt_diag_nomem(&b->diag, "a texture");
 }
 
-int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding)
+/* The images already read of a file whose colours mean something else than the same numbers in Rec. 709. */
+static void name_image(char *key, size_t room, const char *path, double code, enum pt_image_use use)
 {
-    char path[2048], key[2200];
+    snprintf(key, room, "%s%g %s", use == PT_IMAGE_COLOUR ? "c" : "d", code, path);
+}
+
+int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding,
+                           enum pt_image_use use)
+{
+    char path[2048], key[2200], own_key[2200];
     double code = parse_encoding(encoding), start_s = base_clock_wall_s();
     struct pic_image image = {0};
     struct pt_image_map map;
@@ -100,7 +107,8 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
     pt_builder_path(b, name, path, sizeof path);
     snprintf(key, sizeof key, "%g %s", code, path);
     /* Many textures of a scene name one file: it is read once for each encoding. */
-    if ((id = pt_names_get(&b->image_names, key)) >= 0)
+    name_image(own_key, sizeof own_key, path, code, use);
+    if ((id = pt_names_get(&b->image_names, key)) >= 0 || (id = pt_names_get(&b->image_names, own_key)) >= 0)
         return id;
     int rc;
     /* A real file is opened by the image library itself, without a copy of its bytes. */
@@ -119,10 +127,13 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
     if (!rc && image.is_part)
         pt_diag_warn(&b->diag, loc, "%s: its pixels are not those of its whole picture: others are black, or left out",
                      path);
+    const int is_own = !rc && image.has_primaries; /* as numbers it is another image */
+    if (is_own && use == PT_IMAGE_COLOUR)
+        rc = pic_to_rec709(path, &image, &err);
     if (rc)
         pt_diag_fail_code(&b->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, loc, "cannot read %s", err.text);
     else if (convert(b, &image, code, &map) == 0 && (id = pt_list_add(b, &b->images, &map)) >= 0 &&
-             pt_names_set(&b->image_names, key, id) != 0)
+             pt_names_set(&b->image_names, is_own ? own_key : key, id) != 0)
         pt_diag_nomem(&b->diag, "a texture");
     pic_release(&image);
     b->scene->stats.texture_s += base_clock_wall_s() - start_s;
@@ -132,7 +143,7 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
 int32_t pt_build_image_texture(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding)
 {
     struct pt_texture t = {.kind = PT_TEXTURE_IMAGE, .scale = 1, .su = 1, .sv = 1};
-    t.image = pt_build_image_map(b, loc, name, encoding);
+    t.image = pt_build_image_map(b, loc, name, encoding, PT_IMAGE_DATA);
     return t.image < 0 ? 0 : pt_list_add(b, &b->textures, &t) + 1;
 }
 
@@ -338,7 +349,10 @@ static void make_imagemap(struct context *c, struct pt_texture *t)
     read_mapping(c, t);
     pt_params_ignore(p, "filter maxanisotropy trilinear");
     struct pt_param *named = pt_params_find(p, "filename");
-    t->image = !c->b->diag.rc ? pt_build_image_map(c->b, named ? named->loc : p->loc, file, encoding) : -1;
+    t->image = -1;
+    if (!c->b->diag.rc)
+        t->image = pt_build_image_map(c->b, named ? named->loc : p->loc, file, encoding,
+                                      c->is_float ? PT_IMAGE_DATA : PT_IMAGE_COLOUR);
     if (t->image >= 0 && c->is_float) {
         const struct pt_image_map *m = &((struct pt_image_map *)c->b->images.items)[t->image];
         if (c->b->is_v3) /* knows no alpha of images */

@@ -14,6 +14,8 @@ struct pic_image {
     float *f32;                      /* owns [height][width][channels]: values, those of integers in [0, 1]; or NULL */
     size_t clipped;                  /* pixels that were NaN, infinite or negative when pic_encode made codes of them */
     int32_t is_part;                 /* pic_read: the file has other pixels than its picture */
+    int32_t has_primaries;           /* the file's colours are not those of Rec. 709: pic_to_rec709 makes them so */
+    float primaries[8];              /* x, y of red, green, blue and white, if has_primaries */
 };
 
 /* Where the stored pixels lie in the whole picture: 0 <= x0 < x1 <= width, the same of y. */

@@ -5,6 +5,7 @@ extern "C" {
 
 #include "picture/channels.h"
 #include "picture/oiio.h"
+#include "picture/primaries.h"
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
@@ -226,6 +227,23 @@ int read_placed(ImageInput &input, const pic_request &q, const pic_choice &s, co
     return 0;
 }
 
+/* What a colour EXR says of its R, G and B (technical introduction to OpenEXR, "chromaticities"), unless it is Rec. 709. */
+void find_primaries(ImageInput &input, const pic_choice &s, pic_image *image)
+{
+    static const float rec709[8] = PIC_REC709_PRIMARIES;
+    const float same = 1e-3f; /* closer than writers that round to three digits */
+    if (s.count < 3 || s.at[1] == s.at[0] || std::strcmp(input.format_name(), "openexr") != 0)
+        return;
+    const ImageSpec spec = input.spec(s.part, 0);
+    const OIIO::ParamValue *found = spec.find_attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8));
+    if (found == nullptr)
+        return;
+    std::memcpy(image->primaries, found->data(), sizeof image->primaries);
+    for (int i = 0; i < 8; i++)
+        if (!(std::abs(image->primaries[i] - rec709[i]) <= same))
+            image->has_primaries = 1;
+}
+
 int read_pixels(ImageInput &input, const pic_request &q, pic_image *out, base_err *err)
 {
     pic_choice s = {};
@@ -246,8 +264,13 @@ int read_pixels(ImageInput &input, const pic_request &q, pic_image *out, base_er
         return base_fail_nomem(err, q.name);
     if (int rc = read_placed(input, q, s, spec, type, c, static_cast<char *>(values.get()), err))
         return rc;
-    *out = pic_image{c.width, c.height, s.count, is_float,
-                     nullptr, nullptr,  0,       !(holds(c, spec) && c.width == spec.width && c.height == spec.height)};
+    *out = pic_image{};
+    out->width = c.width;
+    out->height = c.height;
+    out->channels = s.count;
+    out->is_float_file = is_float;
+    out->is_part = !(holds(c, spec) && c.width == spec.width && c.height == spec.height);
+    find_primaries(input, s, out);
     if (is_codes)
         out->u8 = static_cast<uint8_t *>(values.release());
     else

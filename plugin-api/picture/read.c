@@ -7,6 +7,7 @@
 #include "base/colour.h"
 #include "base/module.h"
 #include "picture/oiio.h"
+#include "picture/primaries.h"
 
 static const struct pic_library *library(const char *name, struct base_err *err)
 {
@@ -77,6 +78,24 @@ int pic_read_layer(const char *path, const char *layer, struct pic_image *out, s
     return rc;
 }
 
+int pic_to_rec709(const char *name, struct pic_image *image, struct base_err *err)
+{
+    const size_t n = (size_t)image->width * (size_t)image->height, channels = (size_t)image->channels;
+    double m[3][3];
+    if (!image->has_primaries || !image->f32)
+        return 0;
+    if (!pic_primaries_to_rec709(image->primaries, m))
+        return base_fail(err, BASE_EINVAL, "%s: its chromaticities are no colour space", name);
+    for (size_t i = 0; i < n; i++) {
+        float *rgb = image->f32 + i * channels;
+        const double r = (double)rgb[0], g = (double)rgb[1], b = (double)rgb[2];
+        for (int c = 0; c < 3 && isfinite(r + g + b); c++) /* what is not finite stays so, whoever reads it decides */
+            rgb[c] = (float)(m[c][0] * r + m[c][1] * g + m[c][2] * b);
+    }
+    image->has_primaries = 0;
+    return 0;
+}
+
 static int is_light(float v) { return isfinite(v) && v >= 0.0f; }
 
 int pic_encode(const char *name, struct pic_image *image, struct base_err *err)
@@ -98,7 +117,13 @@ int pic_read_light(const char *path, struct pic_image *out, struct base_err *err
 {
     struct pic_image image;
     int rc = answer(&(struct pic_request){.wanted = PIC_DISPLAY, .name = path}, &image, err);
-    if (!rc && image.f32 && (rc = pic_encode(path, &image, err)) != 0)
+    const int has_image = !rc;
+    if (!rc && image.f32) {
+        rc = pic_to_rec709(path, &image, err);
+        if (!rc)
+            rc = pic_encode(path, &image, err);
+    }
+    if (rc && has_image)
         pic_release(&image);
     if (!rc)
         *out = image;

@@ -15,14 +15,15 @@
 #include "picture/image.h"
 
 /* The picture, as picture/channels.h finds it: grey, or red, green and blue, each with alpha if there is one; codes of
- * an 8-bit file, else values. Where the stored pixels are not those of the picture (EXR's data and display window) they
- * are put into their place: what is missing is black, what lies outside is left out, and is_part is set. */
+ * an 8-bit file, else values, those of the file whatever its primaries. Where the stored pixels are not those of the
+ * picture (EXR's data and display window) they are put into their place: what is missing is black, what lies outside is
+ * left out, and is_part is set. */
 int pic_read(const char *path, struct pic_image *out, struct base_err *err);
 /* The same from memory; `name` only tells the format by its extension and names the image in errors. Formats that
  * OpenImageIO reads from files alone are refused (BASE_EINVAL). */
 int pic_read_memory(const char *name, const void *data, size_t size, struct pic_image *out, struct base_err *err);
 /* The sRGB codes that a display shows of the stored pixels, three channels, found in the same way. Those of integers
- * come as they are, those of light are made by pic_encode. Grey is repeated, alpha is dropped. */
+ * come as they are, those of light are made by pic_to_rec709 and pic_encode. Grey is repeated, alpha dropped. */
 int pic_read_display(const char *path, struct pic_image *out, struct base_err *err);
 /* The same, and the light itself beside the codes where the file holds light. */
 int pic_read_light(const char *path, struct pic_image *out, struct base_err *err);
@@ -35,6 +36,10 @@ int pic_read_layer(const char *path, const char *layer, struct pic_image *out, s
 int pic_read_header(const char *path, struct pic_window *window, struct pic_attribute *attributes, int count,
                     struct base_err *err);
 
+/* Makes light of other primaries (image->has_primaries) light of Rec. 709; else it does nothing. It is the same light: a
+ * white that differs is no white any more (no chromatic adaptation, as OpenEXR, tev and Mitsuba). Colours outside of Rec. 709
+ * get negative values. BASE_EINVAL when the file's primaries and white span no colour space. */
+int pic_to_rec709(const char *name, struct pic_image *image, struct base_err *err);
 /* Gives an RGB image of linear light (f32, Rec. 709 primaries) its codes too. `name` names it in errors. */
 int pic_encode(const char *name, struct pic_image *image, struct base_err *err);
 

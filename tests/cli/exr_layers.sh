@@ -45,6 +45,40 @@ refused "luminance and chroma" colour.pbrt -q --spp 1 -o x.exr
 make 1,2,3 N.X,N.Y,N.Z 3
 refused "t.exr: none of its channels is a picture: N.X, N.Y, N.Z" colour.pbrt -q --spp 1 -o x.exr
 
+# Colours in other primaries: those of ACES 2065-1 and CIE XYZ, made Rec. 709's by Imf::RGBtoXYZ · Imf::XYZtoRGB of OpenEXR 3.
+# colours CHROMATICITIES VALUES EXPECTED: as sky and reflectance
+sed -e /alpha/d -e '/"f"/d' colour.pbrt >in.pbrt; echo 'Shape "disk" "float radius" 1' >>in.pbrt
+colours() {
+    make "$3" R,G,B 3
+    "$P" in.pbrt -q --spp 8 --reproducible -o up.exr --strict
+    make "$2" R,G,B 3 "--attrib:type=float[8]" chromaticities "$1"
+    "$P" in.pbrt -q --spp 8 --reproducible -o got.exr --strict && idiff -q -fail 1e-5 up.exr got.exr
+}
+ap0=.7347,.2653,0,1,.0001,-.077,.32168,.33767
+t "colours of ACES" colours $ap0 .5,.4,.3 .71386097,.37936744,.25630845
+t "  …of CIE XYZ" colours 1,0,0,1,0,0,.33333333,.33333333 .5,.4,.3 .85594847,.27823170,.26331571
+t "  …outside of Rec. 709 are cut off" colours $ap0 .2,.5,.8 0,.55262102,.78711577
+t "  …of Rec. 709 in three digits" colours .64,.33,.3,.6,.15,.06,.313,.329 .5,.4,.3 .5,.4,.3
+cat >numbers.pbrt <<'S'
+LookAt 0 0 -5  0 0 0  0 1 0
+Camera "orthographic"
+Film "rgb" "integer xresolution" 4 "integer yresolution" 4
+WorldBegin
+LightSource "infinite"
+Texture "c" "spectrum" "imagemap" "string filename" "t.exr"
+Texture "f" "float" "imagemap" "string filename" "t.exr"
+Material "diffuse" "string normalmap" "t.exr"
+Shape "disk" "float radius" 1 "texture alpha" "f"
+S
+make .5,.4,.3 R,G,B 3
+"$P" numbers.pbrt -q --spp 8 --reproducible -o up.exr
+make .5,.4,.3 R,G,B 3 "--attrib:type=float[8]" chromaticities $ap0
+t "numbers stay as they are, also after the same file's colours" sh -c "'$P' numbers.pbrt -q --spp 8 --reproducible -o got.exr && cmp up.exr got.exr"
+for wrong in 0,0,0,0,0,0,0,0 .64,.33,.3,.6,.15,.06,.8,.1 .1,.1,.2,.2,.3,.3,.2,.2 nan,.33,.3,.6,.15,.06,.31,.33; do
+    make .5,.4,.3 R,G,B 3 "--attrib:type=float[8]" chromaticities $wrong
+    refused "cannot read t.exr: its chromaticities are no colour space" in.pbrt -q --spp 1 -o x.exr
+done
+
 # What pbrt-v3 reads of a float image is its luminance, whatever its alpha.
 cat >v3.pbrt <<'S'
 LookAt 0 0 -5  0 0 0  0 1 0

@@ -61,6 +61,10 @@ fails "EXR without the channel" 'no channel' sh -c "oiiotool --pattern constant:
 oiiotool --pattern checker 40x40 3 -d uint8 -o "$tmp/a.png" --pattern constant:color=.5,.5,.5 40x30 3 -d uint8 -o "$tmp/b.png" >/dev/null 2>&1
 $ggn flip "$tmp/a.png" "$tmp/a.png" --json -o "$tmp/map.png" >"$tmp/out" 2>"$tmp/err" && grep -qx '{"mean": 0.000000, "max": 0.000000}' "$tmp/out" && [ -s "$tmp/map.png" ]
 check "flip of equal images is 0" $?
+oiiotool --pattern constant:color=.5,.4,.3 16x8 3 --attrib:type=float[8] chromaticities .7347,.2653,0,1,.0001,-.077,.32168,.33767 -o "$tmp/aces.exr"
+oiiotool --pattern constant:color=.71386097,.37936744,.25630845 16x8 3 -o "$tmp/709.exr"
+$ggn flip "$tmp/aces.exr" "$tmp/709.exr" --json >"$tmp/out" 2>"$tmp/err" && grep -qx '{"mean": 0.000000, "max": 0.000000}' "$tmp/out"
+check "flip of one colour in two spaces is 0" $?
 fails "flip: sizes differ" 'sizes must be equal' $ggn flip "$tmp/a.png" "$tmp/b.png"
 head -c 100 "$tmp/a.png" >"$tmp/cut.png"
 oiiotool "$tmp/a.png" --crop 8x8+0+4 -d float -o "$tmp/one.exr" "$tmp/a.png" --crop 8x8+12+4 -d float -o "$tmp/other.exr" \

@@ -15,6 +15,7 @@
 #include "base/files.h"
 #include "picture/colour_map.h"
 #include "picture/png.h"
+#include "picture/primaries.h"
 #include "picture/read.h"
 
 static char dir[] = "/tmp/base_picture_XXXXXX";
@@ -182,6 +183,27 @@ static void sizes(void **state)
     }
 }
 
+/* From CIE XYZ it is the published inverse of sRGB (IEC 61966-2-1, amendment 1); a white stays white if it is the same. */
+static void primaries(void **state)
+{
+    (void)state;
+    static const float xyz[8] = {1, 0, 0, 1, 0, 0, 1.0f / 3, 1.0f / 3}, same[8] = PIC_REC709_PRIMARIES,
+                       rec2020[8] = {0.708f, 0.292f, 0.170f, 0.797f, 0.131f, 0.046f, 0.3127f, 0.3290f};
+    static const double inverse[3][3] = {
+        {3.2406255, -1.5372080, -0.4986286}, {-0.9689307, 1.8757561, 0.0415175}, {0.0557101, -0.2040211, 1.0569959}};
+    const double digits = 4e-4; /* the standard begins with matrices of four digits */
+    double m[3][3];
+    assert_true(pic_primaries_to_rec709(xyz, m));
+    for (int i = 0; i < 9; i++)
+        assert_true(fabs(m[i / 3][i % 3] - inverse[i / 3][i % 3]) < digits);
+    assert_true(pic_primaries_to_rec709(same, m));
+    for (int i = 0; i < 9; i++)
+        assert_true(fabs(m[i / 3][i % 3] - (i % 4 == 0)) < 1e-12);
+    assert_true(pic_primaries_to_rec709(rec2020, m));
+    for (int i = 0; i < 3; i++)
+        assert_true(fabs(m[i][0] + m[i][1] + m[i][2] - 1) < 1e-12);
+}
+
 static void colours(void **state)
 {
     (void)state;
@@ -205,6 +227,6 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(png_round_trip), cmocka_unit_test(png_of_many_sizes),
                                        cmocka_unit_test(refusals),       cmocka_unit_test(display),
                                        cmocka_unit_test(encoding),       cmocka_unit_test(sizes),
-                                       cmocka_unit_test(colours)};
+                                       cmocka_unit_test(colours),        cmocka_unit_test(primaries)};
     return cmocka_run_group_tests(tests, make_dir, remove_dir);
 }
