@@ -6,6 +6,7 @@
 
 #include "base/clock.h"
 #include "base/colour.h"
+#include "base/files.h"
 #include "base/options.h"
 #include "picture/read.h"
 #include "pbrt/build.h"
@@ -33,36 +34,34 @@ static double parse_encoding(const char *encoding)
     return -1;
 }
 
-/* Grey and alpha become four channels, alpha that is 1 everywhere goes: the renderer knows 1, 3 and 4 channels.
- * Returns the channels to keep per pixel; `from` maps them. */
-static int choose_channels(const struct pic_image *image, int from[4])
+/* The first channels that the renderer keeps, 1, 3 or 4, as pbrt-v4 does: alpha beside grey goes, alpha of formats that pbrt
+ * reads by stb_image goes (Image::Read), and alpha that is 1 everywhere goes (MIPMap::CreateFromFile). */
+static int choose_channels(const char *path, const struct pic_image *image)
 {
+    static const char *const without_alpha[] = {"tga", "bmp", "psd", "gif"};
     size_t n = (size_t)image->width * (size_t)image->height, c = (size_t)image->channels;
-    for (int k = 0; k < 4; k++)
-        from[k] = k < image->channels ? k : 0;
-    if (image->channels == 1 || image->channels == 3)
-        return image->channels;
+    if (image->channels < 4)
+        return image->channels < 3 ? 1 : 3;
+    for (size_t i = 0; i < sizeof without_alpha / sizeof without_alpha[0]; i++)
+        if (base_file_has_ending(path, without_alpha[i]))
+            return 3;
     int opaque = 1;
     for (size_t i = 0; i < n && opaque; i++)
         opaque = image->u8 ? image->u8[i * c + c - 1] == 255 : image->f32[i * c + c - 1] >= 1;
-    if (image->channels == 2) {
-        from[1] = from[2] = 0;
-        from[3] = 1;
-        return opaque ? 1 : 4;
-    }
     return opaque ? 3 : 4;
 }
 
-static int convert(struct pt_builder *b, const struct pic_image *image, double encoding, struct pt_image_map *out)
+static int convert(struct pt_builder *b, const char *path, const struct pic_image *image, double encoding,
+                   struct pt_image_map *out)
 {
-    int from[4], channels = choose_channels(image, from);
+    const int channels = choose_channels(path, image);
     size_t n = (size_t)image->width * (size_t)image->height, c = (size_t)image->channels, k = (size_t)channels;
     *out = (struct pt_image_map){image->width, image->height, channels, PT_PIXEL_FLOAT, 1, NULL};
     if (image->u8) {
         uint8_t *pixels = pt_arena_alloc(&b->scene->arena, n, k);
         for (size_t i = 0; pixels && i < n; i++)
             for (size_t j = 0; j < k; j++)
-                pixels[i * k + j] = image->u8[i * c + (size_t)from[j]];
+                pixels[i * k + j] = image->u8[i * c + j];
         out->type = encoding == 0 ? PT_PIXEL_U8_SRGB : PT_PIXEL_U8_LINEAR;
         out->gamma = encoding > 0 ? (float)encoding : 1;
         out->pixels = pixels;
@@ -70,7 +69,7 @@ static int convert(struct pt_builder *b, const struct pic_image *image, double e
         float *pixels = pt_arena_alloc(&b->scene->arena, n, k * sizeof *pixels);
         for (size_t i = 0; pixels && i < n; i++)
             for (size_t j = 0; j < k; j++) {
-                float v = image->f32[i * c + (size_t)from[j]];
+                float v = image->f32[i * c + j];
                 if (!image->is_float_file && j < 3 && encoding != 1)
                     v = encoding == 0 ? (float)base_srgb_eotf((double)v) : powf(v, (float)encoding);
                 /* An infinite pixel is a half float that overflowed: the largest half. */
@@ -132,7 +131,7 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
         rc = pic_to_rec709(path, &image, &err);
     if (rc)
         pt_diag_fail_code(&b->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, loc, "cannot read %s", err.text);
-    else if (convert(b, &image, code, &map) == 0 && (id = pt_list_add(b, &b->images, &map)) >= 0 &&
+    else if (convert(b, path, &image, code, &map) == 0 && (id = pt_list_add(b, &b->images, &map)) >= 0 &&
              pt_names_set(&b->image_names, is_own ? own_key : key, id) != 0)
         pt_diag_nomem(&b->diag, "a texture");
     pic_release(&image);

@@ -1,0 +1,41 @@
+#!/bin/sh
+# Image files in, as textures: which alpha is the value of a float texture, which way up a file of Radiance is, names that mean
+# something to a library.
+. "$(dirname "$0")/lull_render_setup"
+
+# files: what no writer of ours makes
+python3 - <<'E' || exit 2
+import struct, zlib
+def png(name, kind, pixel):
+    chunk = lambda t, d: struct.pack(">I", len(d)) + t + d + struct.pack(">I", zlib.crc32(t + d))
+    row = b"\0" + bytes(pixel) * 2
+    open(name, "wb").write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 2, 2, 8, kind, 0, 0, 0))
+                           + chunk(b"IDAT", zlib.compress(row * 2)) + chunk(b"IEND", b""))
+def tga(name, pixel):
+    open(name, "wb").write(struct.pack("<BBB9xHHBB", 0, 0, 2, 1, 1, 8 * len(pixel), 8 if len(pixel) == 4 else 0) + bytes(pixel))
+png("grey.png", 0, [188]), png("grey_alpha.png", 4, [188, 20])
+png("sixty.png", 0, [60]), png("alpha.png", 6, [188, 90, 40, 60])
+tga("colour.tga", [40, 90, 188]), tga("colour_alpha.tga", [40, 90, 188, 20])
+E
+cat >float.pbrt <<'S'
+LookAt 0 0 -5  0 0 0  0 1 0
+Camera "orthographic"
+Film "rgb" "integer xresolution" 4 "integer yresolution" 4
+WorldBegin
+Texture "f" "float" "imagemap" "string filename" "FILE" "string encoding" "linear"
+AreaLightSource "diffuse" "bool twosided" true
+Shape "disk" "float radius" 9 "texture alpha" "f"
+S
+picture() { # picture SCENE FILE OUT
+    sed "s#FILE#$2#" "$1.pbrt" >scene.pbrt
+    "$P" scene.pbrt -q --spp 64 --reproducible -o "$3"
+}
+same() { picture "$1" "$2" up.exr && picture "$1" "$3" got.exr && cmp up.exr got.exr; } # same SCENE FILE FILE
+
+# what pbrt-v4 reads of a float image: alpha of a PNG of four channels, else grey or the mean of the colours
+t "grey beside alpha" same float grey.png grey_alpha.png
+t "alpha beside colours" same float sixty.png alpha.png
+t "colours of a TGA with alpha" same float colour.tga colour_alpha.tga
+t "  …which are another value than that alpha" sh -c '! cmp up.exr sixty.exr' "$(picture float sixty.png sixty.exr)"
+echo "1..$n"
+exit $bad
