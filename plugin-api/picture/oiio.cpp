@@ -227,6 +227,43 @@ int read_placed(ImageInput &input, const pic_request &q, const pic_choice &s, co
     return 0;
 }
 
+/* How the stored rows lie in the picture, counted as EXIF does: 1 as usual, from 5 on they are its columns. Of a file that
+ * begins with columns, OpenImageIO counts Radiance's "+X +Y" as 6 and "-X -Y" as 8, which are EXIF's 8 and 6. What other
+ * formats say is left to the viewer, as in pbrt. */
+int orientation_of(const ImageInput &input, const ImageSpec &spec)
+{
+    const bool is_hdr = std::strcmp(input.format_name(), "hdr") == 0;
+    const int n = spec.get_int_attribute("Orientation", 1);
+    if ((!is_hdr && std::strcmp(input.format_name(), "dpx") != 0) || n < 1 || n > 8)
+        return 1;
+    return is_hdr && n % 2 == 0 && n >= 6 ? 14 - n : n;
+}
+
+/* Puts the pixels, of `pixel` bytes each, where the picture has them. */
+int turn(const char *name, int orientation, size_t pixel, int *width, int *height, memory *values, base_err *err)
+{
+    const bool turned = orientation >= 5,
+               from_right = orientation == 2 || orientation == 3 || orientation == 6 || orientation == 7,
+               from_bottom = orientation == 3 || orientation == 4 || orientation >= 7;
+    const size_t w = static_cast<size_t>(turned ? *height : *width), h = static_cast<size_t>(turned ? *width : *height);
+    const size_t stored_width = static_cast<size_t>(*width);
+    memory out(std::calloc(w * h, pixel));
+    if (!out)
+        return base_fail_nomem(err, name);
+    for (size_t y = 0; y < h; y++)
+        for (size_t x = 0; x < w; x++) {
+            const size_t a = from_right ? w - 1 - x : x, b = from_bottom ? h - 1 - y : y;
+            std::memcpy(static_cast<char *>(out.get()) + (y * w + x) * pixel,
+                        static_cast<const char *>(values->get()) +
+                            (turned ? a * stored_width + b : b * stored_width + a) * pixel,
+                        pixel);
+        }
+    *values = std::move(out);
+    *width = static_cast<int>(w);
+    *height = static_cast<int>(h);
+    return 0;
+}
+
 /* What a colour EXR says of its R, G and B (technical introduction to OpenEXR, "chromaticities"), unless it is Rec. 709. */
 void find_primaries(ImageInput &input, const pic_choice &s, pic_image *image)
 {
@@ -264,12 +301,18 @@ int read_pixels(ImageInput &input, const pic_request &q, pic_image *out, base_er
         return base_fail_nomem(err, q.name);
     if (int rc = read_placed(input, q, s, spec, type, c, static_cast<char *>(values.get()), err))
         return rc;
+    const int orientation = orientation_of(input, input.spec(s.part, 0));
+    const bool is_part = !(holds(c, spec) && c.width == spec.width && c.height == spec.height);
+    if (orientation != 1)
+        if (int rc =
+                turn(q.name, orientation, static_cast<size_t>(s.count) * type.size(), &c.width, &c.height, &values, err))
+            return rc;
     *out = pic_image{};
     out->width = c.width;
     out->height = c.height;
     out->channels = s.count;
     out->is_float_file = is_float;
-    out->is_part = !(holds(c, spec) && c.width == spec.width && c.height == spec.height);
+    out->is_part = is_part;
     find_primaries(input, s, out);
     if (is_codes)
         out->u8 = static_cast<uint8_t *>(values.release());
@@ -405,7 +448,11 @@ int answer_header(const char *path, pic_window *window, pic_attribute *attribute
         if (!input)
             return complain(path, OIIO::geterror(), err);
         std::for_each(attributes, attributes + count, [&](pic_attribute &a) { find_attribute(input->spec(), &a); });
-        return find_window(input->spec(), path, window, err);
+        if (int rc = find_window(input->spec(), path, window, err))
+            return rc;
+        if (orientation_of(*input, input->spec()) >= 5)
+            *window = pic_window{window->height, window->width, window->y0, window->x0, window->y1, window->x1};
+        return 0;
     } catch (const std::bad_alloc &) {
         return base_fail_nomem(err, path);
     } catch (const std::exception &e) {

@@ -23,7 +23,8 @@ int pic_read(const char *path, struct pic_image *out, struct base_err *err);
  * OpenImageIO reads from files alone are refused (BASE_EINVAL). */
 int pic_read_memory(const char *name, const void *data, size_t size, struct pic_image *out, struct base_err *err);
 /* The sRGB codes that a display shows of the stored pixels, three channels, found in the same way. Those of integers
- * come as they are, those of light are made by pic_to_rec709 and pic_encode. Grey is repeated, alpha dropped. */
+ * come as they are, those of light are made by pic_to_rec709 and pic_encode. Grey is repeated, alpha
+ * dropped. */
 int pic_read_display(const char *path, struct pic_image *out, struct base_err *err);
 /* The same, and the light itself beside the codes where the file holds light. */
 int pic_read_light(const char *path, struct pic_image *out, struct base_err *err);
@@ -37,8 +38,8 @@ int pic_read_header(const char *path, struct pic_window *window, struct pic_attr
                     struct base_err *err);
 
 /* Makes light of other primaries (image->has_primaries) light of Rec. 709; else it does nothing. It is the same light: a
- * white that differs is no white any more (no chromatic adaptation, as OpenEXR, tev and Mitsuba). Colours outside of Rec. 709
- * get negative values. BASE_EINVAL when the file's primaries and white span no colour space. */
+ * white that differs is no white any more (no chromatic adaptation, as OpenEXR, tev and Mitsuba). Colours outside of
+ * Rec. 709 get negative values. BASE_EINVAL when the file's primaries and white span no colour space. */
 int pic_to_rec709(const char *name, struct pic_image *image, struct base_err *err);
 /* Gives an RGB image of linear light (f32, Rec. 709 primaries) its codes too. `name` names it in errors. */
 int pic_encode(const char *name, struct pic_image *image, struct base_err *err);

@@ -37,5 +37,36 @@ t "grey beside alpha" same float grey.png grey_alpha.png
 t "alpha beside colours" same float sixty.png alpha.png
 t "colours of a TGA with alpha" same float colour.tga colour_alpha.tga
 t "  …which are another value than that alpha" sh -c '! cmp up.exr sixty.exr' "$(picture float sixty.png sixty.exr)"
+
+# a picture of 3 x 2 in each order that Radiance knows: -Y is from the top down, the second axis is that of a scanline
+python3 - <<'E' || exit 2
+size = {"X": 3, "Y": 2}
+def along(axis):
+    n = list(range(size[axis[1]]))
+    return n if axis in ("+X", "-Y") else n[::-1]
+for order in "-Y +X", "-Y -X", "+Y -X", "+Y +X", "+X -Y", "+X +Y", "-X +Y", "-X -Y":
+    a, b = order.split()
+    data = b""
+    for i in along(a):
+        for j in along(b):
+            x, y = (j, i) if a[1] == "Y" else (i, j)
+            data += bytes([40 + 70 * x, 40 + 120 * y, 90, 128])
+    head = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n%s %d %s %d\n" % (a, size[a[1]], b, size[b[1]])
+    open("order%s.hdr" % order.replace(" ", ""), "wb").write(head.encode() + data)
+E
+cat >colour.pbrt <<'S'
+LookAt 0 0 -5  0 0 0  0 1 0
+Camera "orthographic"
+Film "rgb" "integer xresolution" 12 "integer yresolution" 12
+WorldBegin
+LightSource "infinite"
+Texture "t" "spectrum" "imagemap" "string filename" "FILE"
+Material "diffuse" "texture reflectance" "t"
+Shape "bilinearmesh" "point3 P" [-1 -1 0 1 -1 0 -1 1 0 1 1 0]
+S
+for order in -Y-X +Y-X +Y+X +X-Y +X+Y -X+Y -X-Y; do
+    t "a file of Radiance, $order" same colour order-Y+X.hdr "order$order.hdr"
+done
+t "  …is compared right side up" sh -c "'${P%lull-render}ggn' flip order-Y+X.hdr order+X+Y.hdr --json | grep -q '\"max\": 0.000000'"
 echo "1..$n"
 exit $bad
