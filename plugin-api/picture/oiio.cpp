@@ -30,7 +30,7 @@ using OIIO::ImageSpec;
 using OIIO::TypeDesc;
 
 constexpr int max_channels = 1024;
-constexpr size_t max_png = 1u << 30; /* bytes */
+constexpr size_t max_bytes = 1u << 30; /* of a file that is read before it is opened */
 
 struct release {
     void operator()(void *memory) const { std::free(memory); }
@@ -366,46 +366,54 @@ std::string format_of(const char *name)
     return format;
 }
 
-int read_memory(const pic_request &q, pic_image *out, base_err *err)
+/* An image whose pixels can be asked for, and what it stands on; gone in the reverse order. */
+struct opened {
+    memory data;
+    std::unique_ptr<OIIO::Filesystem::IOMemReader> reader;
+    std::unique_ptr<ImageInput> input;
+};
+
+int open_memory(const char *name, const void *data, size_t size, opened *out, base_err *err)
 {
-    if (base_file_has_ending(q.name, "png"))
-        if (int rc = check_png(q.name, static_cast<const unsigned char *>(q.data), q.size, err))
+    if (base_file_has_ending(name, "png"))
+        if (int rc = check_png(name, static_cast<const unsigned char *>(data), size, err))
             return rc;
-    OIIO::Filesystem::IOMemReader reader(q.data, q.size);
-    std::unique_ptr<ImageInput> input = ImageInput::create(format_of(q.name), false);
-    if (!input || input->supports("ioproxy") == 0) {
+    out->reader = std::make_unique<OIIO::Filesystem::IOMemReader>(data, size);
+    out->input = ImageInput::create(format_of(name), false);
+    if (!out->input || out->input->supports("ioproxy") == 0) {
         OIIO::geterror();
-        return base_fail(err, BASE_EINVAL, "%s: this format cannot be read from memory", q.name);
+        return base_fail(err, BASE_EINVAL, "%s: this format cannot be read from memory", name);
     }
     ImageSpec config = raw_config(), spec;
-    OIIO::Filesystem::IOProxy *proxy = &reader;
+    OIIO::Filesystem::IOProxy *proxy = out->reader.get();
     config.attribute("oiio:ioproxy", TypeDesc::PTR, &proxy);
-    if (!input->open(q.name, spec, config))
-        return complain(q.name, input->geterror(), err);
-    return read_pixels(*input, q, out, err);
+    return out->input->open(name, spec, config) ? 0 : complain(name, out->input->geterror(), err);
 }
 
-int read_file(pic_request q, pic_image *out, base_err *err)
+/* A name with '?' is an address with a query to OpenImageIO: such a file is given to it as bytes. */
+int open_file(const char *path, opened *out, base_err *err)
 {
-    if (int rc = base_file_check_input(q.name, err))
+    if (int rc = base_file_check_input(path, err))
         return rc;
-    if (base_file_has_ending(q.name, "png")) {
+    if (base_file_has_ending(path, "png") || std::strchr(path, '?') != nullptr) {
         char *data = nullptr;
-        int rc = base_file_read(q.name, max_png, &data, &q.size, err);
-        const memory owner(data);
-        q.data = data;
-        return rc ? rc : read_memory(q, out, err);
+        size_t size = 0;
+        const int rc = base_file_read(path, max_bytes, &data, &size, err);
+        out->data = memory(data);
+        return rc ? rc : open_memory(path, data, size, out, err);
     }
     const ImageSpec config = raw_config();
-    std::unique_ptr<ImageInput> input = ImageInput::open(q.name, &config);
-    return input ? read_pixels(*input, q, out, err) : complain(q.name, OIIO::geterror(), err);
+    out->input = ImageInput::open(path, &config);
+    return out->input ? 0 : complain(path, OIIO::geterror(), err);
 }
 
 int answer(const pic_request *q, pic_image *out, base_err *err)
 {
     try {
         configure_once();
-        return q->data != nullptr ? read_memory(*q, out, err) : read_file(*q, out, err);
+        opened image;
+        int rc = q->data != nullptr ? open_memory(q->name, q->data, q->size, &image, err) : open_file(q->name, &image, err);
+        return rc ? rc : read_pixels(*image.input, *q, out, err);
     } catch (const std::bad_alloc &) {
         return base_fail_nomem(err, q->name);
     } catch (const std::exception &e) {
@@ -442,15 +450,14 @@ int answer_header(const char *path, pic_window *window, pic_attribute *attribute
 {
     try {
         configure_once();
-        if (int rc = base_file_check_input(path, err))
+        opened image;
+        if (int rc = open_file(path, &image, err))
             return rc;
-        const std::unique_ptr<ImageInput> input = ImageInput::open(path);
-        if (!input)
-            return complain(path, OIIO::geterror(), err);
-        std::for_each(attributes, attributes + count, [&](pic_attribute &a) { find_attribute(input->spec(), &a); });
-        if (int rc = find_window(input->spec(), path, window, err))
+        const ImageSpec &spec = image.input->spec();
+        std::for_each(attributes, attributes + count, [&](pic_attribute &a) { find_attribute(spec, &a); });
+        if (int rc = find_window(spec, path, window, err))
             return rc;
-        if (orientation_of(*input, input->spec()) >= 5)
+        if (orientation_of(*image.input, spec) >= 5)
             *window = pic_window{window->height, window->width, window->y0, window->x0, window->y1, window->x1};
         return 0;
     } catch (const std::bad_alloc &) {

@@ -68,5 +68,13 @@ for order in -Y-X +Y-X +Y+X +X-Y +X+Y -X+Y -X-Y; do
     t "a file of Radiance, $order" same colour order-Y+X.hdr "order$order.hdr"
 done
 t "  …is compared right side up" sh -c "'${P%lull-render}ggn' flip order-Y+X.hdr order+X+Y.hdr --json | grep -q '\"max\": 0.000000'"
+
+# '?' is no query
+cp up.exr one.exr
+for file in grey.png colour.tga order-Y+X.hdr one.exr; do
+    cp "$file" "a?b.${file##*.}"
+    t "a file called a?b.${file##*.}" same float "$file" "a?b.${file##*.}"
+done
+t "  …is compared" sh -c "'${P%lull-render}ggn' flip one.exr 'a?b.exr' --json | grep -q '\"max\": 0.000000'"
 echo "1..$n"
 exit $bad
