@@ -21,7 +21,7 @@ static const struct {
 /* What a property means to us. */
 enum role { R_SKIP, R_X, R_Y, R_Z, R_NX, R_NY, R_NZ, R_U, R_V, R_INDICES, R_CORNER_UVS };
 
-enum { MAX_PROPERTIES = 32, MAX_ELEMENTS = 16, MAX_CORNERS = 1 << 16 };
+enum { MAX_PROPERTIES = 512, MAX_ELEMENTS = 16, MAX_CORNERS = 1 << 16 };
 
 struct property {
     enum ply_type type, count_type; /* count_type: T_NONE unless a list */
@@ -39,14 +39,25 @@ struct reader {
     const char *at, *end;
     struct base_err *err;
     int ascii, swap;
+    char newline; /* of the header: '\n', also after '\r'; '\r' alone */
     int element_count;
     struct element elements[MAX_ELEMENTS];
     struct pt_ply *ply;
+    int has_vertices;
+    uint64_t vertex_total; /* that the header promises: faces may come first */
     size_t index_room;
     int has[R_CORNER_UVS + 1];
 };
 
 /* --- header ----------------------------------------------------------------------------------------------------------- */
+
+/* By the end of the first line, because behind a binary header either character may be data. */
+static char newline_of(const char *at, const char *end)
+{
+    while (at < end && *at != '\n' && *at != '\r')
+        at++;
+    return at + 1 < end && at[0] == '\r' && at[1] != '\n' ? '\r' : '\n';
+}
 
 /* Next line of the header without its end; 0 at the end of the file. */
 static int next_line(struct reader *r, char *line, size_t room)
@@ -54,7 +65,7 @@ static int next_line(struct reader *r, char *line, size_t room)
     size_t n = 0;
     if (r->at >= r->end)
         return 0;
-    while (r->at < r->end && *r->at != '\n') {
+    while (r->at < r->end && *r->at != r->newline) {
         if (n + 1 < room)
             line[n++] = *r->at;
         r->at++;
@@ -132,6 +143,11 @@ static int read_element(struct reader *r, char *words[], int n)
     struct element *e = &r->elements[r->element_count++];
     strncpy(e->name, words[1], sizeof e->name - 1);
     e->count = (uint64_t)count;
+    if (strcmp(e->name, "vertex") != 0)
+        return 0;
+    if (r->has_vertices++)
+        return base_fail(r->err, BASE_EINVAL, "%s: PLY element \"vertex\" occurs twice", r->name);
+    r->vertex_total = e->count;
     return 0;
 }
 
@@ -143,6 +159,7 @@ static int read_header(struct reader *r)
     int has_format = 0;
     const uint16_t probe = 1;
     const int little = *(const uint8_t *)&probe == 1;
+    r->newline = newline_of(r->at, r->end);
     if (!next_line(r, line, sizeof line) || strcmp(line, "ply") != 0)
         return base_fail(r->err, BASE_EINVAL, "%s: not a PLY file", r->name);
     while (next_line(r, line, sizeof line)) {
@@ -175,11 +192,13 @@ static int read_header(struct reader *r)
 
 static int truncated(struct reader *r) { return base_fail(r->err, BASE_EINVAL, "%s: truncated PLY file", r->name); }
 
-/* What exporters write for a number that is none; where one is needed, its reader refuses it. */
+/* What exporters write for a number that is none, those of Microsoft's C library 1.#IND, 1.#QNAN or 1.#INF; where one is
+ * needed, its reader refuses it. */
 static int is_no_number(const char *text, size_t n)
 {
     size_t sign = n > 0 && (text[0] == '-' || text[0] == '+');
-    return n >= sign + 3 && (strncasecmp(text + sign, "nan", 3) == 0 || strncasecmp(text + sign, "inf", 3) == 0);
+    return n >= sign + 3 && (strncasecmp(text + sign, "nan", 3) == 0 || strncasecmp(text + sign, "inf", 3) == 0 ||
+                             strncmp(text + sign, "1.#", 3) == 0);
 }
 
 static int ascii_value(struct reader *r, double *out)
@@ -300,9 +319,9 @@ static int read_list(struct reader *r, const struct property *p)
             return rc;
         if (p->role != R_INDICES)
             continue;
-        if (!(value >= 0 && value < (double)r->ply->vertex_count) || value != floor(value))
+        if (!(value >= 0 && value < (double)r->vertex_total) || value != floor(value))
             return base_fail(r->err, BASE_EINVAL, "%s: vertex index %.0f out of range (expected 0 to %lld)", r->name, value,
-                             (long long)r->ply->vertex_count - 1);
+                             (long long)r->vertex_total - 1);
         uint32_t index = (uint32_t)value;
         if (k == 0)
             first = index;
@@ -327,8 +346,6 @@ static size_t least_bytes(const struct reader *r, const struct element *e)
 static int begin_vertices(struct reader *r, const struct element *e)
 {
     struct pt_ply *p = r->ply;
-    if (p->positions)
-        return base_fail(r->err, BASE_EINVAL, "%s: PLY element \"vertex\" occurs twice", r->name);
     if (!r->has[R_X] || !r->has[R_Y] || !r->has[R_Z])
         return base_fail(r->err, BASE_EINVAL, "%s: PLY vertices without x, y and z", r->name);
     if (e->count > INT32_MAX)

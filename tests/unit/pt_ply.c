@@ -4,6 +4,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -108,6 +109,113 @@ static void texture_coordinates_per_corner(void **state)
     }
 }
 
+static const char xyz[] = "property float x\nproperty float y\nproperty float z\n",
+                  face[] = "element face 1\nproperty list uchar int vertex_indices\n";
+
+/* One triangle: what the text gives, or why not. */
+static int triangle(const char *text, size_t n, struct pt_ply *ply, char words[512])
+{
+    struct base_err err = {0};
+    int rc = pt_ply_parse("a.ply", text, n, ply, &err);
+    snprintf(words, 512, "%s", err.text);
+    if (rc)
+        return rc;
+    const int is_one = ply->vertex_count == 3 && ply->triangle_count == 1 && ply->indices[2] == 2 && ply->positions[3] == 1;
+    assert_true(is_one);
+    return 0;
+}
+
+/* What other programs write beside the usual. */
+static void habits_of_exporters(void **state)
+{
+    (void)state;
+    static const char vertices[] = "0 0 0\n1 0 0\n0 1 0\n";
+    char bytes[4096], words[512];
+    struct pt_ply ply;
+    int n = snprintf(bytes, sizeof bytes, "ply\nformat ascii 1.0\n%selement vertex 3\n%send_header\n3 0 1 2\n%s", face, xyz,
+                     vertices); /* elements may stand in any order */
+    assert_int_equal(triangle(bytes, (size_t)n, &ply, words), 0);
+    pt_ply_release(&ply);
+    n = snprintf(bytes, sizeof bytes, "ply\nformat ascii 1.0\n%selement vertex 3\n%send_header\n3 0 1 3\n%s", face, xyz,
+                 vertices);
+    assert_int_equal(triangle(bytes, (size_t)n, &ply, words), BASE_EINVAL);
+    assert_string_equal(words, "a.ply: vertex index 3 out of range (expected 0 to 2)");
+    /* a second element of that name, even without properties, is no larger range */
+    n = snprintf(bytes, sizeof bytes,
+                 "ply\nformat ascii 1.0\nelement vertex 3\n%s%selement vertex 9\nend_header\n%s3 0 1 8\n", xyz, face,
+                 vertices);
+    assert_int_equal(triangle(bytes, (size_t)n, &ply, words), BASE_EINVAL);
+    assert_string_equal(words, "a.ply: PLY element \"vertex\" occurs twice");
+    /* normals of Microsoft's C library */
+    n = snprintf(bytes, sizeof bytes,
+                 "ply\nformat ascii 1.0\nelement vertex 3\n%sproperty float nx\nproperty float ny\nproperty float nz\n%s"
+                 "end_header\n0 0 0 -1.#IND 1.#QNAN 1.#INF\n1 0 0 0 0 1\n0 1 0 -1.#IND00 0 1\n3 0 1 2\n",
+                 xyz, face);
+    assert_int_equal(triangle(bytes, (size_t)n, &ply, words), 0);
+    assert_true(isnan(ply.normals[0]) && isnan(ply.normals[1]) && isnan(ply.normals[2]) && ply.normals[5] == 1);
+    pt_ply_release(&ply);
+    n = snprintf(bytes, sizeof bytes,
+                 "ply\nformat ascii 1.0\nelement vertex 3\n%s%send_header\n0 0 1.#IND\n1 0 0\n0 1 0\n3 0 1 2\n", xyz, face);
+    assert_int_equal(triangle(bytes, (size_t)n, &ply, words), BASE_EINVAL);
+    assert_string_equal(words, "a.ply: vertex 0 is not finite");
+}
+
+/* Of old Macs; behind a binary header "\n" may be data. */
+static void lines_that_end_in_cr(void **state)
+{
+    (void)state;
+    static const float positions[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    static const int32_t corners[3] = {0, 1, 2};
+    char bytes[1024], words[512];
+    struct pt_ply ply;
+    for (int is_binary = 0; is_binary < 2; is_binary++) {
+        int n = snprintf(bytes, sizeof bytes, "ply\nformat %s 1.0\ncomment x\nelement vertex 3\n%s%send_header\n%s",
+                         is_binary ? "binary_little_endian" : "ascii", xyz, face,
+                         is_binary ? "" : "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+        for (int i = 0; i < n; i++)
+            if (bytes[i] == '\n')
+                bytes[i] = '\r';
+        if (is_binary) {
+            memcpy(bytes + n, positions, sizeof positions);
+            bytes[n] = '\n'; /* a coordinate next to 0 */
+            bytes[n + 36] = 3;
+            memcpy(bytes + n + 37, corners, sizeof corners);
+            n += 37 + 12;
+        }
+        if (triangle(bytes, (size_t)n, &ply, words) != 0)
+            fail_msg("%s", words);
+        pt_ply_release(&ply);
+    }
+}
+
+/* Scanned points and their descriptors have many numbers each; a limit stays. */
+static void many_properties(void **state)
+{
+    (void)state;
+    static char bytes[1 << 16];
+    char words[512];
+    struct pt_ply ply;
+    for (int count = 509; count <= 510; count++) {
+        int n = snprintf(bytes, sizeof bytes, "ply\nformat ascii 1.0\nelement vertex 3\n%s", xyz);
+        for (int i = 0; i < count; i++)
+            n += snprintf(bytes + n, sizeof bytes - (size_t)n, "property float f_%d\n", i);
+        n += snprintf(bytes + n, sizeof bytes - (size_t)n, "%send_header\n", face);
+        for (int v = 0; v < 3; v++) {
+            n += snprintf(bytes + n, sizeof bytes - (size_t)n, "%d %d 0", v == 1, v == 2);
+            for (int i = 0; i < count; i++)
+                n += snprintf(bytes + n, sizeof bytes - (size_t)n, " 7");
+            n += snprintf(bytes + n, sizeof bytes - (size_t)n, "\n");
+        }
+        n += snprintf(bytes + n, sizeof bytes - (size_t)n, "3 0 1 2\n");
+        const int rc = triangle(bytes, (size_t)n, &ply, words);
+        assert_int_equal(rc, count == 509 ? 0 : BASE_EINVAL);
+        if (rc)
+            assert_string_equal(words, "a.ply: more than 512 PLY properties");
+        else
+            pt_ply_release(&ply);
+    }
+}
+
 static size_t put_number(char *out, size_t at, int type, double v, int big)
 {
     const int8_t i8 = (int8_t)v;
@@ -166,7 +274,10 @@ static void numbers_of_every_type(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(reads_ascii), cmocka_unit_test(texture_coordinates_per_corner),
-                                       cmocka_unit_test(reads_binary), cmocka_unit_test(numbers_of_every_type)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(reads_ascii),         cmocka_unit_test(texture_coordinates_per_corner),
+        cmocka_unit_test(reads_binary),        cmocka_unit_test(numbers_of_every_type),
+        cmocka_unit_test(habits_of_exporters), cmocka_unit_test(lines_that_end_in_cr),
+        cmocka_unit_test(many_properties)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
