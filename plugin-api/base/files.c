@@ -291,6 +291,16 @@ static int create_tmp(struct base_file_out *out, int *fd, struct base_err *err)
     return base_fail(err, BASE_EIO, "%s: cannot write there: %s", out->path, strerror(errno));
 }
 
+/* A file that is replaced keeps its permissions, as one that is written over; where that cannot be, it is written. */
+static void keep_mode(const char *target, int fd, mode_t besides)
+{
+    const int saved = errno;
+    struct stat st;
+    if (stat(target, &st) == 0 && S_ISREG(st.st_mode))
+        (void)!fchmod(fd, (st.st_mode & (S_IRWXU | S_IRWXG | S_IRWXO)) | besides);
+    errno = saved;
+}
+
 int base_file_begin(struct base_file_out *out, const char *path, struct base_err *err)
 {
     memset(out, 0, sizeof *out);
@@ -299,6 +309,7 @@ int base_file_begin(struct base_file_out *out, const char *path, struct base_err
         rc = create_tmp(out, &fd, err);
     if (rc)
         return rc;
+    keep_mode(out->path, fd, S_IRUSR | S_IWUSR); /* sweep opens it */
     out->file = fdopen(fd, "wb");
     if (!out->file) {
         close(fd);
@@ -332,6 +343,7 @@ int base_file_commit(struct base_file_out *out, struct base_err *err)
     int bad = ferror(out->file) != 0;
     errno = bad ? find_reason(out) : 0;
     bad |= fflush(out->file) != 0;
+    keep_mode(out->path, fileno(out->file), 0);
     if (!bad) /* EINVAL: a file system without fsync */
         bad = fsync(fileno(out->file)) != 0 && errno != EINVAL;
     int saved = errno;

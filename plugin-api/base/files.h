@@ -3,9 +3,9 @@
  * reading them may never end, and an output takes the place of what was there.
  *
  * An output is written to a temporary beside PATH and renamed onto PATH by base_file_commit, so that a reader sees the old
- * file or the new one and never a part. A symbolic link is followed. A temporary is locked while its process lives; those
- * that a killed process left in a folder are removed when the next output there is checked or begun. Not thread-safe per
- * object.
+ * file or the new one and never a part. A symbolic link is followed, the permissions of an old file stay. A temporary is
+ * locked while its process lives; those that a killed process left in a folder are removed when the next output there is
+ * checked or begun. Not thread-safe per object.
  */
 #ifndef BASE_FILES_H
 #define BASE_FILES_H

@@ -197,9 +197,11 @@ def test_outputs():
     """a file is whole or as before; nothing goes onto the study's own, by whatever name"""
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "a")
-        for text in ("one", "two"):
+        for text, mode in ("one", 0o600), ("two", 0o640):
             with replaced(path) as file:
                 file.write(text)
+            assert text == "one" or os.stat(path).st_mode & 0o777 == 0o600  # of the file that was there
+            os.chmod(path, mode)
         try:
             with replaced(path) as file:
                 file.write("three")

@@ -198,6 +198,37 @@ static void outputs_appear_when_they_are_whole(void **state)
     assert_null(a.file);
 }
 
+static mode_t mode_of(const char *path)
+{
+    struct stat st;
+    return stat(path, &st) == 0 ? st.st_mode & 07777 : 0;
+}
+
+/* What was private stays so, also while it is written; what a group may write it may go on to. */
+static void permissions_of_the_old_file_stay(void **state)
+{
+    (void)state;
+    static const mode_t modes[] = {0600, 0664, 0444, 0640};
+    struct base_err err = {0};
+    struct base_file_out out;
+    const mode_t mask = umask(022);
+    for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
+        put("kept", "old");
+        assert_int_equal(chmod("kept", modes[i]), 0);
+        assert_int_equal(base_file_begin(&out, "kept", &err), 0);
+        assert_int_equal(mode_of(out.tmp_path), modes[i] | 0600);
+        fprintf(out.file, "new");
+        assert_int_equal(base_file_commit(&out, &err), 0);
+        assert_string_equal(get("kept"), "new");
+        assert_int_equal(mode_of("kept"), modes[i]);
+        assert_int_equal(unlink("kept"), 0);
+    }
+    assert_int_equal(base_file_write_line("kept", "new", &err), 0); /* of a new one the umask decides */
+    assert_int_equal(mode_of("kept"), 0644);
+    umask(mask);
+    unlink("kept");
+}
+
 static void a_failed_write_keeps_the_old_file(void **state)
 {
     (void)state;
@@ -534,6 +565,7 @@ int main(void)
         cmocka_unit_test(whole_files),
         cmocka_unit_test(what_cannot_be_written),
         cmocka_unit_test(outputs_appear_when_they_are_whole),
+        cmocka_unit_test(permissions_of_the_old_file_stay),
         cmocka_unit_test(a_failed_write_keeps_the_old_file),
         cmocka_unit_test(leftovers_of_the_dead_are_swept),
         cmocka_unit_test(inside_or_not),

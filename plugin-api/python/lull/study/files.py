@@ -99,6 +99,8 @@ def replaced(path: str) -> Iterator[TextIO]:
         with open(descriptor, "w", encoding="utf-8", newline="\n") as file:
             yield file
             file.flush()
+            with contextlib.suppress(OSError):  # a file that is replaced keeps its permissions
+                os.fchmod(file.fileno(), os.stat(target).st_mode & 0o777)
             os.fsync(file.fileno())
         os.replace(made, target)
     except BaseException as error:
