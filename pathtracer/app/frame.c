@@ -11,13 +11,13 @@ enum { NAME_ROOM = 4096 };
 
 /* --- names ---------------------------------------------------------------------------------------------------------- */
 
-/* Where the number's place begins and how long it is; 0: there is none; -1: something else has a '%'. */
-static int find_place(const char *pattern, size_t *begin, int *digits)
+/* Where the number's place begins in a text and how long it is; 0: there is none; -1: something else has a '%'. */
+static int find_place(const char *text, size_t *begin, int *digits)
 {
-    const char *percent = strchr(pattern, '%'), *at = percent + 1;
+    const char *percent = strchr(text, '%'), *at = percent + 1;
     if (!percent)
         return 0;
-    *begin = (size_t)(percent - pattern);
+    *begin = (size_t)(percent - text);
     *digits = 1;
     if (at[0] == '0' && at[1] >= '1' && at[1] <= '9') {
         *digits = at[1] - '0';
@@ -26,12 +26,33 @@ static int find_place(const char *pattern, size_t *begin, int *digits)
     return *at == 'd' && !strchr(at, '%') ? (int)(at + 1 - percent) : -1;
 }
 
+/* The same in a path: in the file's own name, else in its folders, whose other '%' are nothing but that. */
+static int find_place_in_path(const char *path, size_t *begin, int *digits)
+{
+    const char *name = base_file_name(path);
+    int length = find_place(name, begin, digits);
+    if (length > 0)
+        *begin += (size_t)(name - path);
+    if (length == 0 && (length = find_place(path, begin, digits)) < 0)
+        length = 0;
+    return length;
+}
+
+int pt_frame_has_number(const char *path)
+{
+    size_t begin;
+    int digits;
+    return find_place_in_path(path, &begin, &digits) != 0;
+}
+
 int pt_frame_name(const char *pattern, int number, char *out, size_t room, struct base_err *err)
 {
-    size_t begin = strlen(pattern);
-    int digits = 1, length = find_place(pattern, &begin, &digits);
+    size_t begin = 0;
+    int digits = 1, length = find_place_in_path(pattern, &begin, &digits);
     if (length < 0)
         return base_fail(err, BASE_EINVAL, "%s: expected one %%d or %%04d in the place of the frame's number", pattern);
+    if (length == 0)
+        begin = strlen(pattern);
     int n = length ? snprintf(out, room, "%.*s%0*d%s", (int)begin, pattern, digits, number, pattern + begin + length)
                    : snprintf(out, room, "%s", pattern);
     return (size_t)n < room ? 0 : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", pattern);

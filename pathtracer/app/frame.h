@@ -27,8 +27,11 @@ int pt_frame_init(struct pt_shot_frame *frame, const struct pt_cli *cli, int num
                   struct base_err *err);
 void pt_frame_release(struct pt_shot_frame *frame);
 
-/* The pattern with the frame's number in it, in out[room]. A name without '%' stays. */
+/* The pattern with the frame's number in the place of %d or %04d, in out[room]: in the file's own name, else in one of its
+ * folders, which may have a '%' as well. Without it the pattern stays. */
 int pt_frame_name(const char *pattern, int number, char *out, size_t room, struct base_err *err);
+/* Whether the file's name changes with the number, or has another '%', which pt_frame_name refuses. */
+int pt_frame_has_number(const char *pattern);
 /* Its own for each frame of a shot and each seed of the command line; another seed is another picture of independent
  * noise. */
 uint32_t pt_frame_seed(uint32_t seed, int number);

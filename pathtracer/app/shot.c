@@ -155,7 +155,7 @@ static int read_path(const struct pt_shot_plan *plan, struct pt_shot *s, struct 
 static int check_names(const struct pt_cli *cli, const struct pt_shot *s, struct base_err *err)
 {
     for (int i = 0; i < cli->outputs.count && s->count > 1; i++)
-        if (cli->outputs.list[i].path != cli->shot.plan && !strchr(cli->outputs.list[i].path, '%'))
+        if (cli->outputs.list[i].path != cli->shot.plan && !pt_frame_has_number(cli->outputs.list[i].path))
             return base_fail(err, BASE_EINVAL, "--%s %s: several frames need a number in the name, as in out_%%04d.exr",
                              cli->outputs.list[i].option, cli->outputs.list[i].path);
     for (size_t i = 0; i < s->count; i++) {

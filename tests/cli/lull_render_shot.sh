@@ -105,6 +105,11 @@ refused "--frames 3-1: expected a rising list" "$scene" --frames 3-1 -o x_%d.exr
 refused "--output x.exr: several frames need a number" "$scene" --frames 1-2 -o x.exr
 refused "--checkpoint k: several frames need a number" "$scene" --frames 1-2 -o x_%d.exr --checkpoint k
 refused "x_%s.exr: expected one %d or %04d" "$scene" --frames 1-2 -o x_%s.exr
+mkdir 50% && cp s_0001.pbrt 50%/
+t "a folder's name with a %" "$P" 50%/s_%04d.pbrt --frames 1 $small --spp 1 -o 50%/f_%d.exr
+t "  …is that folder" test -s 50%/f_1.exr
+refused "50%/x_%.exr: expected one %d or %04d in the place of the frame's number" "$scene" --frames 1 -o 50%/x_%.exr
+refused "--output 50%/x.exr: several frames need a number" "$scene" --frames 1-2 -o 50%/x.exr
 refused "s_0004.pbrt: No such file" s_%04d.pbrt --frames 1-4 $small -o x_%d.exr
 refused "belong to --frames" "$scene" --shot-table own.csv -o x.exr
 refused "goes with none of --quote" "$scene" --frames 1 --quote -o x.exr

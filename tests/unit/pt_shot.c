@@ -51,6 +51,12 @@ static void names_of_frames(void **state)
     assert_string_equal(name, "a_0007.exr");
     assert_int_equal(pt_frame_name("%d/x", 123456, name, sizeof name, NULL), 0);
     assert_string_equal(name, "123456/x");
+    assert_int_equal(pt_frame_name("50%/%d%s/%03d.exr", 7, name, sizeof name, NULL), 0);
+    assert_string_equal(name, "50%/%d%s/007.exr");
+    assert_int_equal(pt_frame_name("50%/a.pbrt", 7, name, sizeof name, NULL), 0);
+    assert_string_equal(name, "50%/a.pbrt");
+    assert_true(pt_frame_has_number("50%/%d") && pt_frame_has_number("%04d/a") && pt_frame_has_number("%s"));
+    assert_true(!pt_frame_has_number("50%/a") && !pt_frame_has_number("a"));
     assert_int_equal(pt_frame_name("still.pbrt", 7, name, sizeof name, NULL), 0);
     assert_string_equal(name, "still.pbrt");
     static const char *const bad[] = {"%", "%s", "%n", "%4d", "%0d", "%012d", "%%d", "%d%d", "%d%n", "%ld", "%04"};
