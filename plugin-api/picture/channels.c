@@ -76,16 +76,25 @@ static int is_combined(const struct layer *l)
            (l->length == n || l->name[l->length - n - 1] == '.');
 }
 
+/* Blender's compositor: the picture that it shows, beside the layers that the picture was made of. */
+static int is_composite(const struct layer *l)
+{
+    static const char name[] = "Composite.Combined";
+    return l->length == sizeof name - 1 && strncasecmp(l->name, name, sizeof name - 1) == 0;
+}
+
 /* The one of its kind; NULL: there is none, or there are several, *colours of them in colour. */
 static const struct layer *find_picture(const struct layer *list, int count, int *colours)
 {
-    const struct layer *colour = NULL, *combined = NULL, *grey = NULL;
+    const struct layer *colour = NULL, *combined = NULL, *grey = NULL, *composite = NULL;
     int combineds = 0, greys = 0;
     *colours = 0;
     for (int i = 0; i < count; i++) {
         const struct layer *l = &list[i];
         if (l->part == 0 && l->is_own && (is_colour(l) || grey_of(l) >= 0))
             return l;
+        if (is_colour(l) && is_composite(l))
+            composite = l;
         if (is_colour(l) && is_combined(l))
             combined = ++combineds == 1 ? l : NULL;
         if (is_colour(l))
@@ -93,7 +102,7 @@ static const struct layer *find_picture(const struct layer *list, int count, int
         else if (grey_of(l) >= 0)
             grey = ++greys == 1 ? l : NULL;
     }
-    return combined ? combined : *colours > 0 ? colour : grey;
+    return composite ? composite : combined ? combined : *colours > 0 ? colour : grey;
 }
 
 static struct pic_choice choice_of(const struct layer *l)

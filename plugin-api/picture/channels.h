@@ -27,8 +27,8 @@ struct pic_choice {
 enum { PIC_MAX_CHANNELS = 4096 };
 
 /* The first part's own layer if it is a picture; else the one layer that is a colour picture, or of several the one called
- * Combined; else the one that is a grey picture; else the only channel, of any name. BASE_EINVAL, naming layers or channels,
- * when that does not tell, BASE_ENOMEM. file: named in errors. */
+ * Combined, or of several of those Blender's Composite.Combined; else the one that is a grey picture; else the only channel,
+ * of any name. BASE_EINVAL, naming layers or channels, when that does not tell, BASE_ENOMEM. file: named in errors. */
 int pic_choose_channels(const char *file, const struct pic_channel *list, int count, struct pic_choice *out,
                         struct base_err *err);
 

@@ -82,6 +82,10 @@ static void pictures(void **state)
          "0: 3 2 1 0"},
         {"V.Combined.B V.Combined.G V.Combined.R V.Diffuse.B V.Diffuse.G V.Diffuse.R", "0: 2 1 0"},
         {"V.Diffuse.B V.Diffuse.G V.Diffuse.R combined.B combined.G combined.R", "0: 5 4 3"},
+        {"V.Combined.B V.Combined.G V.Combined.R Composite.Combined.B Composite.Combined.G Composite.Combined.R",
+         "0: 5 4 3"},
+        {"Z|V.Combined:R V.Combined:G V.Combined:B|Composite.Combined:R Composite.Combined:G Composite.Combined:B",
+         "2: 0 1 2"},
         {"beauty.B beauty.G beauty.R N.X N.Y N.Z Z", "0: 2 1 0"}, /* the only colour */
         {"layer.Y N.X N.Y N.Z", "0: 0"},
         {"R G B|R G B", "0: 0 1 2"}, /* the first part is the picture */
