@@ -10,7 +10,7 @@ static double det3(const double a[3], const double b[3], const double c[3])
 }
 
 /* columns · out = v, by Cramer's rule. */
-static void solve3(const double columns[3][3], const double v[3], double out[3])
+static void solve3(double columns[3][3], const double v[3], double out[3])
 {
     const double det = det3(columns[0], columns[1], columns[2]);
     out[0] = det3(v, columns[1], columns[2]) / det;
