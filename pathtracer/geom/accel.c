@@ -14,6 +14,7 @@ struct pt_accel {
     RTCScene *objects;      /* [object_count], owns */
     RTCGeometry *instances; /* [instance_count], borrows from `world` */
     int32_t object_count;
+    enum RTCSceneFlags flags;
     int packet; /* rays that go together: the processor's own width, 1 = one by one */
     atomic_llong bytes;
 };
@@ -44,26 +45,63 @@ enum { FIELDS = sizeof(struct RTCRayHit16) / (16 * sizeof(union lane)) };
 _Static_assert(RTC_MAX_INSTANCE_LEVEL_COUNT == 1 && (int)FIELDS >= (int)OUR_FIELDS,
                "Embree has several levels of instances");
 
-/* Ray i of n. */
-static int quadric_query(const struct pt_quadric *q, const union lane *rays, unsigned n, unsigned i, float *t,
-                         pt_vec3 *p_quadric)
+/* Of what a query leaves out, by Embree's ids. */
+struct left_out {
+    uint32_t count;
+    struct {
+        unsigned geometry, primitive, instance, crossing;
+    } of[PT_PASSED];
+};
+
+static int is_left_out(const struct left_out *list, uint32_t i, unsigned geometry, unsigned primitive, unsigned instance)
+{
+    return list->of[i].geometry == geometry && list->of[i].primitive == primitive && list->of[i].instance == instance;
+}
+
+/* The crossings of a quadric, a bit each. */
+static unsigned crossings_left_out(const struct left_out *list, unsigned geometry, unsigned primitive, unsigned instance)
+{
+    unsigned crossings = 0;
+    for (uint32_t i = 0; list && i < list->count; i++)
+        if (is_left_out(list, i, geometry, primitive, instance))
+            crossings |= 1u << list->of[i].crossing;
+    return crossings;
+}
+
+/* Triangles. */
+static void leave_out(const struct RTCFilterFunctionNArguments *args)
+{
+    const struct left_out *list = ((const struct pt_embree_context *)args->context)->left_out;
+    const struct RTCHit *hit = (const struct RTCHit *)args->hit; /* of one ray */
+    for (uint32_t i = 0; i < list->count; i++)
+        if (is_left_out(list, i, hit->geomID, hit->primID, hit->instID[0]))
+            args->valid[0] = 0;
+}
+
+/* Ray i of n; as pt_quadric_intersect. */
+static int quadric_query(const struct pt_quadric *q, const union lane *rays, unsigned n, unsigned i, unsigned left_out,
+                         float *t, pt_vec3 *p_quadric)
 {
     return pt_quadric_intersect(q, v3(rays[ORG_X * n + i].f, rays[ORG_Y * n + i].f, rays[ORG_Z * n + i].f),
                                 v3(rays[DIR_X * n + i].f, rays[DIR_Y * n + i].f, rays[DIR_Z * n + i].f),
-                                rays[TNEAR * n + i].f, rays[TFAR * n + i].f, t, p_quadric);
+                                rays[TNEAR * n + i].f, rays[TFAR * n + i].f, left_out, t, p_quadric);
 }
 
 static void quadric_intersect(const struct RTCIntersectFunctionNArguments *args)
 {
     unsigned n = args->N;
     union lane *lanes = (union lane *)args->rayhit;
+    const unsigned left_out = crossings_left_out(((const struct pt_embree_context *)args->context)->left_out, args->geomID,
+                                                 args->primID, args->context->instID[0]);
     float t;
     pt_vec3 p;
     for (unsigned i = 0; i < n; i++) {
-        if (!args->valid[i] || !quadric_query(args->geometryUserPtr, lanes, n, i, &t, &p))
+        int crossing = args->valid[i] ? quadric_query(args->geometryUserPtr, lanes, n, i, left_out, &t, &p) : 0;
+        if (!crossing)
             continue;
         lanes[TFAR * n + i].f = t;
-        lanes[HIT_U * n + i].f = lanes[HIT_V * n + i].f = 0.0f;
+        lanes[HIT_U * n + i].f = (float)(crossing - 1);
+        lanes[HIT_V * n + i].f = 0.0f;
         lanes[NG_X * n + i].f = p.x;
         lanes[NG_Y * n + i].f = p.y;
         lanes[NG_Z * n + i].f = p.z;
@@ -80,7 +118,7 @@ static void quadric_occluded(const struct RTCOccludedFunctionNArguments *args)
     float t;
     pt_vec3 p;
     for (unsigned i = 0; i < n; i++)
-        if (args->valid[i] && quadric_query(args->geometryUserPtr, lanes, n, i, &t, &p))
+        if (args->valid[i] && quadric_query(args->geometryUserPtr, lanes, n, i, 0, &t, &p))
             lanes[TFAR * n + i].f = -INFINITY;
 }
 
@@ -174,12 +212,19 @@ static int attach(RTCScene target, RTCGeometry g, unsigned id)
     return 1;
 }
 
-static RTCScene make_group(struct pt_scene *scene, RTCDevice device, int32_t first, int32_t count, int commit)
+/* Whether rays can go on behind this shape. */
+static int is_passable(const struct pt_scene *scene, const struct pt_shape *shape)
 {
+    return shape->has_alpha || scene->materials[shape->material].kind == PT_MATERIAL_INTERFACE;
+}
+
+static RTCScene make_group(struct pt_scene *scene, const struct pt_accel *accel, int32_t first, int32_t count, int commit)
+{
+    RTCDevice device = accel->device;
     RTCScene group = rtcNewScene(device);
     if (!group)
         return NULL;
-    rtcSetSceneFlags(group, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneFlags(group, accel->flags);
     for (int32_t i = 0; i < count; i++) {
         const struct pt_shape *shape = &scene->shapes[first + i];
         RTCGeometry g = shape->kind == PT_SHAPE_MESH ? make_mesh(device, &scene->meshes[shape->data])
@@ -246,13 +291,17 @@ static int build(struct pt_scene *scene, struct pt_accel *accel)
     if (!accel->device)
         return 0;
     accel->packet = native_packet(accel->device);
+    accel->flags = RTC_SCENE_FLAG_ROBUST;
+    for (int32_t i = 0; i < scene->shape_count; i++)
+        if (is_passable(scene, &scene->shapes[i]))
+            accel->flags = RTC_SCENE_FLAG_ROBUST | PT_EMBREE_FLAG_FILTER;
     rtcSetDeviceMemoryMonitorFunction(accel->device, count_bytes, accel);
     for (int32_t i = 0; i < scene->object_count; i++) {
         const struct pt_object *o = &scene->objects[i];
-        if (!(accel->objects[i] = make_group(scene, accel->device, o->first_shape, o->shape_count, 1)))
+        if (!(accel->objects[i] = make_group(scene, accel, o->first_shape, o->shape_count, 1)))
             return 0;
     }
-    accel->world = make_group(scene, accel->device, 0, scene->world_shape_count, 0);
+    accel->world = make_group(scene, accel, 0, scene->world_shape_count, 0);
     if (!accel->world || !build_instances(scene, accel))
         return 0;
     rtcCommitScene(accel->world);
@@ -324,20 +373,65 @@ static inline void name_shape(const struct pt_scene *scene, unsigned geometry, u
     }
 }
 
-int pt_accel_intersect(const struct pt_scene *scene, const struct pt_ray *ray, struct pt_hit *hit)
+static inline struct RTCRayHit make_query(const struct pt_ray *ray)
 {
     struct RTCRayHit rh;
     rh.ray = make_ray(ray);
     rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    pt_embree_intersect1(scene->accel->world, &rh);
-    hit->t = rh.ray.tfar;
-    hit->u = rh.hit.u;
-    hit->v = rh.hit.v;
-    hit->primitive = (int32_t)rh.hit.primID;
-    hit->geometric = v3(rh.hit.Ng_x, rh.hit.Ng_y, rh.hit.Ng_z);
-    name_shape(scene, rh.hit.geomID, rh.hit.instID[0], hit);
+    return rh;
+}
+
+static inline int take_answer(const struct pt_scene *scene, const struct RTCRayHit *rh, struct pt_hit *hit)
+{
+    hit->t = rh->ray.tfar;
+    hit->u = rh->hit.u;
+    hit->v = rh->hit.v;
+    hit->primitive = (int32_t)rh->hit.primID;
+    hit->geometric = v3(rh->hit.Ng_x, rh->hit.Ng_y, rh->hit.Ng_z);
+    name_shape(scene, rh->hit.geomID, rh->hit.instID[0], hit);
     return hit->shape >= 0;
+}
+
+int pt_accel_intersect(const struct pt_scene *scene, const struct pt_ray *ray, struct pt_hit *hit)
+{
+    struct RTCRayHit rh = make_query(ray);
+    pt_embree_intersect1(scene->accel->world, &rh);
+    return take_answer(scene, &rh, hit);
+}
+
+/* A ray that goes on begins this share before what it has passed: rounding may put what is at the same place before it. */
+#define PASSED_BACK 1e-5f
+/* Where more was passed at one place than is remembered: the distance of a hit is known to a few roundings only. */
+#define PASSED_BEYOND 1e-6f
+
+void pt_ray_pass(struct pt_ray *ray, struct pt_passed *passed, const struct pt_hit *hit)
+{
+    struct pt_hit *place = &passed->hits[passed->count % PT_PASSED];
+    float t = hit->t * (1.0f - PASSED_BACK);
+    if (passed->count >= PT_PASSED)
+        t = fmaxf(t, place->t * (1.0f + PASSED_BEYOND));
+    ray->t_min = fmaxf(ray->t_min, t);
+    *place = *hit;
+    passed->count++;
+}
+
+int pt_accel_intersect_behind(const struct pt_scene *scene, const struct pt_ray *ray, const struct pt_passed *passed,
+                              struct pt_hit *hit)
+{
+    struct left_out list = {.count = passed->count < PT_PASSED ? passed->count : PT_PASSED};
+    for (uint32_t i = 0; i < list.count; i++) {
+        const struct pt_hit *of = &passed->hits[i];
+        int32_t first = of->instance < 0 ? 0 : scene->objects[scene->instances[of->instance].object].first_shape;
+        list.of[i].geometry = (unsigned)(of->shape - first);
+        list.of[i].instance =
+            of->instance < 0 ? RTC_INVALID_GEOMETRY_ID : (unsigned)(scene->world_shape_count + of->instance);
+        list.of[i].primitive = (unsigned)of->primitive;
+        list.of[i].crossing = scene->shapes[of->shape].kind == PT_SHAPE_QUADRIC && of->u > 0.0f;
+    }
+    struct RTCRayHit rh = make_query(ray);
+    pt_embree_intersect1_filtered(scene->accel->world, &rh, leave_out, &list);
+    return take_answer(scene, &rh, hit);
 }
 
 int pt_accel_occluded(const struct pt_scene *scene, const struct pt_ray *ray)

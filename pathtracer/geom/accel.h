@@ -25,7 +25,7 @@ struct pt_ray {
 
 struct pt_hit {
     float t;
-    float u, v;        /* mesh: weights of corners 1 and 2 */
+    float u, v;        /* mesh: weights of corners 1 and 2; quadric: u is the number, 0 or 1, of the line's crossing */
     int32_t shape;     /* id, -1 = nothing was hit */
     int32_t primitive; /* mesh: triangle */
     int32_t instance;  /* id, -1 = a shape of the world */
@@ -33,11 +33,21 @@ struct pt_hit {
                           quadric: the hit point in the quadric's own space */
 };
 
-/* t_min for going on behind a hit at t: the hit's own distance is known to a few roundings only. */
-static inline float pt_ray_beyond(float t) { return t * 1.000001f + 1e-37f; }
+/* The surfaces that a ray has passed through, at most the last PT_PASSED. They are left out by their names, not by their
+ * distances: what coincides with one of them, or lies closely behind it, is still met. */
+enum { PT_PASSED = 16 };
+struct pt_passed {
+    uint32_t count; /* of all; number i is in place i % PT_PASSED */
+    struct pt_hit hits[PT_PASSED];
+};
+/* The ray goes on behind `hit`. Of more than PT_PASSED surfaces at one place, those that come too late are left out, too. */
+void pt_ray_pass(struct pt_ray *ray, struct pt_passed *passed, const struct pt_hit *hit);
 
 /* Nearest hit; returns 1 and fills *hit, or 0 and hit->shape is -1. Alpha is not looked at. */
 int pt_accel_intersect(const struct pt_scene *scene, const struct pt_ray *ray, struct pt_hit *hit);
+/* The same without what was passed. The scene has shapes with alpha or of the material `interface`. */
+int pt_accel_intersect_behind(const struct pt_scene *scene, const struct pt_ray *ray, const struct pt_passed *passed,
+                              struct pt_hit *hit);
 /* 1 when anything lies in (t_min, t_max). Alpha is not looked at. */
 int pt_accel_occluded(const struct pt_scene *scene, const struct pt_ray *ray);
 

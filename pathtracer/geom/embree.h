@@ -8,28 +8,57 @@
 #if PT_EMBREE == 4
 #include <embree4/rtcore.h>
 
+/* What callbacks are given: `left_out` is for them and for a filter, NULL: nothing is. */
+struct pt_embree_context {
+    struct RTCRayQueryContext embree;
+    const void *left_out;
+};
+
 /* The arguments of a query, by which Embree 4 is told what 3 had in the context. */
 #define PT_EMBREE_ARGUMENTS(kind, coherent) \
-    struct RTCRayQueryContext context; \
+    struct pt_embree_context context; \
     struct RTC##kind##Arguments query; \
-    rtcInitRayQueryContext(&context); \
+    rtcInitRayQueryContext(&context.embree); \
+    context.left_out = NULL; \
     rtcInit##kind##Arguments(&query); \
-    query.context = &context; \
+    query.context = &context.embree; \
     query.flags = (coherent) ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT
 #define PT_EMBREE_ASK(function, rays, ...) function(__VA_ARGS__, rays, &query)
+/* Of a scene that is asked with a filter. */
+#define PT_EMBREE_FLAG_FILTER RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS
+/* All hits of triangles, not only of geometries that ask for it. */
+#define PT_EMBREE_FILTER(function) query.filter = (function), query.flags |= RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER
 #else
 #include <embree3/rtcore.h>
 
+struct pt_embree_context {
+    struct RTCIntersectContext embree;
+    const void *left_out;
+};
+
 #define PT_EMBREE_ARGUMENTS(kind, coherent) \
-    struct RTCIntersectContext query; \
-    rtcInitIntersectContext(&query); \
-    query.flags = (coherent) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT
-#define PT_EMBREE_ASK(function, rays, ...) function(__VA_ARGS__, &query, rays)
+    struct pt_embree_context context; \
+    rtcInitIntersectContext(&context.embree); \
+    context.left_out = NULL; \
+    context.embree.flags = (coherent) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT
+#define PT_EMBREE_ASK(function, rays, ...) function(__VA_ARGS__, &context.embree, rays)
+#define PT_EMBREE_FLAG_FILTER RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION
+#define PT_EMBREE_FILTER(function) context.embree.filter = (function)
 #endif
 
 static inline void pt_embree_intersect1(RTCScene scene, struct RTCRayHit *ray)
 {
     PT_EMBREE_ARGUMENTS(Intersect, 0);
+    PT_EMBREE_ASK(rtcIntersect1, ray, scene);
+}
+
+/* `filter` clears *valid of triangles that are not to be hit. */
+static inline void pt_embree_intersect1_filtered(RTCScene scene, struct RTCRayHit *ray, RTCFilterFunctionN filter,
+                                                 const void *left_out)
+{
+    PT_EMBREE_ARGUMENTS(Intersect, 0);
+    context.left_out = left_out;
+    PT_EMBREE_FILTER(filter);
     PT_EMBREE_ASK(rtcIntersect1, ray, scene);
 }
 

@@ -56,8 +56,8 @@ static struct dvec along(struct dvec o, struct dvec d, double t)
     return (struct dvec){o.x + t * d.x, o.y + t * d.y, o.z + t * d.z};
 }
 
-static int intersect_round(const struct pt_quadric *q, struct dvec o, struct dvec d, double t_min, double t_max, double *t,
-                           struct dvec *p)
+static int intersect_round(const struct pt_quadric *q, struct dvec o, struct dvec d, double t_min, double t_max,
+                           unsigned left_out, double *t, struct dvec *p)
 {
     double r = (double)q->radius, zz = q->kind == PT_QUADRIC_SPHERE ? 1.0 : 0.0, t01[2];
     double a = d.x * d.x + d.y * d.y + zz * d.z * d.z, b = o.x * d.x + o.y * d.y + zz * o.z * d.z;
@@ -66,17 +66,17 @@ static int intersect_round(const struct pt_quadric *q, struct dvec o, struct dve
     for (int i = 0; i < 2; i++) {
         *t = t01[i];
         *p = along(o, d, *t);
-        if (*t > t_min && *t < t_max && !clipped(q, p))
-            return 1;
+        if (!(left_out >> i & 1) && *t > t_min && *t < t_max && !clipped(q, p))
+            return 1 + i;
     }
     return 0;
 }
 
-static int intersect_disk(const struct pt_quadric *q, struct dvec o, struct dvec d, double t_min, double t_max, double *t,
-                          struct dvec *p)
+static int intersect_disk(const struct pt_quadric *q, struct dvec o, struct dvec d, double t_min, double t_max,
+                          unsigned left_out, double *t, struct dvec *p)
 {
     *t = d.z != 0.0 ? ((double)q->z_min - o.z) / d.z : INFINITY;
-    if (!(*t > t_min && *t < t_max))
+    if ((left_out & 1) || !(*t > t_min && *t < t_max))
         return 0;
     *p = along(o, d, *t);
     double r = sqrt(p->x * p->x + p->y * p->y);
@@ -84,18 +84,18 @@ static int intersect_disk(const struct pt_quadric *q, struct dvec o, struct dvec
            (whole_turn(q) || angle_of(p->x, p->y) <= (double)q->phi_max);
 }
 
-int pt_quadric_intersect(const struct pt_quadric *q, pt_vec3 origin, pt_vec3 direction, float t_min, float t_max, float *t,
-                         pt_vec3 *p_quadric)
+int pt_quadric_intersect(const struct pt_quadric *q, pt_vec3 origin, pt_vec3 direction, float t_min, float t_max,
+                         unsigned left_out, float *t, pt_vec3 *p_quadric)
 {
     struct dvec o = transform(q->from_render.m, origin, 1.0), d = transform(q->from_render.m, direction, 0.0), p;
     double at;
-    int found = q->kind == PT_QUADRIC_DISK ? intersect_disk(q, o, d, (double)t_min, (double)t_max, &at, &p)
-                                           : intersect_round(q, o, d, (double)t_min, (double)t_max, &at, &p);
+    int found = q->kind == PT_QUADRIC_DISK ? intersect_disk(q, o, d, (double)t_min, (double)t_max, left_out, &at, &p)
+                                           : intersect_round(q, o, d, (double)t_min, (double)t_max, left_out, &at, &p);
     if (!found)
         return 0;
     *t = (float)at;
     *p_quadric = v3((float)p.x, (float)p.y, (float)p.z);
-    return 1;
+    return found;
 }
 
 void pt_quadric_bounds(const struct pt_quadric *q, pt_vec3 *lower, pt_vec3 *upper)

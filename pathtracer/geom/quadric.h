@@ -8,9 +8,10 @@
 #include "scene/scene.h"
 
 /* Nearest hit with t in (t_min, t_max); the ray is in the space of q->to_render, *p_quadric (the hit point) in the quadric's
- * own. 1 when there is one. */
-int pt_quadric_intersect(const struct pt_quadric *q, pt_vec3 origin, pt_vec3 direction, float t_min, float t_max, float *t,
-                         pt_vec3 *p_quadric);
+ * own. Its line crosses the quadric at most twice: 1 or 2 says which is hit, 0 that none is. Bit 0 of `left_out`: not
+ * the first, bit 1: not the second. */
+int pt_quadric_intersect(const struct pt_quadric *q, pt_vec3 origin, pt_vec3 direction, float t_min, float t_max,
+                         unsigned left_out, float *t, pt_vec3 *p_quadric);
 
 /* Axis-aligned bounds in the space of to_render, rounded outwards. */
 void pt_quadric_bounds(const struct pt_quadric *q, pt_vec3 *lower, pt_vec3 *upper);

@@ -11,6 +11,7 @@
 #ifndef PT_INTEG_PATH_H
 #define PT_INTEG_PATH_H
 
+#include "integ/borders.h"
 #include "integ/integrator.h"
 #include "integ/lanes.h"
 #include "integ/surface.h"
@@ -26,6 +27,9 @@
 
 /* Shadow rays end this share before their target, which is already off its surface. */
 #define PT_SHADOW_END 0.9999f
+
+/* Rays may go on behind what they meet. */
+#define PT_FX_THROUGH (PT_FX_ALPHA | PT_FX_INTERFACE)
 
 /* A path between perfect mirrors loses nothing and would never end when the depth is unlimited: beyond this many bounces
  * roulette takes some of them whatever they carry. */
@@ -57,6 +61,9 @@ struct pt_path {
     int32_t depth;   /* bounces so far */
     uint32_t rays;
     struct pt_hit hit;          /* what the ray has met first */
+    struct pt_passed *passed;   /* borrows; what it has passed through, with PT_FX_THROUGH only */
+    float t_medium;             /* the ray is in its medium from here on */
+    int32_t looked;             /* `hit` is already known */
     struct pt_light_plan plan;  /* of the last vertex */
     struct pt_path_result *out; /* borrows */
 };
@@ -93,30 +100,82 @@ PT_KERNEL_INLINE int pt_passes_alpha(const struct pt_scene *scene, const struct 
     return alpha < 1.0f && (alpha <= 0.0f || pt_rng_float(rng) >= alpha);
 }
 
-/* Whether a ray that passes through this shape by chance comes into the medium behind it. */
-PT_KERNEL_INLINE int pt_is_border(pt_effects fx, const struct pt_shape *shape)
+/* What becomes of a ray that meets a surface. */
+enum pt_passage { PT_PASSAGE_NONE, PT_PASSAGE_FREE, PT_PASSAGE_BORDER /* through, and into the medium behind */ };
+
+PT_KERNEL_INLINE enum pt_passage pt_passage_at(pt_effects fx, const struct pt_scene *scene, const struct pt_ray *ray,
+                                               const struct pt_hit *hit, struct pt_rng *rng)
 {
-    return (fx & PT_FX_MEDIA) && shape->has_opacity && shape->medium_in != shape->medium_out;
+    const struct pt_shape *shape = &scene->shapes[hit->shape];
+    int by_chance = (fx & PT_FX_ALPHA) && pt_passes_alpha(scene, ray, hit, rng);
+    if (!by_chance && !((fx & PT_FX_INTERFACE) && scene->materials[shape->material].kind == PT_MATERIAL_INTERFACE))
+        return PT_PASSAGE_NONE;
+    if (!(fx & PT_FX_MEDIA) || shape->medium_in == shape->medium_out || (by_chance && !shape->has_opacity))
+        return PT_PASSAGE_FREE;
+    return PT_PASSAGE_BORDER;
 }
 
 /* What a path's ray has met. */
 enum pt_found { PT_FOUND_NOTHING, PT_FOUND_SURFACE, PT_FOUND_BORDER /* a surface that lets it into another medium */ };
 
-/* What the path met that counts: goes on behind what it passes through by chance. */
-PT_KERNEL_INLINE enum pt_found pt_path_found(pt_effects fx, struct pt_path *path)
+/* The path's ray goes on behind its hit. */
+PT_KERNEL_INLINE void pt_path_pass(struct pt_path *path)
 {
+    pt_ray_pass(&path->ray, path->passed, &path->hit);
     path->rays++;
-    if (fx & PT_FX_ALPHA) {
-        struct pt_rng rng = pt_sampler_stream(&path->sampler, PT_DIM_ALPHA);
-        while (path->hit.shape >= 0 && pt_passes_alpha(path->scene, &path->ray, &path->hit, &rng)) {
-            if (pt_is_border(fx, &path->scene->shapes[path->hit.shape]))
-                return PT_FOUND_BORDER;
-            path->ray.t_min = pt_ray_beyond(path->hit.t);
-            path->rays++;
-            pt_accel_intersect(path->scene, &path->ray, &path->hit);
-        }
+    pt_accel_intersect_behind(path->scene, &path->ray, path->passed, &path->hit);
+}
+
+/* What the path met that counts: goes on behind what it passes through. */
+PT_KERNEL_INLINE enum pt_found pt_path_found(pt_effects fx, struct pt_path *path, struct pt_rng *rng)
+{
+    path->rays += !((fx & PT_FX_THROUGH) && path->looked);
+    while ((fx & PT_FX_THROUGH) && path->hit.shape >= 0) {
+        enum pt_passage passage = pt_passage_at(fx, path->scene, &path->ray, &path->hit, rng);
+        if (passage == PT_PASSAGE_BORDER)
+            return PT_FOUND_BORDER;
+        if (passage == PT_PASSAGE_NONE)
+            break;
+        pt_path_pass(path);
     }
     return path->hit.shape >= 0 ? PT_FOUND_SURFACE : PT_FOUND_NOTHING;
+}
+
+/* Takes the path through the border that it has met. PT_FOUND_SURFACE: at the same place is a surface that it does not pass
+ * through, which it has met in the medium before the border. Else PT_FOUND_BORDER. */
+PT_KERNEL_INLINE enum pt_found pt_path_cross_border(pt_effects fx, struct pt_path *path, struct pt_rng *rng)
+{
+    struct pt_borders borders = {.count = 0};
+    struct pt_place at;
+    pt_place_at_hit(fx, path->scene, &path->ray, &path->hit, &at);
+    pt_borders_add(&borders, &at, path->ray.direction, path->hit.t);
+    for (;;) {
+        pt_path_pass(path);
+        if (path->hit.shape < 0)
+            break;
+        pt_place_at_hit(fx, path->scene, &path->ray, &path->hit, &at);
+        if (!pt_borders_at(&borders, &at, path->ray.direction, path->hit.t))
+            break;
+        enum pt_passage passage = pt_passage_at(fx, path->scene, &path->ray, &path->hit, rng);
+        if (passage == PT_PASSAGE_NONE)
+            return PT_FOUND_SURFACE;
+        if (passage == PT_PASSAGE_BORDER)
+            pt_borders_add(&borders, &at, path->ray.direction, path->hit.t);
+    }
+    path->medium = pt_borders_cross(&borders, path->medium);
+    path->t_medium = borders.t;
+    path->looked = 1;
+    return PT_FOUND_BORDER;
+}
+
+/* The path's next ray. */
+PT_KERNEL_INLINE void pt_path_turn(pt_effects fx, struct pt_path *path, pt_vec3 origin, pt_vec3 direction)
+{
+    path->ray = (struct pt_ray){origin, direction, 0.0f, INFINITY, path->ray.time};
+    path->t_medium = 0.0f;
+    path->looked = 0;
+    if (fx & PT_FX_THROUGH)
+        path->passed->count = 0;
 }
 
 /* Of a medium that fills the whole shadow ray; direction unnormalised, its length in `length`. */
@@ -136,28 +195,38 @@ PT_KERNEL_INLINE pt_vec3 pt_path_transmittance(pt_effects fx, struct pt_path *pa
     const struct pt_scene *scene = path->scene;
     struct pt_rng rng = pt_sampler_stream(&path->sampler, PT_DIM_SHADOW);
     pt_vec3 through = v3_splat(1.0f), unit = v3_scale(ray->direction, 1.0f / length);
-    for (;;) {
+    struct pt_passed passed;
+    struct pt_borders borders = {.count = 0};
+    float start = ray->t_min;
+    for (passed.count = 0;;) {
         struct pt_hit hit;
+        struct pt_place at;
         path->rays++;
-        int found = pt_accel_intersect(scene, ray, &hit);
-        int alpha = found && (fx & PT_FX_ALPHA) && pt_passes_alpha(scene, ray, &hit, &rng);
-        int interface = found && (fx & PT_FX_INTERFACE) &&
-                        scene->materials[scene->shapes[hit.shape].material].kind == PT_MATERIAL_INTERFACE;
-        if (found && !alpha && !interface)
+        int found =
+            passed.count ? pt_accel_intersect_behind(scene, ray, &passed, &hit) : pt_accel_intersect(scene, ray, &hit);
+        enum pt_passage passage = found ? pt_passage_at(fx, scene, ray, &hit, &rng) : PT_PASSAGE_BORDER;
+        if (passage == PT_PASSAGE_NONE)
             return v3_splat(0.0f);
-        float end = found ? hit.t : ray->t_max;
-        if ((fx & PT_FX_MEDIA) && medium >= 0)
-            through = v3_mul(through,
-                             pt_medium_transmittance(&scene->media[medium], v3_madd(ray->origin, ray->t_min, ray->direction),
-                                                     unit, (end - ray->t_min) * length, &rng));
-        if (!found || v3_is_black(through))
-            return through;
-        if ((fx & PT_FX_MEDIA) && (alpha ? pt_is_border(fx, &scene->shapes[hit.shape]) : interface)) {
-            struct pt_place at;
-            pt_place_at_hit(fx, scene, ray, &hit, &at);
-            medium = pt_medium_towards(&at, ray->direction, medium);
+        if ((fx & PT_FX_MEDIA) && passage == PT_PASSAGE_BORDER) {
+            if (found)
+                pt_place_at_hit(fx, scene, ray, &hit, &at);
+            if (borders.count && !(found && pt_borders_at(&borders, &at, ray->direction, hit.t)))
+                medium = pt_borders_cross(&borders, medium);
+            float end = found ? hit.t : ray->t_max;
+            if (medium >= 0 && !borders.count)
+                through = v3_mul(through,
+                                 pt_medium_transmittance(&scene->media[medium], v3_madd(ray->origin, start, ray->direction),
+                                                         unit, fmaxf(0.0f, end - start) * length, &rng));
+            if (v3_is_black(through))
+                return through;
+            if (!borders.count)
+                start = end;
         }
-        ray->t_min = pt_ray_beyond(hit.t);
+        if (!found)
+            return through;
+        if ((fx & PT_FX_MEDIA) && passage == PT_PASSAGE_BORDER)
+            pt_borders_add(&borders, &at, ray->direction, hit.t);
+        pt_ray_pass(ray, &passed, &hit);
     }
 }
 
@@ -208,7 +277,7 @@ PT_KERNEL_INLINE void pt_path_add_light(pt_effects fx, struct pt_path *path, str
 {
     const struct pt_light_plan *plan = &path->plan;
     pt_vec3 add = plan->add;
-    if (fx & (PT_FX_ALPHA | PT_FX_INTERFACE))
+    if (fx & PT_FX_THROUGH)
         add = v3_mul(add, pt_path_transmittance(fx, path, ray, v3_len(ray->direction), plan->medium));
     else if ((fx & PT_FX_MEDIA) && plan->medium >= 0)
         add = v3_mul(add, pt_path_medium_transmittance(path, ray, v3_len(ray->direction), plan->medium));
@@ -288,7 +357,7 @@ PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, f
     struct pt_rng rng = pt_sampler_stream(&path->sampler, PT_DIM_MEDIUM);
     struct pt_medium_event event;
     pt_vec3 start = v3_madd(path->ray.origin, t_start, path->ray.direction);
-    pt_medium_sample_distance(medium, start, path->ray.direction, t_end - t_start, &rng, &event);
+    pt_medium_sample_distance(medium, start, path->ray.direction, fmaxf(0.0f, t_end - t_start), &rng, &event);
     path->radiance = v3_add(path->radiance, v3_mul(path->throughput, event.emitted));
     path->throughput = v3_mul(path->throughput, event.weight);
     if (v3_is_black(path->throughput))
@@ -308,7 +377,7 @@ PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, f
     }
     struct pt_sample2 u = pt_sampler_2d(&path->sampler, PT_DIM_PHASE);
     path->pdf_prev = pt_phase_sample(medium->g, wo, u.x, u.y, &wi);
-    path->ray = (struct pt_ray){p, wi, 0.0f, INFINITY, path->ray.time};
+    pt_path_turn(fx, path, p, wi);
     path->depth++;
     return pt_path_survives(path) ? 1 : -1;
 }
@@ -354,8 +423,7 @@ PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const 
     }
     if (fx & PT_FX_MEDIA)
         path->medium = pt_medium_towards(at, wi, path->medium);
-    path->ray =
-        (struct pt_ray){pt_offset_point(at->p, at->s.n_geometric, at->error, wi), wi, 0.0f, INFINITY, path->ray.time};
+    pt_path_turn(fx, path, pt_offset_point(at->p, at->s.n_geometric, at->error, wi), wi);
     path->depth++;
     return pt_path_survives(path);
 }
@@ -411,6 +479,10 @@ PT_KERNEL_INLINE void pt_path_start(pt_effects fx, struct pt_path *path, float x
     path->pdf_prev = 0.0f;
     path->depth = 0;
     path->rays = 0;
+    path->t_medium = 0.0f;
+    path->looked = 0;
+    if (fx & PT_FX_THROUGH)
+        path->passed->count = 0;
     *path->out = (struct pt_path_result){.depth = INFINITY};
     struct pt_sample2 lens = {0.5f, 0.5f};
     float time = 0.0f;
@@ -431,10 +503,10 @@ PT_KERNEL_INLINE int pt_path_vertex(pt_effects fx, struct pt_path *path)
     const struct pt_scene *scene = path->scene;
     struct pt_place at;
     path->plan.add = path->plan.light.target = v3_splat(0.0f);
-    float t_start = path->ray.t_min; /* the medium is also before what the ray passes through */
-    enum pt_found found = pt_path_found(fx, path);
+    struct pt_rng rng = fx & PT_FX_ALPHA ? pt_sampler_stream(&path->sampler, PT_DIM_ALPHA) : (struct pt_rng){0};
+    enum pt_found found = pt_path_found(fx, path, &rng);
     if ((fx & PT_FX_MEDIA) && path->medium >= 0) {
-        int crossed = pt_path_cross_medium(fx, path, t_start, found != PT_FOUND_NOTHING ? path->hit.t : INFINITY);
+        int crossed = pt_path_cross_medium(fx, path, path->t_medium, found != PT_FOUND_NOTHING ? path->hit.t : INFINITY);
         if (crossed != 0)
             return crossed > 0;
     }
@@ -443,13 +515,9 @@ PT_KERNEL_INLINE int pt_path_vertex(pt_effects fx, struct pt_path *path)
             pt_path_add_environment(path);
         return 0;
     }
-    pt_place_at_hit(fx, scene, &path->ray, &path->hit, &at);
-    if (found == PT_FOUND_BORDER ||
-        ((fx & PT_FX_INTERFACE) && scene->materials[at.shape->material].kind == PT_MATERIAL_INTERFACE)) {
-        path->medium = pt_medium_towards(&at, path->ray.direction, path->medium);
-        path->ray.t_min = pt_ray_beyond(path->hit.t);
+    if ((fx & PT_FX_THROUGH) && found == PT_FOUND_BORDER && pt_path_cross_border(fx, path, &rng) == PT_FOUND_BORDER)
         return 1;
-    }
+    pt_place_at_hit(fx, scene, &path->ray, &path->hit, &at);
     if (at.shape->light >= 0)
         pt_path_add_emission(fx, path, &at);
     return !pt_path_at_max_depth(path) && pt_path_bounce(fx, path, &at);

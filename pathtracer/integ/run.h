@@ -14,17 +14,20 @@
 #include "integ/kernel_sets.h"
 #include "integ/run_lanes.h"
 
-/* Where the paths' rays end. Camera rays keep together, those of later vertices do not. */
+/* Where the paths' rays end that is not known yet. Camera rays keep together, those of later vertices do not. */
 PT_KERNEL_INLINE void pt_run_intersect(pt_effects fx, struct pt_path *const *live, int count, int coherent)
 {
     const struct pt_ray *rays[PT_RUN];
     struct pt_hit *hits[PT_RUN];
+    int n = 0;
     for (int i = 0; i < count; i++) {
-        rays[i] = &live[i]->ray;
-        hits[i] = &live[i]->hit;
+        if ((fx & PT_FX_THROUGH) && live[i]->looked)
+            continue;
+        rays[n] = &live[i]->ray;
+        hits[n++] = &live[i]->hit;
     }
-    pt_accel_intersect_many(live[0]->scene, rays, count, coherent, hits);
-    pt_fetch_hits(fx, live[0]->scene, hits, count);
+    pt_accel_intersect_many(live[0]->scene, rays, n, coherent, hits);
+    pt_fetch_hits(fx, live[0]->scene, hits, n);
 }
 
 /* Adds to each path what its last vertex planned, if it arrives. */
@@ -34,7 +37,7 @@ PT_KERNEL_INLINE void pt_run_lights(pt_effects fx, struct pt_path *const *live, 
     const struct pt_ray *rays[PT_RUN];
     struct pt_path *asked[PT_RUN];
     uint8_t occluded[PT_RUN] = {0};
-    const int through = (fx & (PT_FX_ALPHA | PT_FX_INTERFACE)) != 0; /* a hit says little: rays go one by one */
+    const int through = (fx & PT_FX_THROUGH) != 0; /* a hit says little: rays go one by one */
     int n = 0;
     for (int i = 0; i < count; i++)
         if (!v3_is_black(live[i]->plan.add)) {
@@ -100,6 +103,7 @@ PT_KERNEL_INLINE void pt_run_sample(pt_effects fx, const struct pt_scene *scene,
                                     struct pt_path_result *out)
 {
     struct pt_path paths[PT_RUN], *live[PT_RUN]; /* no initialiser: it would clear them all for each run */
+    struct pt_passed passed[PT_RUN];
     struct pt_lane_keys keys;
     _Alignas(64) float u[PT_DIMS_PER_VERTEX][PT_RUN];
     for (int i = 0; i < count; i++) {
@@ -107,6 +111,7 @@ PT_KERNEL_INLINE void pt_run_sample(pt_effects fx, const struct pt_scene *scene,
         paths[i].scene = scene;
         paths[i].settings = settings;
         paths[i].trace = trace;
+        paths[i].passed = &passed[i];
         paths[i].out = &out[i];
     }
     pt_run_start(fx, scene, settings, x, y, sample, paths, count, &keys, u);

@@ -320,6 +320,55 @@ static void media_behind_masks(void **state)
     }
 }
 
+/* --- surfaces at one place, or nearly -------------------------------------------------------------------------------------- */
+
+#define WIDE(z) QUAD "[ -90 -90 " z " 90 -90 " z " 90 90 " z " -90 90 " z " ] "
+#define THICK_FOG \
+    " MakeNamedMedium \"thick\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [ 50 50 50 ] \"rgb sigma_s\" [ 0 0 0 ] "
+#define ENTRY(medium, z) "AttributeBegin Material \"interface\" MediumInterface \"" medium "\" \"\" " WIDE(z) "AttributeEnd "
+#define EXIT(medium, z) "AttributeBegin Material \"interface\" MediumInterface \"\" \"" medium "\" " WIDE(z) "AttributeEnd "
+#define LAMP(z, more) "AttributeBegin " BLACK GLOW WIDE(z) more "AttributeEnd "
+static double fog_of_5(int x, int y) { return (void)x, (void)y, exp(-0.5); }
+static double fog_of_5_tilted(int x, int y) { return (void)x, (void)y, exp(-0.5 / cos(0.6)); }
+static double fog_of_5_twice(int x, int y) { return (void)x, (void)y, exp(-1.0); }
+static double quarter(int x, int y) { return (void)x, (void)y, 0.25; }
+static double two(int x, int y) { return (void)x, (void)y, 2.0; }
+
+/* Fog ends where a lamp or a floor is, or where other fog begins; masked cards lie on another, and so do unmasked ones. In the file
+ * either comes first, and what is thin is far away. */
+static void surfaces_at_one_place(void **state)
+{
+    (void)state;
+    static const char *const tilt = "Rotate 34.37746771 1 2 0 "; /* 0.6 */
+    const struct {
+        const char *world[7];
+        expected_at *expected;
+    } cases[] = {
+        {{ENTRY("fog", "3"), EXIT("fog", "8"), LAMP("8", "")}, fog_of_5},
+        {{LAMP("8", ""), ENTRY("fog", "3"), EXIT("fog", "8")}, fog_of_5},
+        {{tilt, ENTRY("fog", "3"), EXIT("fog", "8"), LAMP("8", "")}, fog_of_5_tilted},
+        {{tilt, LAMP("8", ""), ENTRY("fog", "3"), EXIT("fog", "8")}, fog_of_5_tilted},
+        {{ENTRY("fog", "3"), EXIT("fog", "8"), SUN, WHITE, WIDE("8")}, fog_of_5_twice},
+        {{SUN, WHITE, WIDE("8"), ENTRY("fog", "3"), EXIT("fog", "8")}, fog_of_5_twice},
+        {{ENTRY("fog", "3"), EXIT("fog", "5"), ENTRY("fog", "5"), EXIT("fog", "8"), LAMP("9", "")}, fog_of_5},
+        {{EXIT("fog", "8"), ENTRY("fog", "5"), EXIT("fog", "5"), ENTRY("fog", "3"), LAMP("9", "")}, fog_of_5},
+        {{ENTRY("fog", "-8"), EXIT("fog", "-5"), ENTRY("fog", "-5"), EXIT("fog", "-3"), SUN, FLOOR}, fog_of_5},
+        {{ENTRY("fog", "-5"), EXIT("fog", "-5"), EXIT("fog", "-3"), ENTRY("fog", "-8"), SUN, FLOOR}, fog_of_5},
+        {{ENTRY("thick", "1000"), EXIT("thick", "1000.01"), LAMP("1001", "")}, fog_of_5},
+        {{BLACK, WIDE("1000") "\"float alpha\" .5 ", WIDE("1000.0005") "\"float alpha\" .5 ", LAMP("1001", "")}, quarter},
+        {{LAMP("7", ""), "AttributeBegin " BLACK "AreaLightSource \"diffuse\" \"rgb L\" [ 3 3 3 ] ",
+          WIDE("6.999998") "\"float alpha\" .5 AttributeEnd "},
+         two},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[5000];
+        int n = snprintf(text, sizeof text, HEAD(BOX, FOG THICK_FOG));
+        for (int k = 0; k < 7 && cases[i].world[k]; k++)
+            n += snprintf(text + n, sizeof text - (size_t)n, "%s", cases[i].world[k]);
+        check_image(text, cases[i].expected, 2.0 * CHANCE_ERROR);
+    }
+}
+
 /* --- normals of sheared instances ---------------------------------------------------------------------------------------- */
 
 /* z' = z + x / 2 tilts the plane: its normal is (-1/2, 0, 1) whatever the matrix does to other vectors, so cos² = 4/5. The same with
@@ -428,6 +477,7 @@ int main(void)
         cmocka_unit_test(moving_shadow),
         cmocka_unit_test(masked_lamps),
         cmocka_unit_test(media_behind_masks),
+        cmocka_unit_test(surfaces_at_one_place),
         cmocka_unit_test(sheared_instances),
         cmocka_unit_test(shadows_of_what_is_close_to_the_light),
         cmocka_unit_test(stretched_sky),

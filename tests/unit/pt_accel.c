@@ -51,13 +51,37 @@ static void triangles_have_right_hand_normals(void **state)
     pt_place_at_hit(PT_FX_ALL, &scene, &ray, &hit, &at);
     assert_vec_near(at.p, v3(0.25f, -0.5f, 2.0f), 1e-6f);
     assert_vec_near(at.s.n_geometric, v3(0, 0, 1), 1e-6f);
-    /* going on from the distance of a hit must not meet the same surface */
-    ray.t_min = pt_ray_beyond(hit.t);
-    assert_int_equal(pt_accel_intersect(&scene, &ray, &hit), 0);
-    ray.t_min = 0.0f;
     assert_int_equal(pt_accel_occluded(&scene, &ray), 1);
     ray.t_max = 1.9f;
     assert_int_equal(pt_accel_occluded(&scene, &ray), 0);
+    test_scene_end(&scene);
+}
+
+/* A ray through a sphere in front of three cards at one place, in any order of these: it meets each of the two walls and of the
+ * cards once. */
+static void what_was_passed_is_met_no_more(void **state)
+{
+    (void)state;
+    struct pt_scene scene;
+    struct pt_hit hit;
+    struct pt_passed passed = {0};
+    test_scene_begin(&scene);
+    int32_t none = test_add_material(&scene, PT_MATERIAL_INTERFACE);
+    test_add_sphere(&scene, none, v3(0, 0, 2), 1e-4f);
+    for (int i = 0; i < 3; i++)
+        test_add_quad(&scene, none, v3(-1, -1, 3), v3(2, 0, 0), v3(0, 2, 0));
+    test_scene_finish(&scene);
+    struct pt_ray ray = ray_to(v3(0, 0, 0), v3(1e-6f, 2e-6f, 1));
+    assert_int_equal(pt_accel_intersect(&scene, &ray, &hit), 1);
+    int met[4] = {0};
+    for (int i = 0; i < 5; i++) {
+        assert_int_equal(hit.shape < 1, i < 2);
+        met[hit.shape]++;
+        pt_ray_pass(&ray, &passed, &hit);
+        assert_int_equal(pt_accel_intersect_behind(&scene, &ray, &passed, &hit), i < 4);
+    }
+    for (int i = 0; i < 4; i++)
+        assert_int_equal(met[i], i == 0 ? 2 : 1);
     test_scene_end(&scene);
 }
 
@@ -95,25 +119,25 @@ static void quadrics(void **state)
     struct pt_quadric q = {PT_QUADRIC_SPHERE, 1.0f, 0.0f, -1.0f, 1.0f, 2.0f * PT_PI, id, id};
     float t, u, v;
     pt_vec3 p, du, dv;
-    assert_int_equal(pt_quadric_intersect(&q, v3(-3, 0, 0), v3(1, 0, 0), 0.0f, INFINITY, &t, &p), 1);
+    assert_int_equal(pt_quadric_intersect(&q, v3(-3, 0, 0), v3(1, 0, 0), 0.0f, INFINITY, 0, &t, &p), 1);
     assert_near(t, 2.0f, 1e-6f);
-    assert_int_equal(pt_quadric_intersect(&q, v3(-3, 0, 0), v3(1, 0, 0), 2.0f, INFINITY, &t, &p), 1);
+    assert_int_equal(pt_quadric_intersect(&q, v3(-3, 0, 0), v3(1, 0, 0), 2.0f, INFINITY, 0, &t, &p), 2);
     assert_near(t, 4.0f, 1e-6f);
     pt_quadric_uv(&q, v3(0, 1, 0), &u, &v, &du, &dv);
     assert_near(u, 0.25f, 1e-6f);
     assert_near(v, 0.5f, 1e-6f);
     assert_vec_near(du, v3(-2.0f * PT_PI, 0, 0), 1e-5f);
     q.z_max = 0.5f;
-    assert_int_equal(pt_quadric_intersect(&q, v3(0, 0, 5), v3(0, 0, -1), 0.0f, INFINITY, &t, &p), 1);
+    assert_int_equal(pt_quadric_intersect(&q, v3(0, 0, 5), v3(0, 0, -1), 0.0f, INFINITY, 0, &t, &p), 2);
     assert_near(t, 6.0f, 1e-6f);
     q = (struct pt_quadric){PT_QUADRIC_CYLINDER, 1.0f, 0.0f, -1.0f, 1.0f, PT_PI, id, id};
-    assert_int_equal(pt_quadric_intersect(&q, v3(0, -5, 0), v3(0, 1, 0), 0.0f, INFINITY, &t, &p), 1);
+    assert_int_equal(pt_quadric_intersect(&q, v3(0, -5, 0), v3(0, 1, 0), 0.0f, INFINITY, 0, &t, &p), 2);
     assert_near(t, 6.0f, 1e-6f); /* y < 0 is cut away */
-    assert_int_equal(pt_quadric_intersect(&q, v3(0, -5, 2), v3(0, 1, 0), 0.0f, INFINITY, &t, &p), 0);
+    assert_int_equal(pt_quadric_intersect(&q, v3(0, -5, 2), v3(0, 1, 0), 0.0f, INFINITY, 0, &t, &p), 0);
     q = (struct pt_quadric){PT_QUADRIC_DISK, 1.0f, 0.5f, 2.0f, 2.0f, 2.0f * PT_PI, id, id};
-    assert_int_equal(pt_quadric_intersect(&q, v3(0.75f, 0, 0), v3(0, 0, 1), 0.0f, INFINITY, &t, &p), 1);
+    assert_int_equal(pt_quadric_intersect(&q, v3(0.75f, 0, 0), v3(0, 0, 1), 0.0f, INFINITY, 0, &t, &p), 1);
     assert_near(t, 2.0f, 1e-6f);
-    assert_int_equal(pt_quadric_intersect(&q, v3(0.25f, 0, 0), v3(0, 0, 1), 0.0f, INFINITY, &t, &p), 0);
+    assert_int_equal(pt_quadric_intersect(&q, v3(0.25f, 0, 0), v3(0, 0, 1), 0.0f, INFINITY, 0, &t, &p), 0);
 }
 
 /* A point of the surface by pbrt's parameters, in double and the quadric's own space. */
@@ -394,6 +418,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(triangles_have_right_hand_normals),
+        cmocka_unit_test(what_was_passed_is_met_no_more),
         cmocka_unit_test(empty_scene_has_no_hits),
         cmocka_unit_test(bounds_of_a_sheet),
         cmocka_unit_test(quadrics),

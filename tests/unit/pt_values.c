@@ -368,7 +368,7 @@ static void print_quadrics(void)
             float t;
             pt_vec3 own;
             if (!pt_quadric_intersect(&q, from[i / COUNT(ends) % COUNT(from)], ways[i / COUNT(ends) / COUNT(from)], end[0],
-                                      end[1], &t, &own))
+                                      end[1], 0, &t, &own))
                 continue;
             words(" ray %d:", (int)i);
             number(t);
