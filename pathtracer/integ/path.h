@@ -25,8 +25,9 @@
 
 #define PT_KERNEL_INLINE static inline __attribute__((always_inline))
 
-/* Shadow rays end this share before their target, which is already off its surface. */
-#define PT_SHADOW_END 0.9999f
+/* Shadow rays end this share before their target, which is already off its surface: 32 roundings of the distance, for what
+ * lies in the plane of a lamp. */
+#define PT_SHADOW_END 0.999998f
 
 /* Rays may go on behind what they meet. */
 #define PT_FX_THROUGH (PT_FX_ALPHA | PT_FX_INTERFACE)

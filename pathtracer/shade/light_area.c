@@ -124,6 +124,8 @@ static int finish(const struct pt_light *light, const struct pt_shape *shape, pt
     out->radiance = light->emission;
     out->delta = 0;
     out->finite = 1;
+    /* as of triangles (light_area.h) */
+    error = v3_add(error, v3_scale(v3(fabsf(d.x), fabsf(d.y), fabsf(d.z)), PT_OFFSET_ERROR));
     out->target = pt_offset_point(p, n, error, v3_neg(d));
     return out->inv_pdf_solid > 0.0f && out->inv_pdf_solid < INFINITY;
 }

@@ -395,16 +395,16 @@ static void sheared_instances(void **state)
 
 static double dark(int x, int y) { return (void)x, (void)y, 0.0; }
 
-/* A shutter a fifth of a thousandth of the way before the light keeps all of it back: from a point 100 above the floor and from a
- * lamp there, and a sun's however far away it is. */
+/* A shutter five millionths of the way before the light keeps all of it back: from a point 100 above the floor and from a lamp there,
+ * and a sun's however far away it is. */
 static void shadows_of_what_is_close_to_the_light(void **state)
 {
     (void)state;
 #define SHUTTER(z) BLACK QUAD "[ -50 -50 " z "  50 -50 " z "  50 50 " z "  -50 50 " z " ]\n"
     check_image(HEAD(BOX, "")
-                    FLOOR SHUTTER("-94.98") "LightSource \"point\" \"rgb I\" [ 1e4 1e4 1e4 ] \"point3 from\" [ 0 0 -95 ]",
+                    FLOOR SHUTTER("-94.9995") "LightSource \"point\" \"rgb I\" [ 1e4 1e4 1e4 ] \"point3 from\" [ 0 0 -95 ]",
                 dark, 0.0);
-    check_image(HEAD(BOX, "") FLOOR SHUTTER("-94.98") BLACK
+    check_image(HEAD(BOX, "") FLOOR SHUTTER("-94.9995") BLACK
                 "AreaLightSource \"diffuse\" \"rgb L\" [ 1e4 1e4 1e4 ] \"bool twosided\" true " QUAD
                 "[ -1 -1 -95  1 -1 -95  1 1 -95  -1 1 -95 ]",
                 dark, 0.0);
