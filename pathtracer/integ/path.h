@@ -358,7 +358,8 @@ PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, f
     struct pt_rng rng = pt_sampler_stream(&path->sampler, PT_DIM_MEDIUM);
     struct pt_medium_event event;
     pt_vec3 start = v3_madd(path->ray.origin, t_start, path->ray.direction);
-    pt_medium_sample_distance(medium, start, path->ray.direction, fmaxf(0.0f, t_end - t_start), &rng, &event);
+    pt_medium_sample_distance(medium, start, path->ray.direction, fmaxf(0.0f, t_end - t_start), path->throughput, &rng,
+                              &event);
     path->radiance = v3_add(path->radiance, v3_mul(path->throughput, event.emitted));
     path->throughput = v3_mul(path->throughput, event.weight);
     if (v3_is_black(path->throughput))

@@ -23,9 +23,11 @@ int pt_media_build(struct pt_scene *scene, struct base_err *err)
     return 0;
 }
 
-/* One channel is chosen uniformly and gives the distance; the weight is the balance heuristic over the three (one-sample
- * MIS), so grey media have constant weights. */
-static void homogeneous_sample(const struct pt_medium *m, float t_max, struct pt_rng *rng, struct pt_medium_event *event)
+/* One channel is chosen by its share of the path's throughput β and gives the distance; the weight is the balance heuristic
+ * over the three (one-sample MIS). Then Σ β is the same behind the collision, β_c σ_c T_c / (Σ β_k σ_k T_k / Σ β), but for
+ * what is absorbed. Shares that did not follow β would make of it a product of numbers up to 3. */
+static void homogeneous_sample(const struct pt_medium *m, float t_max, pt_vec3 throughput, struct pt_rng *rng,
+                               struct pt_medium_event *event)
 {
     pt_vec3 sigma_t = v3_add(m->sigma_a, m->sigma_s);
     event->emitted = v3_splat(0.0f);
@@ -38,30 +40,31 @@ static void homogeneous_sample(const struct pt_medium *m, float t_max, struct pt
         event->weight = beer_rgb(sigma_t, t_max);
         return;
     }
-    float u = 3.0f * pt_rng_float(rng);
-    float sigma = u < 1.0f ? sigma_t.x : u < 2.0f ? sigma_t.y : sigma_t.z;
+    const pt_vec3 share = v3_scale(throughput, 1.0f / (throughput.x + throughput.y + throughput.z));
+    float u = pt_rng_float(rng);
+    float sigma = u < share.x ? sigma_t.x : u < share.x + share.y ? sigma_t.y : sigma_t.z;
     float t = sigma > 0.0f ? -log1pf(-pt_rng_float(rng)) / sigma : INFINITY;
     if (t < t_max) {
         pt_vec3 tr = beer_rgb(sigma_t, t);
-        float pdf = v3_mean(v3_mul(sigma_t, tr));
+        float pdf = v3_dot(share, v3_mul(sigma_t, tr));
         event->scattered = 1;
         event->t = t;
         event->weight = pdf > 0.0f ? v3_scale(v3_mul(m->sigma_s, tr), 1.0f / pdf) : v3_splat(0.0f);
     } else {
         pt_vec3 tr = beer_rgb(sigma_t, t_max);
-        float p = v3_mean(tr);
+        float p = v3_dot(share, tr);
         event->weight = p > 0.0f ? v3_scale(tr, 1.0f / p) : v3_splat(0.0f);
     }
 }
 
 void pt_medium_sample_distance(const struct pt_medium *medium, pt_vec3 origin, pt_vec3 direction, float t_max,
-                               struct pt_rng *rng, struct pt_medium_event *event)
+                               pt_vec3 throughput, struct pt_rng *rng, struct pt_medium_event *event)
 {
     pt_medium_queries++;
     if (medium->kind == PT_MEDIUM_GRID)
-        pt_medium_grid_sample(medium, origin, direction, t_max, rng, event);
+        pt_medium_grid_sample(medium, origin, direction, t_max, throughput, rng, event);
     else
-        homogeneous_sample(medium, t_max, rng, event);
+        homogeneous_sample(medium, t_max, throughput, rng, event);
 }
 
 pt_vec3 pt_medium_transmittance(const struct pt_medium *medium, pt_vec3 origin, pt_vec3 direction, float t_max,

@@ -25,9 +25,9 @@ struct pt_medium_event {
 int pt_media_build(struct pt_scene *scene, struct base_err *err);
 
 /* Samples the distance to the next scattering within [0, t_max]; t_max may be INFINITY. Media that only absorb use no random
- * number and never scatter. */
+ * number and never scatter. `throughput` of the path so far, not black: colours are followed as far as they count in it. */
 void pt_medium_sample_distance(const struct pt_medium *medium, pt_vec3 origin, pt_vec3 direction, float t_max,
-                               struct pt_rng *rng, struct pt_medium_event *event);
+                               pt_vec3 throughput, struct pt_rng *rng, struct pt_medium_event *event);
 
 /* Transmittance over [0, t_max]: exact for homogeneous media, an unbiased estimate in [0, 1] for grids. */
 pt_vec3 pt_medium_transmittance(const struct pt_medium *medium, pt_vec3 origin, pt_vec3 direction, float t_max,
@@ -38,7 +38,7 @@ float pt_medium_density(const struct pt_medium *medium, pt_vec3 p_grid);
 
 /* Grid media, in medium_grid.c; the functions above forward to these. */
 void pt_medium_grid_sample(const struct pt_medium *medium, pt_vec3 origin, pt_vec3 direction, float t_max,
-                           struct pt_rng *rng, struct pt_medium_event *event);
+                           pt_vec3 throughput, struct pt_rng *rng, struct pt_medium_event *event);
 pt_vec3 pt_medium_grid_transmittance(const struct pt_medium *medium, pt_vec3 origin, pt_vec3 direction, float t_max,
                                      struct pt_rng *rng);
 int pt_medium_grid_build(struct pt_medium *medium, struct pt_arena *arena, struct base_err *err);

@@ -161,8 +161,8 @@ static int survive(pt_vec3 *weight, struct pt_rng *rng)
     return 1;
 }
 
-void pt_medium_grid_sample(const struct pt_medium *m, pt_vec3 origin, pt_vec3 direction, float t_max, struct pt_rng *rng,
-                           struct pt_medium_event *event)
+void pt_medium_grid_sample(const struct pt_medium *m, pt_vec3 origin, pt_vec3 direction, float t_max, pt_vec3 throughput,
+                           struct pt_rng *rng, struct pt_medium_event *event)
 {
     struct walk w;
     pt_vec3 weight = v3_splat(1.0f), emitted = v3_splat(0.0f), sigma_t = v3_add(m->sigma_a, m->sigma_s);
@@ -174,7 +174,8 @@ void pt_medium_grid_sample(const struct pt_medium *m, pt_vec3 origin, pt_vec3 di
             emitted = v3_madd(emitted, share, v3_mul(weight, m->emission));
             pt_vec3 scatter = v3_scale(m->sigma_s, share), null = v3_sub(v3_splat(1.0f), v3_scale(sigma_t, share));
             null = v3_most(null, v3_splat(0.0f));
-            float ps = v3_mean(v3_mul(weight, scatter)), pn = v3_mean(v3_mul(weight, null));
+            pt_vec3 carried = v3_mul(throughput, weight);
+            float ps = v3_dot(carried, scatter), pn = v3_dot(carried, null);
             if (!(ps + pn > 0.0f)) {
                 weight = v3_splat(0.0f);
                 break;

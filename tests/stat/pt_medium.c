@@ -24,7 +24,7 @@ static void absorption_is_beer_lambert(void **state)
     struct pt_medium m = homogeneous(v3(0.5f, 0.0f, 2.0f), v3_splat(0.0f));
     struct pt_rng rng = pt_rng_make(SEED), untouched = rng;
     struct pt_medium_event e;
-    pt_medium_sample_distance(&m, v3_splat(0.0f), v3(0, 0, 1), 1.5f, &rng, &e);
+    pt_medium_sample_distance(&m, v3_splat(0.0f), v3(0, 0, 1), 1.5f, v3_splat(1.0f), &rng, &e);
     assert_int_equal(e.scattered, 0);
     assert_true(rng.state == untouched.state);
     pt_vec3 tr = pt_medium_transmittance(&m, v3_splat(0.0f), v3(0, 0, 1), 1.5f, &rng);
@@ -35,6 +35,9 @@ static void absorption_is_beer_lambert(void **state)
     tr = pt_medium_transmittance(&m, v3_splat(0.0f), v3(0, 0, 1), INFINITY, &rng);
     assert_true(tr.x == 0.0f && tr.y == 1.0f && tr.z == 0.0f);
 }
+
+/* What the path carries so far: it decides which colour is followed, and the means are the same. */
+static pt_vec3 throughput = {1, 1, 1};
 
 /* Sums of weights over scattering and passing. */
 struct tally {
@@ -47,7 +50,7 @@ static void run(const struct pt_medium *m, pt_vec3 origin, pt_vec3 direction, fl
     *out = (struct tally){0};
     for (int i = 0; i < samples; i++) {
         struct pt_medium_event e;
-        pt_medium_sample_distance(m, origin, direction, t_max, &rng, &e);
+        pt_medium_sample_distance(m, origin, direction, t_max, throughput, &rng, &e);
         double *to = e.scattered ? out->scattered : out->through;
         to[0] += (double)e.weight.x / samples;
         to[1] += (double)e.weight.y / samples;
@@ -82,13 +85,15 @@ static void homogeneous_sampling_is_unbiased(void **state)
     (void)state;
     const pt_vec3 absorb[] = {{0, 0, 0}, {0.1f, 0.5f, 2.0f}, {0, 1, 0}},
                   scatter[] = {{1, 1, 1}, {0.7f, 0.7f, 0.1f}, {3, 0, 0.2f}};
-    for (int i = 0; i < 3; i++) {
-        struct pt_medium m = homogeneous(absorb[i], scatter[i]);
+    for (int i = 0; i < 6; i++) {
+        struct pt_medium m = homogeneous(absorb[i / 2], scatter[i / 2]);
         m.emission = v3(0.3f, 0.0f, 1.0f);
         struct tally t;
+        throughput = i % 2 ? v3(20.0f, 30.0f, 10.0f) : v3_splat(1.0f);
         run(&m, v3_splat(0.0f), v3(1, 0, 0), 0.8f, SAMPLES, &t);
-        check_closed_form(&t, absorb[i], scatter[i], m.emission, 0.8);
+        check_closed_form(&t, absorb[i / 2], scatter[i / 2], m.emission, 0.8);
     }
+    throughput = v3_splat(1.0f);
 }
 
 static struct pt_medium grid(struct pt_arena *arena, const float *density, int nx, int ny, int nz, pt_vec3 a, pt_vec3 s)
@@ -190,6 +195,32 @@ static void majorant_bounds_the_density(void **state)
     pt_arena_release(&arena);
 }
 
+/* Where nothing is absorbed, a path that scatters or passes carries as much as before, all colours together, however often: none of
+ * its samples is worth more than three times the mean. */
+static void nothing_is_lost_or_won(void **state)
+{
+    (void)state;
+    float density[1] = {1.0f};
+    struct pt_arena arena = {0};
+    const pt_vec3 scatter = {0.2f, 1.0f, 5.0f};
+    struct pt_medium media[2] = {homogeneous(v3_splat(0.0f), scatter),
+                                 grid(&arena, density, 1, 1, 1, v3_splat(0.0f), scatter)};
+    for (int k = 0; k < 2; k++) {
+        struct pt_rng rng = pt_rng_make(SEED);
+        for (int i = 0; i < 100; i++) {
+            pt_vec3 carried = v3_splat(1.0f);
+            for (int step = 0; step < 50; step++) {
+                struct pt_medium_event e;
+                pt_medium_sample_distance(&media[k], v3_splat(0.5f), v3(1, 0, 0), 0.4f, carried, &rng, &e);
+                carried = v3_mul(carried, e.weight);
+                if (!(fabs((double)v3_mean(carried) - 1.0) < 1e-4))
+                    fail_msg("medium %d carries %g %g %g", k, (double)carried.x, (double)carried.y, (double)carried.z);
+            }
+        }
+    }
+    pt_arena_release(&arena);
+}
+
 static void rays_that_miss_the_grid_pass(void **state)
 {
     (void)state;
@@ -202,7 +233,7 @@ static void rays_that_miss_the_grid_pass(void **state)
     const float lengths[] = {INFINITY, INFINITY, 0.9f};
     for (int i = 0; i < 3; i++) {
         struct pt_medium_event e;
-        pt_medium_sample_distance(&m, origins[i], directions[i], lengths[i], &rng, &e);
+        pt_medium_sample_distance(&m, origins[i], directions[i], lengths[i], v3_splat(1.0f), &rng, &e);
         assert_true(!e.scattered && e.weight.x == 1.0f);
         assert_true(pt_medium_transmittance(&m, origins[i], directions[i], lengths[i], &rng).x == 1.0f);
     }
@@ -218,6 +249,7 @@ int main(void)
         cmocka_unit_test(absorption_is_beer_lambert),       cmocka_unit_test(homogeneous_sampling_is_unbiased),
         cmocka_unit_test(constant_grid_equals_homogeneous), cmocka_unit_test(tracking_through_a_varying_grid_is_unbiased),
         cmocka_unit_test(majorant_bounds_the_density),      cmocka_unit_test(rays_that_miss_the_grid_pass),
+        cmocka_unit_test(nothing_is_lost_or_won),
     };
     print_message("seed %d\n", SEED);
     return cmocka_run_group_tests(tests, NULL, NULL);

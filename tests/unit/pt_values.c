@@ -235,7 +235,7 @@ static void print_crossing(const struct pt_medium *m, pt_vec3 origin, pt_vec3 di
 {
     struct pt_rng rng = pt_rng_make(key), other = pt_rng_make(key + 100);
     struct pt_medium_event e;
-    pt_medium_sample_distance(m, origin, direction, t_max, &rng, &e);
+    pt_medium_sample_distance(m, origin, direction, t_max, v3_splat(1.0f), &rng, &e);
     words(" %d", e.scattered);
     number(isfinite(e.t) ? e.t : -1.0f);
     vector(e.weight);
