@@ -496,7 +496,8 @@ static inline __attribute__((always_inline)) void put_lanes(struct packet *p, co
         put_field(rays->direction[axis] + first, &p->lanes[(DIR_X + axis) * n], count, n);
     }
     for (int i = 0; i < n; i++) {
-        p->lanes[TNEAR * n + i].f = p->lanes[TIME * n + i].f = 0.0f;
+        p->lanes[TNEAR * n + i].f = rays->t_min;
+        p->lanes[TIME * n + i].f = 0.0f;
         p->lanes[TFAR * n + i].f = rays->t_max;
         p->lanes[MASK * n + i].u = ~0u;
         p->lanes[RAY_ID * n + i].u = p->lanes[FLAGS * n + i].u = 0;
@@ -518,7 +519,8 @@ static inline int packet_fill_lanes(struct packet *p, const struct pt_ray_lanes 
 static inline struct pt_ray lane_ray(const struct pt_ray_lanes *rays, int i)
 {
     return (struct pt_ray){v3(rays->origin[0][i], rays->origin[1][i], rays->origin[2][i]),
-                           v3(rays->direction[0][i], rays->direction[1][i], rays->direction[2][i]), 0.0f, rays->t_max, 0.0f};
+                           v3(rays->direction[0][i], rays->direction[1][i], rays->direction[2][i]), rays->t_min, rays->t_max,
+                           0.0f};
 }
 
 static void packet_intersect(const struct pt_scene *scene, struct packet *p, int n, int coherent)

@@ -17,6 +17,10 @@ void pt_accel_release(struct pt_scene *scene);
 /* Bytes that the structure holds. */
 long long pt_accel_bytes(const struct pt_scene *scene);
 
+/* t_min of a ray that does not meet the triangles which it begins in. Rays from 0 do: no path leaves a room through the
+ * corner that it begins in. Small for every scene, and large enough to be multiplied with the area of a triangle. */
+#define PT_RAY_OFF_START 1e-20f
+
 struct pt_ray {
     pt_vec3 origin, direction;
     float t_min, t_max;
@@ -58,10 +62,10 @@ void pt_accel_intersect_many(const struct pt_scene *scene, const struct pt_ray *
 /* occluded[i]: pt_accel_occluded of rays[i]. */
 void pt_accel_occluded_many(const struct pt_scene *scene, const struct pt_ray *const *rays, int count, uint8_t *occluded);
 
-/* Rays side by side, from 0 to t_max at time 0; arrays of equal length, a multiple of 16. */
+/* Rays side by side, from t_min to t_max at time 0; arrays of equal length, a multiple of 16. */
 struct pt_ray_lanes {
     const float *origin[3], *direction[3]; /* borrow */
-    float t_max;
+    float t_min, t_max;
 };
 /* As pt_accel_intersect_many and pt_accel_occluded_many with the first `count` of them. */
 void pt_accel_intersect_lanes(const struct pt_scene *scene, const struct pt_ray_lanes *rays, int count, int coherent,

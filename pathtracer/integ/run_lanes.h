@@ -22,9 +22,10 @@ struct pt_lane_run {
 };
 
 static inline struct pt_ray_lanes pt_lane_rays(const struct pt_lane_vec3 *origin, const struct pt_lane_vec3 *direction,
-                                               float t_max)
+                                               float t_min, float t_max)
 {
-    return (struct pt_ray_lanes){{origin->x, origin->y, origin->z}, {direction->x, direction->y, direction->z}, t_max};
+    return (struct pt_ray_lanes){
+        {origin->x, origin->y, origin->z}, {direction->x, direction->y, direction->z}, t_min, t_max};
 }
 
 PT_KERNEL_INLINE void pt_lane_start(pt_effects fx, struct pt_lane_run *run, uint32_t x, uint32_t y, uint32_t sample,
@@ -162,7 +163,7 @@ static inline void pt_lane_lights(struct pt_lane_run *run, int count)
         pt_lane_put(&paths->shadow_direction, n, pt_lane_get(&paths->shadow_direction, i));
         n++;
     }
-    struct pt_ray_lanes rays = pt_lane_rays(&paths->shadow_origin, &paths->shadow_direction, PT_SHADOW_END);
+    struct pt_ray_lanes rays = pt_lane_rays(&paths->shadow_origin, &paths->shadow_direction, 0.0f, PT_SHADOW_END);
     pt_accel_occluded_lanes(run->scene, &rays, n, occluded);
     for (int i = 0; i < n; i++) {
         struct pt_path_result *out = &run->out[asked[i]];
@@ -204,7 +205,8 @@ PT_KERNEL_INLINE void pt_run_sample_lanes(pt_effects fx, const struct pt_scene *
     pt_lane_start(fx, &run, x, y, sample, count);
     int n = count;
     for (int vertex = 1; n > 0; vertex++) {
-        struct pt_ray_lanes rays = pt_lane_rays(&run.paths.origin, &run.paths.direction, INFINITY);
+        const float t_min = vertex == 1 ? PT_RAY_OFF_START : 0.0f; /* of the camera's rays */
+        struct pt_ray_lanes rays = pt_lane_rays(&run.paths.origin, &run.paths.direction, t_min, INFINITY);
         pt_accel_intersect_lanes(scene, &rays, n, vertex == 1, run.hits);
         pt_fetch_hits(fx, scene, hits, n);
         n = pt_lane_places(fx, &run, n, settings->max_depth >= 0 && vertex > settings->max_depth);

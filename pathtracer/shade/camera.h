@@ -47,7 +47,7 @@ static inline void pt_camera_ray(pt_effects fx, const struct pt_camera *camera, 
     }
     ray->origin = pt_mat34_point(to_render, o);
     ray->direction = v3_norm(pt_mat34_vector(to_render, d));
-    ray->t_min = 0.0f;
+    ray->t_min = PT_RAY_OFF_START;
     ray->t_max = INFINITY;
     ray->time = time;
 }

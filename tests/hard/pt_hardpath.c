@@ -327,6 +327,30 @@ static void bad_emission(void **state)
     test_scene_end(&scene);
 }
 
+/* A camera in the plane of the floor, and within it, sees the sky; a lamp all around instead, which another kernel draws. */
+static void camera_in_a_plane(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < 2; kind++) {
+        struct pt_scene scene;
+        test_scene_begin(&scene);
+        test_camera(&scene, v3(1, 0, 2), v3(2, 0, 3), v3(0, 1, 0), 60.0f, 8);
+        int32_t black = test_add_diffuse(&scene, v3_splat(0.0f));
+        test_add_quad(&scene, black, v3(-1000, 0, -1000), v3(0, 0, 2000), v3(2000, 0, 0));
+        struct pt_light sky = {.kind = PT_LIGHT_ENV_CONSTANT, .shape = -1, .image = -1, .emission = {1, 1, 1}};
+        if (kind)
+            test_add_light(&scene, &sky);
+        else
+            test_add_area_light(&scene, test_add_box(&scene, black, v3(-2000, -2000, -2000), v3(2000, 2000, 2000), 1),
+                                v3_splat(1.0f), 0);
+        test_scene_finish(&scene);
+        struct pt_integrator settings = test_integrator(1);
+        pt_vec3 l = mean_of(&scene, &settings, 4, NULL);
+        assert_ratio((double)l.y, 1.0, 1e-6, kind ? "sky from within the floor" : "lamp from within the floor");
+        test_scene_end(&scene);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -335,7 +359,7 @@ int main(void)
         cmocka_unit_test(scale_and_shift),   cmocka_unit_test(duplicated_and_degenerate),
         cmocka_unit_test(coplanar_light),    cmocka_unit_test(grazing),
         cmocka_unit_test(matched_and_total), cmocka_unit_test(bad_emission),
-        cmocka_unit_test(endless_mirrors),
+        cmocka_unit_test(endless_mirrors),   cmocka_unit_test(camera_in_a_plane),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -85,6 +85,54 @@ static void what_was_passed_is_met_no_more(void **state)
     test_scene_end(&scene);
 }
 
+/* What a ray begins in is not met where that is wanted, by one ray, by many and by those in lanes; what is right behind it is. */
+static void start_is_not_met(void **state)
+{
+    (void)state;
+    enum { N = 16 };
+    struct pt_scene scene;
+    struct pt_hit hits[N];
+    struct pt_ray rays[N];
+    const struct pt_ray *list[N];
+    struct pt_hit *found[N];
+    uint8_t occluded[2][N];
+    _Alignas(64) float zero[N] = {0}, x[N], z[N];
+    test_scene_begin(&scene);
+    int32_t grey = test_add_diffuse(&scene, v3_splat(0.5f));
+    test_add_quad(&scene, grey, v3(-1000, -1000, 0), v3(2000, 0, 0), v3(0, 2000, 0));
+    test_add_quad(&scene, grey, v3(-1e-3f, -1e-3f, 0), v3(2e-3f, 0, 0), v3(0, 2e-3f, 0));
+    test_add_quad(&scene, grey, v3(-5, -5, 1e-12f), v3(2, 0, 0), v3(0, 10, 0));
+    test_scene_finish(&scene);
+    for (int i = 0; i < N; i++) {
+        x[i] = 0.1f * (float)i;
+        z[i] = i % 2 ? 1.0f : -1.0f;
+        rays[i] = ray_to(v3_splat(0.0f), v3(x[i], 0, z[i]));
+        assert_int_equal(pt_accel_intersect(&scene, &rays[i], &hits[i]), 1);
+        rays[i].t_min = PT_RAY_OFF_START;
+        list[i] = &rays[i];
+        found[i] = &hits[i];
+        assert_int_equal(pt_accel_intersect(&scene, &rays[i], &hits[i]), 0);
+        assert_int_equal(pt_accel_occluded(&scene, &rays[i]), 0);
+    }
+    struct pt_ray_lanes lanes = {{zero, zero, zero}, {x, zero, z}, PT_RAY_OFF_START, INFINITY};
+    for (int coherent = 0; coherent < 2; coherent++)
+        for (int kind = 0; kind < 2; kind++) {
+            if (kind)
+                pt_accel_intersect_lanes(&scene, &lanes, N, coherent, hits);
+            else
+                pt_accel_intersect_many(&scene, list, N, coherent, found);
+            for (int i = 0; i < N; i++)
+                assert_int_equal(hits[i].shape, -1);
+        }
+    pt_accel_occluded_many(&scene, list, N, occluded[0]);
+    pt_accel_occluded_lanes(&scene, &lanes, N, occluded[1]);
+    for (int i = 0; i < 2 * N; i++)
+        assert_int_equal(occluded[i / N][i % N], 0);
+    rays[0] = ray_to(v3(-4, 0, 0), v3(0, 0, 1));
+    assert_int_equal(pt_accel_intersect(&scene, &rays[0], &hits[0]), 1);
+    test_scene_end(&scene);
+}
+
 static void empty_scene_has_no_hits(void **state)
 {
     (void)state;
@@ -324,7 +372,7 @@ static void compare_lanes(const struct pt_scene *scene, int count, int coherent,
         d[0][i] = to.x, d[1][i] = to.y, d[2][i] = to.z;
         o[0][i] = 0.1f, o[1][i] = 0.2f, o[2][i] = -4.0f;
     }
-    const struct pt_ray_lanes rays = {{o[0], o[1], o[2]}, {d[0], d[1], d[2]}, 0.5f + number(state)};
+    const struct pt_ray_lanes rays = {{o[0], o[1], o[2]}, {d[0], d[1], d[2]}, 0.0f, 0.5f + number(state)};
     pt_accel_intersect_lanes(scene, &rays, count, coherent, hits);
     pt_accel_occluded_lanes(scene, &rays, count, occluded);
     for (int i = 0; i < count; i++) {
@@ -419,6 +467,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(triangles_have_right_hand_normals),
         cmocka_unit_test(what_was_passed_is_met_no_more),
+        cmocka_unit_test(start_is_not_met),
         cmocka_unit_test(empty_scene_has_no_hits),
         cmocka_unit_test(bounds_of_a_sheet),
         cmocka_unit_test(quadrics),
