@@ -17,9 +17,9 @@
 #include "plugin/viewing.h"
 #include "plugin/translate.h"
 
-static const double STEP = 1.25; /* of samples from check to check, at least */
+static const double STEP = 1.25;              /* of samples from check to check, at least */
 static const double CLEAR = 0.8, APART = 0.4; /* of the limit, below it: so low an error needs no other */
-static const double FALL = 0.4;  /* the error falls as samples^-FALL: slower than noise, since part of it is bias */
+static const double FALL = 0.4; /* the error falls as samples^-FALL: slower than noise, since part of it is bias */
 
 enum { P_VISIBLE, P_ERROR, P_FIRST_SPP, P_GROWTH, P_PICTURE, P_QUALITY, P_LIBRARY, P_FPS, P_PPD, P_COUNT };
 enum {
