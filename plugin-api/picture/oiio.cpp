@@ -228,15 +228,21 @@ int read_placed(ImageInput &input, const pic_request &q, const pic_choice &s, co
 }
 
 /* How the stored rows lie in the picture, counted as EXIF does: 1 as usual, from 5 on they are its columns. Of a file that
- * begins with columns, OpenImageIO counts Radiance's "+X +Y" as 6 and "-X -Y" as 8, which are EXIF's 8 and 6. What other
- * formats say is left to the viewer, as in pbrt. */
+ * begins with columns, OpenImageIO counts Radiance's "+X +Y" as 6 and "-X -Y" as 8, which are EXIF's 8 and 6. What JPEG and
+ * TIFF say is left to the viewer, as in pbrt. */
 int orientation_of(const ImageInput &input, const ImageSpec &spec)
 {
-    const bool is_hdr = std::strcmp(input.format_name(), "hdr") == 0;
-    const int n = spec.get_int_attribute("Orientation", 1);
-    if ((!is_hdr && std::strcmp(input.format_name(), "dpx") != 0) || n < 1 || n > 8)
-        return 1;
-    return is_hdr && n % 2 == 0 && n >= 6 ? 14 - n : n;
+    const int n = std::strcmp(input.format_name(), "hdr") == 0 ? spec.get_int_attribute("Orientation", 1) : 1;
+    return n == 6 || n == 8 ? 14 - n : n >= 1 && n <= 8 ? n : 1;
+}
+
+/* OpenImageIO mixes up the orders of DPX: what it writes as 3 it reads as 4, and of columns it exchanges the sizes only. */
+int check_order(const ImageInput &input, const ImageSpec &spec, const char *name, base_err *err)
+{
+    if (std::strcmp(input.format_name(), "dpx") != 0 || spec.get_int_attribute("Orientation", 1) == 1)
+        return 0;
+    return base_fail(err, BASE_EINVAL,
+                     "%s: a DPX whose first pixel is not at the top left, or not the first of a row: turn it", name);
 }
 
 /* Puts the pixels, of `pixel` bytes each, where the picture has them. */
@@ -265,13 +271,12 @@ int turn(const char *name, int orientation, size_t pixel, int *width, int *heigh
 }
 
 /* What a colour EXR says of its R, G and B (technical introduction to OpenEXR, "chromaticities"), unless it is Rec. 709. */
-void find_primaries(ImageInput &input, const pic_choice &s, pic_image *image)
+void find_primaries(const ImageInput &input, const ImageSpec &spec, const pic_choice &s, pic_image *image)
 {
     static const float rec709[8] = PIC_REC709_PRIMARIES;
     const float same = 1e-3f; /* closer than writers that round to three digits */
     if (s.count < 3 || s.at[1] == s.at[0] || std::strcmp(input.format_name(), "openexr") != 0)
         return;
-    const ImageSpec spec = input.spec(s.part, 0);
     const OIIO::ParamValue *found = spec.find_attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8));
     if (found == nullptr)
         return;
@@ -286,9 +291,11 @@ int read_pixels(ImageInput &input, const pic_request &q, pic_image *out, base_er
     pic_choice s = {};
     if (int rc = choose(input, q, &s, err))
         return rc;
-    const ImageSpec spec = input.spec_dimensions(s.part, 0);
+    const ImageSpec spec = input.spec(s.part, 0);
     canvas c = {};
     if (int rc = check_size(spec, q.name, err))
+        return rc;
+    if (int rc = check_order(input, spec, q.name, err))
         return rc;
     if (int rc = find_canvas(spec, q, &c, err))
         return rc;
@@ -301,7 +308,7 @@ int read_pixels(ImageInput &input, const pic_request &q, pic_image *out, base_er
         return base_fail_nomem(err, q.name);
     if (int rc = read_placed(input, q, s, spec, type, c, static_cast<char *>(values.get()), err))
         return rc;
-    const int orientation = orientation_of(input, input.spec(s.part, 0));
+    const int orientation = orientation_of(input, spec);
     const bool is_part = !(holds(c, spec) && c.width == spec.width && c.height == spec.height);
     if (orientation != 1)
         if (int rc =
@@ -313,7 +320,7 @@ int read_pixels(ImageInput &input, const pic_request &q, pic_image *out, base_er
     out->channels = s.count;
     out->is_float_file = is_float;
     out->is_part = is_part;
-    find_primaries(input, s, out);
+    find_primaries(input, spec, s, out);
     if (is_codes)
         out->u8 = static_cast<uint8_t *>(values.release());
     else
