@@ -286,11 +286,14 @@ void find_primaries(const ImageInput &input, const ImageSpec &spec, const pic_ch
             image->has_primaries = 1;
 }
 
-int read_pixels(ImageInput &input, const pic_request &q, pic_image *out, base_err *err)
+/* without_alpha: the picture is what stands in front of its alpha, if it has one. */
+int read_pixels(ImageInput &input, const pic_request &q, bool without_alpha, pic_image *out, base_err *err)
 {
     pic_choice s = {};
     if (int rc = choose(input, q, &s, err))
         return rc;
+    if (without_alpha && s.count % 2 == 0)
+        s.count--;
     const ImageSpec spec = input.spec(s.part, 0);
     canvas c = {};
     if (int rc = check_size(spec, q.name, err))
@@ -378,13 +381,23 @@ struct opened {
     memory data;
     std::unique_ptr<OIIO::Filesystem::IOMemReader> reader;
     std::unique_ptr<ImageInput> input;
+    bool without_alpha = false;
 };
+
+/* Of a PNG that stores no alpha with its pixels (colour types 4 and 6, at byte 25), but a transparent colour or transparent
+ * entries of its palette (tRNS), pbrt reads the colours alone. */
+bool has_colours_alone(const char *name, const void *data, size_t size)
+{
+    const unsigned char *png = static_cast<const unsigned char *>(data);
+    return base_file_has_ending(name, "png") && size > 25 && (png[25] & 4) == 0;
+}
 
 int open_memory(const char *name, const void *data, size_t size, opened *out, base_err *err)
 {
     if (base_file_has_ending(name, "png"))
         if (int rc = check_png(name, static_cast<const unsigned char *>(data), size, err))
             return rc;
+    out->without_alpha = has_colours_alone(name, data, size);
     out->reader = std::make_unique<OIIO::Filesystem::IOMemReader>(data, size);
     out->input = ImageInput::create(format_of(name), false);
     if (!out->input || out->input->supports("ioproxy") == 0) {
@@ -420,7 +433,7 @@ int answer(const pic_request *q, pic_image *out, base_err *err)
         configure_once();
         opened image;
         int rc = q->data != nullptr ? open_memory(q->name, q->data, q->size, &image, err) : open_file(q->name, &image, err);
-        return rc ? rc : read_pixels(*image.input, *q, out, err);
+        return rc ? rc : read_pixels(*image.input, *q, image.without_alpha, out, err);
     } catch (const std::bad_alloc &) {
         return base_fail_nomem(err, q->name);
     } catch (const std::exception &e) {

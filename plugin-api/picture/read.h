@@ -14,8 +14,8 @@
 #include "base/err.h"
 #include "picture/image.h"
 
-/* The picture, as picture/channels.h finds it: grey, or red, green and blue, each with alpha if there is one; codes of
- * an 8-bit file, else values, those of the file whatever its primaries. Where the stored pixels are not those of the
+/* The picture, as picture/channels.h finds it: grey, or red, green and blue, each with alpha if its pixels have one; codes
+ * of an 8-bit file, else values, those of the file whatever its primaries. Where the stored pixels are not those of the
  * picture (EXR's data and display window) they are put into their place: what is missing is black, what lies outside is
  * left out, and is_part is set. */
 int pic_read(const char *path, struct pic_image *out, struct base_err *err);

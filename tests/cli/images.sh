@@ -7,14 +7,17 @@ command -v oiiotool >/dev/null || { echo "1..0 # SKIP no oiiotool"; exit 0; }
 # files: what no writer of ours makes
 python3 - <<'E' || exit 2
 import struct, zlib
-def png(name, kind, pixel):
+def png(name, kind, pixel, **others):
     chunk = lambda t, d: struct.pack(">I", len(d)) + t + d + struct.pack(">I", zlib.crc32(t + d))
     row = b"\0" + bytes(pixel) * 2
     open(name, "wb").write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 2, 2, 8, kind, 0, 0, 0))
-                           + chunk(b"IDAT", zlib.compress(row * 2)) + chunk(b"IEND", b""))
+                           + b"".join(chunk(n.encode(), bytes(d)) for n, d in others.items()) + chunk(b"IDAT", zlib.compress(row * 2)) + chunk(b"IEND", b""))
 def tga(name, pixel):
     open(name, "wb").write(struct.pack("<BBB9xHHBB", 0, 0, 2, 1, 1, 8 * len(pixel), 8 if len(pixel) == 4 else 0) + bytes(pixel))
 png("grey.png", 0, [188]), png("grey_alpha.png", 4, [188, 20])
+colours = [188, 90, 40]
+png("colours.png", 2, colours), png("key.png", 2, colours, tRNS=[0, 188, 0, 90, 0, 40])
+png("palette.png", 3, [1], PLTE=[0, 0, 0] + colours, tRNS=[255, 20])
 png("sixty.png", 0, [60]), png("alpha.png", 6, [188, 90, 40, 60])
 tga("colour.tga", [40, 90, 188]), tga("colour_alpha.tga", [40, 90, 188, 20])
 E
@@ -37,6 +40,8 @@ same() { picture "$1" "$2" up.exr && picture "$1" "$3" got.exr && cmp up.exr got
 t "grey beside alpha" same float grey.png grey_alpha.png
 t "alpha beside colours" same float sixty.png alpha.png
 t "colours of a TGA with alpha" same float colour.tga colour_alpha.tga
+t "colours of a PNG, one of them transparent" same float colours.png key.png
+t "  …in a palette" same float colours.png palette.png
 t "  …which are another value than that alpha" sh -c '! cmp up.exr sixty.exr' "$(picture float sixty.png sixty.exr)"
 
 # a picture of 3 x 2 in each order that Radiance knows: -Y is from the top down, the second axis is that of a scanline
