@@ -196,9 +196,13 @@ int read_stored(ImageInput &input, const pic_request &q, const pic_choice &s, co
                     char *at = to + static_cast<size_t>(y) * row + static_cast<size_t>(x) * pixel;
                     std::memcpy(at + static_cast<size_t>(c) * size, at, size);
                 }
-        } else if (!input.read_image(s.part, 0, s.at[c], s.at[c] + n, type, to + static_cast<size_t>(c) * size,
-                                     static_cast<OIIO::stride_t>(pixel), static_cast<OIIO::stride_t>(row))) {
-            return complain(q.name, input.geterror(), err);
+        } else {
+            input.geterror(); /* what was said before is no news */
+            const bool is_read = input.read_image(s.part, 0, s.at[c], s.at[c] + n, type, to + static_cast<size_t>(c) * size,
+                                                  static_cast<OIIO::stride_t>(pixel), static_cast<OIIO::stride_t>(row));
+            const std::string why = input.geterror(); /* of a TIFF that is cut short it is all that tells */
+            if (!is_read || !why.empty())
+                return complain(q.name, why, err);
         }
     }
     return 0;

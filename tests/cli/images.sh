@@ -78,6 +78,12 @@ oiiotool order-Y+X.hdr -d uint8 --attrib Orientation 4 -o turned.dpx
 sed "s#FILE#turned.dpx#" colour.pbrt >scene.pbrt
 refused "turned.dpx: a DPX whose first pixel is not at the top left" scene.pbrt -q --spp 1 -o x.exr
 
+# a TIFF of a third of its pixels, whose reader goes on
+oiiotool --pattern noise 64x64 3 -d uint8 --compression none -o whole.tif && head -c 4000 whole.tif >cut.tif
+sed "s#FILE#cut.tif#" colour.pbrt >scene.pbrt
+refused "cannot read cut.tif: not an image that can be read" scene.pbrt -q --spp 1 -o x.exr
+t "  …the whole is read" picture colour whole.tif got.exr
+
 # '?' is no query
 cp up.exr one.exr
 for file in grey.png colour.tga order-Y+X.hdr one.exr; do
