@@ -346,7 +346,7 @@ ImageSpec raw_config()
 }
 
 /* libpng prints on stderr when a file is damaged (and OpenImageIO then leaks), so damage is found before it sees the data:
- * signature, chunk lengths, checksums, end marker (PNG specification, §5). */
+ * signature, header, chunk lengths, checksums, end marker (PNG specification, §5). */
 int check_png(const char *name, const unsigned char *data, size_t size, base_err *err)
 {
     static const unsigned char signature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
@@ -360,6 +360,8 @@ int check_png(const char *name, const unsigned char *data, size_t size, base_err
         if (size - at < 12 || be32(at) > size - at - 12)
             return base_fail(err, BASE_EINVAL, "%s: truncated PNG file", name);
         const size_t length = be32(at);
+        if (at == sizeof signature && (length != 13 || std::memcmp(data + at + 4, "IHDR", 4) != 0))
+            return base_fail(err, BASE_EINVAL, "%s: damaged PNG file (it does not begin with its header)", name);
         if (crc32(0, data + at + 4, static_cast<uInt>(length + 4)) != be32(at + 8 + length))
             return base_fail(err, BASE_EINVAL, "%s: damaged PNG file (checksum at byte %zu)", name, at);
         if (std::memcmp(data + at + 4, "IEND", 4) == 0)

@@ -78,6 +78,11 @@ oiiotool order-Y+X.hdr -d uint8 --attrib Orientation 4 -o turned.dpx
 sed "s#FILE#turned.dpx#" colour.pbrt >scene.pbrt
 refused "turned.dpx: a DPX whose first pixel is not at the top left" scene.pbrt -q --spp 1 -o x.exr
 
+# one line, without one of libpng's
+printf '\211PNG\r\n\032\n\0\0\0\0IEND\256B\140\202' >empty.png
+sed "s#FILE#empty.png#" colour.pbrt >scene.pbrt
+refused "cannot read empty.png: damaged PNG file (it does not begin with its header)" scene.pbrt -q --spp 1 -o x.exr
+
 # a TIFF of a third of its pixels, whose reader goes on
 oiiotool --pattern noise 64x64 3 -d uint8 --compression none -o whole.tif && head -c 4000 whole.tif >cut.tif
 sed "s#FILE#cut.tif#" colour.pbrt >scene.pbrt
