@@ -11,6 +11,7 @@ extern "C" {
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -371,6 +372,28 @@ int check_png(const char *name, const unsigned char *data, size_t size, base_err
     return base_fail(err, BASE_EINVAL, "%s: truncated PNG file", name);
 }
 
+/* One character ends the header of a PFM. Behind "\r\n" OpenImageIO would take the second for the first byte of the pixels,
+ * which are nothing then: next to 0. */
+int check_pfm(const char *path, base_err *err)
+{
+    FILE *file = nullptr;
+    if (int rc = base_file_open(path, &file, err))
+        return rc;
+    char head[256];
+    const size_t n = std::fread(head, 1, sizeof head, file);
+    std::fclose(file);
+    size_t at = 0;
+    for (int words = 0; words < 4 && at < n; words++) { /* PF, width, height, scale */
+        while (at < n && std::isspace(static_cast<unsigned char>(head[at])) != 0)
+            at++;
+        while (at < n && std::isspace(static_cast<unsigned char>(head[at])) == 0)
+            at++;
+    }
+    if (at + 1 < n && head[at] == '\r' && head[at + 1] == '\n')
+        return base_fail(err, BASE_EINVAL, "%s: a PFM whose header ends in CR and LF (expected one of them)", path);
+    return 0;
+}
+
 /* The name of a file's format, which is in small letters whatever the file's own name has. */
 std::string format_of(const char *name)
 {
@@ -428,6 +451,9 @@ int open_file(const char *path, opened *out, base_err *err)
         out->data = memory(data);
         return rc ? rc : open_memory(path, data, size, out, err);
     }
+    if (base_file_has_ending(path, "pfm"))
+        if (int rc = check_pfm(path, err))
+            return rc;
     const ImageSpec config = raw_config();
     out->input = ImageInput::open(path, &config);
     return out->input ? 0 : complain(path, OIIO::geterror(), err);

@@ -83,6 +83,12 @@ printf '\211PNG\r\n\032\n\0\0\0\0IEND\256B\140\202' >empty.png
 sed "s#FILE#empty.png#" colour.pbrt >scene.pbrt
 refused "cannot read empty.png: damaged PNG file (it does not begin with its header)" scene.pbrt -q --spp 1 -o x.exr
 
+printf 'Pf\r\n1 1\r\n-1.0\r\n\0\0\200\077' >crlf.pfm
+sed "s#FILE#crlf.pfm#" colour.pbrt >scene.pbrt
+refused "cannot read crlf.pfm: a PFM whose header ends in CR and LF" scene.pbrt -q --spp 1 -o x.exr
+printf 'Pf\n1 1\n-1.0\n\0\0\200\077' >lf.pfm
+t "  …in LF it is read" picture colour lf.pfm got.exr
+
 # a TIFF of a third of its pixels, whose reader goes on
 oiiotool --pattern noise 64x64 3 -d uint8 --compression none -o whole.tif && head -c 4000 whole.tif >cut.tif
 sed "s#FILE#cut.tif#" colour.pbrt >scene.pbrt
