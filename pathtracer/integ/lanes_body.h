@@ -57,6 +57,14 @@ static void numbers(const struct pt_lane_keys *keys, int count, uint32_t block, 
     }
 }
 
+/* pt_path_crosses, of the direction wi behind the ray that is still in `paths`. */
+static inline int crosses(const struct pt_lane_hits *restrict hits, const struct pt_lane_paths *restrict paths, int i,
+                          pt_vec3 wi)
+{
+    pt_vec3 n = pt_lane_get(&hits->n_geometric, i);
+    return -v3_dot(pt_lane_get(&paths->direction, i), n) * v3_dot(wi, n) < 0.0f;
+}
+
 /* What light adds, and the ray that says whether it arrives: pt_path_plan_light and pt_path_shadow_ray. */
 static void plan_lights(const struct pt_lane_hits *restrict hits, const float *restrict u0, const float *restrict u1,
                         int count, struct pt_lane_paths *restrict paths)
@@ -74,6 +82,7 @@ static void plan_lights(const struct pt_lane_hits *restrict hits, const float *r
         struct pt_light_sample light;
         int lit = pt_light_triangle_towards(&e, hits->two_sided[i], p, u0[i], u1[i], &light);
         struct pt_bsdf bsdf = {.reflectance = pt_lane_get(&hits->reflectance, i)};
+        lit &= !crosses(hits, paths, i, light.wi);
         float pdf, scale = light.inv_pdf_solid * hits->by_tree[i];
         pt_vec3 f = pt_diffuse_eval(0, &bsdf, wo, pt_frame_to_local(&frame, light.wi), &pdf);
         float r = pdf * scale;
@@ -101,6 +110,7 @@ static void scatter(const struct pt_lane_hits *restrict hits, const float *restr
         pt_diffuse_sample(0, &bsdf, wo, 0.0f, u0[i], u1[i], &next);
         pt_vec3 wi = pt_frame_to_world(&frame, next.wi),
                 throughput = v3_mul(pt_lane_get(&paths->throughput, i), next.weight);
+        float pdf = crosses(hits, paths, i, wi) ? -next.pdf_solid : next.pdf_solid;
         float keep = v3_max(throughput);
         keep = keep > keep_most ? keep_most : keep;
         int certain = (keep >= 1.0f) | !roulette, some = !v3_is_black(throughput);
@@ -110,7 +120,7 @@ static void scatter(const struct pt_lane_hits *restrict hits, const float *restr
         pt_lane_put(&paths->origin, i,
                     pt_offset_point(p, pt_lane_get(&hits->n_geometric, i), pt_lane_get(&hits->error, i), wi));
         pt_lane_put(&paths->direction, i, wi);
-        paths->pdf_prev[i] = next.pdf_solid;
+        paths->pdf_prev[i] = pdf;
         float side = wo.z < 0.0f ? -1.0f : 1.0f;
         pt_lane_put(&paths->prev_p, i, p);
         pt_lane_put(&paths->prev_n, i, v3_scale(n_shading, side));

@@ -56,7 +56,8 @@ struct pt_path {
     struct pt_ray ray;
     pt_vec3 throughput, radiance;
     struct pt_receiver prev; /* last vertex, and … */
-    float pdf_prev;  /* … density of the direction taken there; 0: no other strategy could have found what comes next */
+    float pdf_prev;  /* … density of the direction taken there; 0: no other strategy could have found what comes next;
+                      * below 0: it went through an opaque surface, so that no lamp shines on that from there */
     float eta_scale; /* undoes in the roulette what refraction did to the throughput */
     int32_t medium;  /* the ray is in it, -1 = vacuum */
     int32_t depth;   /* bounces so far */
@@ -295,6 +296,8 @@ PT_KERNEL_INLINE int pt_emission_weight(pt_effects fx, const struct pt_scene *sc
                                         const struct pt_receiver *prev, float *weight)
 {
     *weight = 1.0f;
+    if (pdf_prev < 0.0f)
+        return 0;
     if (!scene->lights[at->shape->light].two_sided && !(v3_dot(at->s.n_geometric, direction) < 0.0f))
         return 0;
     if (pdf_prev > 0.0f && settings->strategy == PT_STRATEGY_MIS)
@@ -320,8 +323,9 @@ PT_KERNEL_INLINE void pt_path_add_environment(struct pt_path *path)
     for (int32_t i = 0; i < path->scene->env_light_count; i++) {
         const struct pt_light *light = &path->scene->lights[path->scene->env_lights[i]];
         float weight = 1.0f;
-        if (path->pdf_prev > 0.0f && path->settings->strategy == PT_STRATEGY_MIS)
-            weight = pt_mis_weight(path->pdf_prev, pt_light_env_pdf(path->scene, light, path->prev.p, path->ray.direction));
+        if (path->pdf_prev != 0.0f && path->settings->strategy == PT_STRATEGY_MIS)
+            weight = pt_mis_weight(fabsf(path->pdf_prev),
+                                   pt_light_env_pdf(path->scene, light, path->prev.p, path->ray.direction));
         pt_vec3 l = v3_scale(v3_mul(path->throughput, pt_light_env_eval(path->scene, light, path->ray.direction)), weight);
         path->radiance = v3_add(path->radiance, l);
         if (path->trace)
@@ -418,8 +422,11 @@ PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const 
     int delta = (fx & PT_FX_BSDF) && (next.flags & PT_SCATTER_DELTA);
     path->pdf_prev = delta ? 0.0f : next.pdf_solid;
     pt_vec3 wi = pt_frame_to_world(frame, next.wi);
+    int crosses = pt_path_crosses(at, v3_neg(path->ray.direction), wi);
+    if (crosses && !pt_bsdf_transmits(fx, bsdf))
+        path->pdf_prev = delta ? -INFINITY : -next.pdf_solid;
     if (fx & PT_FX_TRANSMISSION) {
-        float side = pt_bsdf_side_factor(fx, bsdf, wo, next.wi, pt_path_crosses(at, v3_neg(path->ray.direction), wi));
+        float side = pt_bsdf_side_factor(fx, bsdf, wo, next.wi, crosses);
         path->throughput = v3_scale(path->throughput, side);
         path->eta_scale /= next.eta_scale * side;
     }
@@ -463,8 +470,11 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
         float pdf;
         pt_vec3 wi = plan->light.wi, wi_local = pt_frame_to_local(&frame, wi);
         pt_vec3 f = pt_bsdf_eval(fx, &bsdf, wo, wi_local, &pdf);
-        if (fx & PT_FX_TRANSMISSION)
-            f = v3_scale(f, pt_bsdf_side_factor(fx, &bsdf, wo, wi_local, pt_path_crosses(at, wo_world, wi)));
+        int crosses = pt_path_crosses(at, wo_world, wi);
+        if (crosses && !pt_bsdf_transmits(fx, &bsdf) && (plan->light.finite || plan->light.delta))
+            f = v3_splat(0.0f);
+        else if (fx & PT_FX_TRANSMISSION)
+            f = v3_scale(f, pt_bsdf_side_factor(fx, &bsdf, wo, wi_local, crosses));
         pt_path_plan_light(fx, path, f, pdf, pt_offset_point(at->p, at->s.n_geometric, at->error, wi),
                            fx & PT_FX_MEDIA ? pt_medium_towards(at, wi, path->medium) : -1, plan);
     }

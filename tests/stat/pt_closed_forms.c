@@ -466,6 +466,44 @@ static void stretched_sky(void **state)
     pt_scene_destroy(scene);
 }
 
+/* --- bent normals ---------------------------------------------------------------------------------------------------------- */
+
+static double white(int x, int y) { return (void)x, (void)y, 1.0; }
+
+/* Whatever the normals say, lamps behind an opaque floor do not shine on its front, and of a sky all around nothing is lost: by the
+ * general kernel and by that of diffuse scenes, which give the same bits. */
+static void floors_with_bent_normals_are_opaque(void **state)
+{
+    (void)state;
+#define BENT \
+    WHITE "Shape \"trianglemesh\" \"integer indices\" [ 0 2 1 0 3 2 ] \"point3 P\" [ -50 -50 5  50 -50 5  50 50 5  -50 50 " \
+          "5 ] " \
+          "\"normal N\" [ 0 .8660254 -.5  0 .8660254 -.5  0 .8660254 -.5  0 .8660254 -.5 ]\n"
+#define LAMP_OF(shape) "AttributeBegin " BLACK GLOW "\"bool twosided\" true " shape " AttributeEnd\n"
+    static const struct {
+        const char *text;
+        expected_at *expected;
+        double tolerance;
+    } cases[] = {
+        {HEAD(BOX, "") BENT "LightSource \"point\" \"point3 from\" [ 0 3 9 ] \"rgb I\" [ 99 99 99 ]", dark, 0.0},
+        {HEAD(BOX, "") BENT LAMP_OF(QUAD "[ -9 -9 9  9 -9 9  9 9 9  -9 9 9 ]"), dark, 0.0},
+        {HEAD(BOX, "") BENT "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]", white, CHANCE_ERROR},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        struct pt_scene_defaults defaults;
+        check_image(cases[k].text, cases[k].expected, cases[k].tolerance);
+        struct pt_scene *scene = text_scene(cases[k].text, &defaults, NULL);
+        for (uint32_t s = 0; s < 64; s++) {
+            struct pt_path_result one[SIZE], other[SIZE];
+            pt_kernel_select(scene->effects, NULL, NULL)(scene, &defaults.integrator, 0, s % SIZE, SIZE, s, one);
+            pt_kernel_select(PT_FX_ALL, NULL, NULL)(scene, &defaults.integrator, 0, s % SIZE, SIZE, s, other);
+            for (int x = 0; x < SIZE; x++)
+                assert_memory_equal(&one[x].radiance, &other[x].radiance, sizeof one[x].radiance);
+        }
+        pt_scene_destroy(scene);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -480,6 +518,7 @@ int main(void)
         cmocka_unit_test(surfaces_at_one_place),
         cmocka_unit_test(sheared_instances),
         cmocka_unit_test(shadows_of_what_is_close_to_the_light),
+        cmocka_unit_test(floors_with_bent_normals_are_opaque),
         cmocka_unit_test(stretched_sky),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
