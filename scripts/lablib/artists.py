@@ -22,6 +22,7 @@ def options(parser):
     parser.add_argument("--block", type=int, default=160, help="side of the blocks (160, as the add-on takes for 640x360)")
     parser.add_argument("--reference-spp", type=int, default=512, metavar="N", help="of each of the two references (512)")
     parser.add_argument("--only-references", action="store_true", help="make these and nothing else")
+    parser.add_argument("--ways", nargs="+", metavar="WAY", help="measure only these, as \"128 samples\", adaptive, \"error 1\", and make no tables")
     parser.add_argument("--blender", default=peers.BPY, metavar="PROGRAM", help="a Python with bpy (that of build/hosts)")
     parser.add_argument("--work", type=tool.path, default=os.path.join(tool.BUILD, "artists"), metavar="DIR",
                         help="scenes, references, figures; what is there is not made again (build/artists)")
@@ -50,7 +51,7 @@ class Scene:
 
     def measure(self, name, **request):
         """Keeps the seconds and visible errors of one way of rendering."""
-        if name in self.ways:
+        if name in self.ways or (self.o.ways and name not in self.o.ways):
             return
         out, report = self.stem + ".exr", self.stem + ".report.json"
         spent = self.cycles.render(file=self.blend, out=out, seed=1, **request)
@@ -61,7 +62,9 @@ class Scene:
             told = tool.load(report)
             self.ways[name].update(phases=told["phases"], blocks=[[b["spp"], b["reason"]] for b in told["blocks"]])
         tool.save(self.ways, self.kept, indent=None)
-        print("%s, %s: %.1f s, worst block %.2f" % (self.name, name, spent["s"], max(self.ways[name]["errors"])), flush=True)
+        off = sum(e > peers.VISIBLE for e in self.ways[name]["errors"])
+        print("%s, %s: %.1f processor s, %.1f s, worst block %.2f, %d of %d visibly off" % (
+            self.name, name, spent["s"], spent["wall_s"], max(self.ways[name]["errors"]), off, len(self.ways[name]["errors"])), flush=True)
 
     def host(self, name, *words):
         self.measure(name, spp=MOST, host=["--denoise", "--block", str(self.o.block), "--report", self.stem + ".report.json", *words])
@@ -72,6 +75,8 @@ class Scene:
         self.measure("adaptive", spp=MOST, threshold=THRESHOLD, denoise=True)
         for e in ERRORS:
             self.host("error %d" % e, "--error", str(e))
+        if self.o.ways:
+            return
         wall = self.ways[TIMED]["wall_s"]
         self.measure("adaptive, timed", spp=MOST, threshold=THRESHOLD, denoise=True, time_limit=wall)
         self.host("timed", "--time-budget", "%.2f" % wall)
@@ -148,6 +153,8 @@ def main(o):
             scene.measure_all()
     finally:
         cycles.close()
+    if o.ways:
+        return
     results = {"measured": tool.measured(), "blender": cycles.version(), "options": {k: getattr(o, k) for k in ("size", "block", "reference_spp")},
                "scenes": {scene.name: scene.ways for scene in scenes}}
     print(page(results))

@@ -20,7 +20,7 @@ SCENES = ["scenes/%s.pbrt" % name for name in "demo rock-garden kitchen cornell-
 SIZE, BLOCK, SEED, REFERENCES, PRICE_SPP = 256, 128, 1, (101, 102), 32
 LEVELS = (32, 40, 64, 80, 128, 160, 256, 320, 512, 640)
 FIRST, STEP, GROWTH = 64, 1.25, 2  # samples of the first look, and their ratio from look to look, at least and at most
-CLEAR, APART = 0.8, 0.4  # of the limit, below it: so low an error needs no other
+CLEAR, APART = 0.8, 0.4  # of the limit, below it: so low a first error needs no other
 FALL = 0.4  # errors fall as samples^-FALL
 KINDS = ("noisy", "denoised", "blend")
 VISIBLE = 1.05  # beyond this an error counts as visible: the references' own noise scatters the truth by some per cent
@@ -111,7 +111,7 @@ def stop(looks, limit, what):
     while spp <= looks[-1]["spp"]:
         error, count = between(looks, spp, what), count + 1
         trend = (error + last["trend"] * (last["spp"] / spp) ** FALL) / 2 if last else error
-        if error <= min(CLEAR * limit, limit - APART) or error <= limit and last and min(last["error"], trend) <= limit:
+        if min(last["error"], trend) <= limit and error <= limit if last else error <= min(CLEAR * limit, limit - APART):
             return spp, count
         last = {"spp": spp, "error": error, "trend": trend}
         spp = int(math.ceil(spp * (STEP if error <= limit else min(max((error / limit) ** (1 / FALL), STEP), GROWTH))))

@@ -4,7 +4,7 @@
  * and estimates how visible the error of the kept picture is (plugin/denoised/block_view.h): from the difference of the
  * denoised halves, and from that of each from the other, noisy one. `error` is the larger of the two over the level at which
  * people stop seeing it. A block stops when a check finds it low enough for `visible`, and so did the one before, or the
- * trend is low as well, since one low error can be luck; or when it is so low that luck does not matter.
+ * trend is low as well, since one low error can be luck; or when the first one is far below the limit.
  *
  * The history of a block is its last check, with the trend: asked again at the same samples it answers the same, though its
  * neighbours, which the denoiser reads too, may have changed.
@@ -18,7 +18,7 @@
 #include "plugin/translate.h"
 
 static const double STEP = 1.25;              /* of samples from check to check, at least */
-static const double CLEAR = 0.8, APART = 0.4; /* of the limit, below it: so low an error needs no other */
+static const double CLEAR = 0.8, APART = 0.4; /* of the limit, below it: so low a first error needs no other */
 static const double FALL = 0.4; /* the error falls as samples^-FALL: slower than noise, since part of it is bias */
 
 enum { P_VISIBLE, P_ERROR, P_FIRST_SPP, P_GROWTH, P_PICTURE, P_QUALITY, P_LIBRARY, P_FPS, P_PPD, P_COUNT };
@@ -109,8 +109,8 @@ static void decide(const struct lull_instance *in, const struct lull_block *b, c
     const int before = now->spp > 0 && !isnan(now->error);
     lull_kit_verdict(&in->kit, b, tally, error, in->stop_error, 0, growth, d);
     now->trend = before ? 0.5 * (d->error + now->trend * pow((double)now->spp / spp, FALL)) : d->error;
-    const int clear = d->error <= fmin(CLEAR * in->stop_error, in->stop_error - APART);
-    const int confirmed = clear || (before && fmin(now->error, now->trend) <= in->stop_error);
+    const int confirmed = before ? fmin(now->error, now->trend) <= in->stop_error
+                                 : d->error <= fmin(CLEAR * in->stop_error, in->stop_error - APART);
     if (d->action == LULL_STOP && !isnan(d->error) && !confirmed) {
         lull_kit_continue(&in->kit, b, STEP * spp, d);
         d->predicted_spp = (double)d->next_spp;
