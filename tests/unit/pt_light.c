@@ -142,7 +142,7 @@ static void check_light(const struct pt_scene *scene, pt_vec3 p_ref, int all_vis
     double error = sqrt(fmax(0.0, square - norm * norm) / SAMPLES);
     if (all_visible && fabs(norm - 1.0) > 5.0 * error + 1e-4)
         fail_msg("the density integrates to %g ± %g", norm, error);
-    if (fabs(by_light - by_direction) > 5.0 * error * by_light + 1e-3)
+    if (fabs(by_light - by_direction) > 5.0 * error / norm * by_light + 1e-3)
         fail_msg("irradiance %g by light sampling, %g by direction", by_light, by_direction);
     assert_true(agree > 0.98 * lit); /* at the very rim of a shape rounding may find another primitive */
 }
