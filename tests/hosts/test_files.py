@@ -89,9 +89,10 @@ def test_one_file_twice():
 
 
 def test_replaced():
-    """a file is replaced as a whole, through links, with the mode that the umask leaves; a failure leaves what was there"""
+    """a file is replaced as a whole, through links, with its mode, a new one with that which the umask leaves; a failure leaves what was there"""
     os.mkdir("r")
     Path("r/old").write_text("old")
+    os.chmod("r/old", 0o604)
     os.symlink("old", "r/link")
     os.symlink("made", "r/dangling")
     before = os.umask(0o027)
@@ -101,7 +102,7 @@ def test_replaced():
     finally:
         os.umask(before)
     assert os.path.islink("r/link") and Path("r/old").read_text() == Path("r/made").read_text() == "new"
-    assert stat.S_IMODE(os.stat("r/old").st_mode) == 0o640
+    assert stat.S_IMODE(os.stat("r/old").st_mode) == 0o604 and stat.S_IMODE(os.stat("r/made").st_mode) == 0o640
     try:
         with replaced("r/old") as file:
             file.write(b"half")
