@@ -97,11 +97,17 @@ static struct lull_rect window_of(const struct lull_rect *frame, struct lull_rec
     return r;
 }
 
+static int32_t within(int64_t at, int32_t first, int32_t last)
+{
+    return at < first ? first : at > last ? last : (int32_t)at;
+}
+
 /* A block and BORDER pixels about it, as far as the frame reaches. */
 static struct lull_rect border_of(const struct lull_rect *frame, struct lull_rect r)
 {
-    return (struct lull_rect){most(frame->x0, r.x0 - BORDER), most(frame->y0, r.y0 - BORDER),
-                              least(frame->x1, r.x1 + BORDER), least(frame->y1, r.y1 + BORDER)};
+    return (struct lull_rect){
+        within((int64_t)r.x0 - BORDER, frame->x0, frame->x1), within((int64_t)r.y0 - BORDER, frame->y0, frame->y1),
+        within((int64_t)r.x1 + BORDER, frame->x0, frame->x1), within((int64_t)r.y1 + BORDER, frame->y0, frame->y1)};
 }
 
 static void see_both(struct worker *w, size_t pixels)
@@ -200,6 +206,14 @@ static double error_of_halves(struct lull_instance *in, const struct lull_view *
                       w, tally);
 }
 
+/* Whether there is scratch memory for an area; not for those of blocks that are none of the frame's. */
+static int has_room(const struct lull_instance *in, struct lull_rect area)
+{
+    const int32_t width = area.x1 - area.x0, height = area.y1 - area.y0;
+    return width > 0 && height > 0 && width <= in->largest.width && (size_t)width * (size_t)height <= in->largest.pixels &&
+           ggn_visible_patches(width, height) <= in->largest.patches;
+}
+
 /* The error of an area around a block; 0 where it is the block, or tells of no noise. */
 static double error_of_area(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                             struct lull_rect area, struct worker *w)
@@ -207,7 +221,7 @@ static double error_of_area(struct lull_instance *in, const struct lull_view *vi
     const struct lull_rect own = gp_rect_of(b);
     struct lull_kit_tally ignored = {0};
 
-    if (memcmp(&own, &area, sizeof own) == 0)
+    if (memcmp(&own, &area, sizeof own) == 0 || !has_room(in, area))
         return 0;
     const int differ = gp_pair_of_halves(&in->kit, view, b, area, w->rgb, &ignored);
     const double error = error_of(in, view, b, area, differ, split_of(b), w);
@@ -228,7 +242,7 @@ static double error_at_edges(struct lull_instance *in, const struct lull_view *v
                              struct worker *w)
 {
     const struct lull_rect own = gp_rect_of(b), area = border_of(&in->frame, own);
-    if (!view->all || !lull_kit_plane(view, LULL_PLANE_MOMENT2) || b->spp < 2)
+    if (!has_room(in, area) || !view->all || !lull_kit_plane(view, LULL_PLANE_MOMENT2) || b->spp < 2)
         return 0;
     gp_pair_of_moments(&in->kit, view, b, area, 1, w->rgb);
     return gp_undersampled_edge(own, area, w->rgb) ? error_of_area(in, view, b, area, w) : 0;
@@ -342,9 +356,7 @@ static int32_t workers_create(struct lull_instance *in, const struct largest *la
 
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
 {
-    const int32_t width = b->x1 - b->x0;
-    if ((size_t)lull_kit_pixels(b) > in->largest.pixels || width > in->largest.width ||
-        ggn_visible_patches(width, b->y1 - b->y0) > in->largest.patches)
+    if (!has_room(in, gp_rect_of(b)))
         return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
     if (in->means.count && (size_t)lull_kit_pixels(b) * 3 != gp_means_values(&in->means, b->id))
         return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
