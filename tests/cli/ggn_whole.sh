@@ -1,5 +1,5 @@
 #!/bin/sh
-# All that the commands of ggn print and write for small recorded inputs, compared with tests/golden/whole/ggn*.txt (whole.py says how).
+# All that the commands of ggn print and write for small recorded inputs, compared with tests/cli/whole/ggn*.txt (whole.py says how).
 # What is called *.near depends on networks.
 . "$(dirname "$0")/ggn_setup"
 recorded=tests/data/recorded model=tests/data/tiny.ggn

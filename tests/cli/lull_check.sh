@@ -29,7 +29,7 @@ t "-p reaches the criterion" says "first at 77 spp" -o requirements -p first-spp
 t "-m and -s reach the calls outside the rules" sh -c '[ "$("$1" -o misuse -m 1000 -s 2 halfbuf)" = "$("$1" -o misuse -m 1000 -s 2 halfbuf)" ] &&
     [ "$("$1" -o misuse -m 1000 halfbuf)" != "$("$1" -o misuse -m 1000 -s 2 halfbuf)" ] && "$1" -o misuse -m 999 -s 2 halfbuf | grep -F "(999 calls, "' - "$check"
 t "no misuse: 2" status 2 -m 0 null
-for o in --help --usage --list; do # whole outputs: tests/golden/lull_check.txt
+for o in --help --usage --list; do # whole outputs: tests/cli/lull_check.txt
     run "lull-check $o" $o
 done
 run "-q" -q -o table null
@@ -108,4 +108,4 @@ t "every criterion of the baselines is checked here" sh -c '[ "$("$1" --list-cri
 all "$check" "$BUILD/lib/lull" "" newer-host order
 # Once: not again for each instruction set (tests/processors/list).
 [ "$BUILD" = build ] && [ -z "${LULL_ISA:-}" ] && [ -x build/asan/bin/lull-check ] && all build/asan/bin/lull-check build/asan/lib/lull " under ASan and UBSan"
-approved tests/golden/lull_check.txt
+approved tests/cli/lull_check.txt

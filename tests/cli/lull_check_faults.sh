@@ -1,7 +1,7 @@
 #!/bin/sh
 # lull-check finds what is broken, and nothing else: each fault of tests/abi/plugins/faulty.c must fail the check that is there to find
 # it, each number of tests/abi/plugins/puppet.c must be minded from its limit on and not before; and a witness in the criterion says
-# what the host that lull-check plays gives it. The whole output of each run is compared with tests/golden/lull_check_faults.txt.
+# what the host that lull-check plays gives it. The whole output of each run is compared with tests/cli/lull_check_faults.txt.
 . tests/cli/lull_check_setup
 fault() { run "$1 $2: $3" -o "$2" -p "fault=$1" "$plugins/faulty.so"; }
 # What hangs is ended after a minute, in which even a busy machine comes to where it hangs: all of it meanwhile.
@@ -148,4 +148,4 @@ for dials in caps=3 flags=0,width=9,height=7,caps=7,first=5,halo=2 used=17,requi
                 sum[k, 4], sum[k, 5], sum[k, 6], sum[k, 7] } }' ./*) >"$tmp/out"
     same "what is given to a puppet with $dials"
 done
-approved tests/golden/lull_check_faults.txt
+approved tests/cli/lull_check_faults.txt

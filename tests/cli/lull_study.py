@@ -1,7 +1,7 @@
 """`lull-study` over raw HTTP: what is refused changes nothing and is logged; what is stored comes back. Speaks TAP.
 
 Every command, request and answer, what is stored, the exports and the reports are kept as they come and compared at the end
-(tests/golden/whole/study.txt; whole.py says how to record anew)."""
+(tests/cli/whole/study.txt; whole.py says how to record anew)."""
 
 import atexit
 import http.client

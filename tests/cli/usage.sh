@@ -46,5 +46,5 @@ check "  ...which is found beside the program" $?
 for o in --help --usage; do
     echo "> lull-render $o"
     "$bin/lull-render" $o | sed 's/^/  /'
-done | "$BUILD/tests/approve" tests/golden/lull-render/help.txt $((n + 1)) || bad=1
+done | "$BUILD/tests/approve" tests/cli/usage.txt $((n + 1)) || bad=1
 exit $bad

@@ -2,7 +2,7 @@
 
 usage: whole.py NAME FOLDER FIRST [REGEX=WORD ...]
 
-Every file below FOLDER is a section of a record tests/golden/whole/NAME*.txt, compared as support/approve.h says: one that differs, is
+Every file below FOLDER is a section of a record tests/cli/whole/NAME*.txt, compared as support/approve.h says: one that differs, is
 missing or is new is a failure. FIRST is the number of the first line of TAP. What a REGEX matches is recorded, and compared, as WORD:
 folders, times, names drawn at random. Long JSON is recorded as tables, a PNG as mean codes.
 
@@ -110,7 +110,7 @@ def compare(name, sections, first):
         lines = laid_out(text).split("\n")
         records[record_of(name, key, text)] += "> %s\n%s" % (key, "".join("  %s\n" % line for line in lines[: -1 if lines[-1] == "" else None]))
     for record, text in sorted(records.items()):
-        path = os.path.join("tests", "golden", "whole", record + ".txt")
+        path = os.path.join("tests", "cli", "whole", record + ".txt")
         ran = subprocess.run([APPROVE, path, str(first)], input=text, stdout=subprocess.PIPE, text=True, cwd=ROOT)
         print(ran.stdout, end="")
         good &= ran.returncode == 0

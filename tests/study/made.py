@@ -45,8 +45,8 @@ def add_trials(store, row, *trials):
 
 
 def approve(name, text):
-    """Against tests/golden/whole/NAME.txt (support/approve.h); RECORD=1 writes it anew."""
+    """Against tests/study/whole/NAME.txt (support/approve.h); RECORD=1 writes it anew."""
     lines = "".join(f"{'' if line.startswith('>') else '  '}{line}\n" for line in text.splitlines())
     tool = os.path.join(os.environ.get("BUILD", "build"), "tests", "approve")
-    ran = subprocess.run([tool, f"tests/golden/whole/{name}.txt", "1"], input=lines, stdout=subprocess.PIPE, text=True)
+    ran = subprocess.run([tool, f"tests/study/whole/{name}.txt", "1"], input=lines, stdout=subprocess.PIPE, text=True)
     assert ran.returncode == 0, ran.stdout

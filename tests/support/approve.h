@@ -1,6 +1,6 @@
 /*
  * Approval: a text against the one recorded in a file. It says that nothing has changed, not that it is right: what is recorded
- * was made by the product and read by somebody. To record anew, on purpose: RECORD=1 with the test, then read `git diff tests/golden`.
+ * was made by the product and read by somebody. To record anew, on purpose: RECORD=1 with the test, then read `git diff tests`.
  *
  * A record:
  *

@@ -1,5 +1,5 @@
 /*
- * A transcript: what a test was told, line by line, compared whole with tests/golden/whole/NAME.txt (support/approve.h).
+ * A transcript: what a test was told, line by line, compared whole with tests/unit/transcripts/NAME.txt (support/approve.h).
  */
 #ifndef TESTS_GGN_TRANSCRIPT_H
 #define TESTS_GGN_TRANSCRIPT_H
@@ -56,7 +56,7 @@ static inline void transcript_hide(struct transcript *t, const char *what, const
 static inline void transcript_end(struct transcript *t, const char *name)
 {
     char path[128];
-    snprintf(path, sizeof path, "tests/golden/whole/%s.txt", name);
+    snprintf(path, sizeof path, "tests/unit/transcripts/%s.txt", name);
     fclose(t->file);
     approve_text(path, t->text);
     free(t->text);

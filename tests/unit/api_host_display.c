@@ -23,12 +23,12 @@
 
 /* --- packets ------------------------------------------------------------------------------------------------------------- */
 
-/* The recorded ones are made by tests/golden/display/record.py. */
+/* The recorded ones are made by tests/unit/api_host_display/record.py. */
 static void expect_packet(const struct viewer_packet *p, const char *file)
 {
     char path[128], *data;
     size_t size;
-    snprintf(path, sizeof path, "tests/golden/display/%s.bin", file);
+    snprintf(path, sizeof path, "tests/unit/api_host_display/%s.bin", file);
     assert_int_equal(base_file_read(path, 1 << 20, &data, &size, NULL), 0);
     assert_int_equal(p->size, size);
     for (size_t i = 0; i < size; i++)

@@ -1,5 +1,5 @@
 /*
- * What the networks are made of: every layer, value and tensor of both presets as recorded in tests/golden/ggn_nn_networks.txt, the first
+ * What the networks are made of: every layer, value and tensor of both presets as recorded in tests/unit/ggn_nn_networks.txt, the first
  * weights by their formulas, memory, the choice of the instruction set, and what is refused.
  */
 #include "support/ggn_cmocka.h"
@@ -76,7 +76,7 @@ static void structure(void **state)
     ggn_model_destroy(model);
     unsetenv("LULL_ISA");
     fclose(f);
-    approve_text("tests/golden/ggn_nn_networks.txt", text);
+    approve_text("tests/unit/ggn_nn_networks.txt", text);
     free(text);
 }
 

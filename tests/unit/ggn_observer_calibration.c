@@ -81,7 +81,7 @@ static void checks(void **state)
     for (uint32_t i = 0; i < l.n; i++)
         fprintf(f, "block %u: %.6g censored %d\n", l.labels[i].id, l.labels[i].threshold, l.labels[i].censored);
     fclose(f);
-    approve_text("tests/golden/ggn_observer_checks.txt", report);
+    approve_text("tests/unit/ggn_observer_checks.txt", report);
     free(report);
     ggn_labels_release(&l);
     base_threads_destroy(threads);
@@ -111,7 +111,7 @@ static void record(const char *path, const struct ggn_dataset_view *view, const 
         fprintf(f, "block %u: %.6g censored %d\n", l.labels[i].id, l.labels[i].threshold, l.labels[i].censored);
     ggn_labels_release(&l);
     fclose(f);
-    approve_text("tests/golden/ggn_observer_calibration.txt", report);
+    approve_text("tests/unit/ggn_observer_calibration.txt", report);
     free(report);
 }
 

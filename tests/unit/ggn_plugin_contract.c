@@ -411,7 +411,7 @@ static void tables(void **state)
         c->destroy(in);
     }
     fclose(f);
-    approve_text("tests/golden/ggn_plugin_tables.txt", text);
+    approve_text("tests/unit/ggn_plugin_tables.txt", text);
     free(text);
 }
 

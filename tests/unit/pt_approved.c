@@ -1,5 +1,5 @@
 /*
- * Small scenes and all that the loader makes of them: the files of tests/golden/pbrt hold each scene's text and the recorded
+ * Small scenes and all that the loader makes of them: the files of tests/unit/pt_approved hold each scene's text and the recorded
  * answer, which is its warnings, then its one-line error or the whole renderable (support/approve.h says how to record).
  *
  * Options: strict, size=8x4, fov=, look-at=a,b,…, effects, power, only-warnings. The header (film … camera) is part of the answer of
@@ -142,7 +142,7 @@ static char *answer(struct approve_case *c)
     static void name(void **state) \
     { \
         (void)state; \
-        approve_cases("tests/golden/pbrt/" #name ".txt", answer); \
+        approve_cases("tests/unit/pt_approved/" #name ".txt", answer); \
     }
 CHECK(header)
 CHECK(transforms)

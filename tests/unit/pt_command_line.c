@@ -143,7 +143,7 @@ static char *parse_words(struct approve_case *c)
 static void command_lines(void **state)
 {
     (void)state;
-    approve_cases("tests/golden/lull-render/command_lines.txt", parse_words);
+    approve_cases("tests/unit/pt_command_line.txt", parse_words);
 }
 
 /* --- what is opened for it ------------------------------------------------------------------------------------------------ */
@@ -253,7 +253,7 @@ static void renders(void **state)
     write_files();
     assert_int_equal(chdir(at), 0);
     assert_true(api_folder(criteria, sizeof criteria, API_CRITERIA) == 0 && setenv("LULL_PLUGIN_PATH", criteria, 1) == 0);
-    approve_cases("tests/golden/lull-render/renders.txt", make_render);
+    approve_cases("tests/unit/pt_command_line_renders.txt", make_render);
     unsetenv("LULL_PLUGIN_PATH");
     snprintf(command, sizeof command, "rm -r %s", folder);
     assert_int_equal(system(command), 0);

@@ -40,7 +40,7 @@ static char *explain_it(struct approve_case *c)
 static void explanations(void **state)
 {
     (void)state;
-    approve_cases("tests/golden/lull-render/explanations.txt", explain_it);
+    approve_cases("tests/unit/pt_explain.txt", explain_it);
 }
 
 int main(void)

@@ -343,7 +343,7 @@ static char *listed(struct approve_case *c)
 static void criteria_by_name(void **state)
 {
     (void)state;
-    approve_cases("tests/golden/lull-render/criteria.txt", listed);
+    approve_cases("tests/unit/pt_host.txt", listed);
 }
 
 int main(void)

@@ -307,7 +307,7 @@ static char *draw(struct approve_case *c)
 static void drawings(void **state)
 {
     (void)state;
-    approve_cases("tests/golden/image/drawings.txt", draw);
+    approve_cases("tests/unit/pt_pictures.txt", draw);
 }
 
 int main(void)

@@ -425,7 +425,7 @@ static char *quote_of(struct approve_case *c)
 static void quotes_in_every_number(void **state)
 {
     (void)state;
-    approve_cases("tests/golden/lull-render/quote_numbers.txt", quote_of);
+    approve_cases("tests/unit/pt_quote.txt", quote_of);
 }
 
 int main(void)

@@ -100,7 +100,7 @@ static char *print_quote(struct approve_case *c)
 static void quotes(void **state)
 {
     (void)state;
-    approve_cases("tests/golden/lull-render/quotes.txt", print_quote);
+    approve_cases("tests/unit/pt_quote_output.txt", print_quote);
 }
 
 /* The picture of a quote is that of its blocks' times, in minutes when the most expensive one takes one. */

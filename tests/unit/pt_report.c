@@ -458,7 +458,7 @@ static char *report_of(struct approve_case *c)
 static void report_word_for_word(void **state)
 {
     (void)state;
-    approve_cases("tests/golden/lull-render/report.txt", report_of);
+    approve_cases("tests/unit/pt_report.txt", report_of);
 }
 
 int main(void)

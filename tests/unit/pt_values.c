@@ -1,7 +1,7 @@
 /*
  * Numbers of the functions that scattering, lights, media, textures and quadrics are made of, at ordinary places and at
  * every edge: cosines of 0, total reflection, ends of intervals, directions along an axis, points inside and beside. What
- * they are is in golden/lull-render/values.txt (support/approve.h says how to record). Sameness only: that the numbers are
+ * they are is in pt_values.txt (support/approve.h says how to record). Sameness only: that the numbers are
  * right is said by stat/, and by closed forms in the other programs of unit/.
  */
 #include <setjmp.h>
@@ -600,7 +600,7 @@ static char *tell(struct approve_case *c)
 static void values(void **state)
 {
     (void)state;
-    approve_cases("tests/golden/lull-render/values.txt", tell);
+    approve_cases("tests/unit/pt_values.txt", tell);
 }
 
 int main(void)

@@ -1,5 +1,5 @@
 """Records the packets that tests/unit/api_host_display.c expects, as the viewer's own client makes them:
-    python3 -m venv build/tev && build/tev/bin/pip install tevclient==1.0.4 && build/tev/bin/python tests/golden/display/record.py"""
+    python3 -m venv build/tev && build/tev/bin/pip install tevclient==1.0.4 && build/tev/bin/python tests/unit/api_host_display/record.py"""
 import pathlib
 
 import numpy as np
