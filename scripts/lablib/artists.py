@@ -1,9 +1,10 @@
 """Compares pictures that artists make with Cycles and its denoiser with those of lull.blender --denoise: seconds and visible errors.
 
 Each scene is exported to Blender (scripts/hosts/pbrt_to_blend.py). Cycles renders a number of samples, by adaptive sampling to a noise
-threshold, or for as long as some number of samples took; lull.blender stops at multiples of what is just seen, or after that time.
-Visible errors are those of the model observer against two references of Cycles, whose noise is taken out (`ggn visible --second`). One
-process renders at a time. Needs bpy in build/hosts (make test-hosts). Interrupted, the same command goes on."""
+threshold, or for as long as some number of samples took; lull.blender stops at multiples of what is just seen, or after that time. What is
+exported is rendered by `lull-render --denoise` as well. Visible errors are those of the model observer against two references of the same
+renderer, whose noise is taken out (`ggn visible --second`). One process renders at a time. Needs bpy in build/hosts (make test-hosts).
+Interrupted, the same command goes on."""
 import json
 import os
 import statistics
@@ -41,26 +42,35 @@ class Scene:
         if not os.path.exists(self.blend):
             cycles.export(file, o.size, self.blend, self.stem + ".pbrt")
 
-    def references(self):
-        paths = ["%s.%d.%d.exr" % (self.stem, self.o.reference_spp, seed) for seed in peers.REFERENCES]
+    def ours(self, out, seed, *words):
+        return peers.ours(self.stem + ".pbrt", self.o.size, self.o.block, seed, out, *words)
+
+    def references(self, ours=False):
+        paths = ["%s%s.%d.%d.exr" % (self.stem, ".ours" if ours else "", self.o.reference_spp, seed) for seed in peers.REFERENCES]
         for path, seed in zip(paths, peers.REFERENCES):
             if not os.path.exists(path):
-                self.cycles.render(file=self.blend, out=path + ".part.exr", seed=seed, spp=self.o.reference_spp)
+                if ours:
+                    self.ours(path + ".part.exr", seed, "--spp", self.o.reference_spp)
+                else:
+                    self.cycles.render(file=self.blend, out=path + ".part.exr", seed=seed, spp=self.o.reference_spp)
                 os.replace(path + ".part.exr", path)
         return paths
 
     def measure(self, name, **request):
-        """Keeps the seconds and visible errors of one way of rendering."""
+        """Keeps the seconds and visible errors of one way of rendering; without a request by lull-render."""
         if name in self.ways or (self.o.ways and name not in self.o.ways):
             return
         out, report = self.stem + ".exr", self.stem + ".report.json"
-        spent = self.cycles.render(file=self.blend, out=out, seed=1, **request)
-        first, second = self.references()
+        if request:
+            spent = self.cycles.render(file=self.blend, out=out, seed=1, **request)
+        else:
+            spent = self.ours(out, 1, "--denoise", "--spp-max", MOST, "--report", report)
+        first, second = self.references(ours=not request)
         seen = json.loads(tool.ggn("visible", first, out, "--second", second, "--block", self.o.block, "--json"))
         self.ways[name] = {**spent, "errors": [b["error"] for b in seen["blocks"]]}
-        if "host" in request:
+        if "host" in request or not request:
             told = tool.load(report)
-            self.ways[name].update(phases=told["phases"], blocks=[[b["spp"], b["reason"]] for b in told["blocks"]])
+            self.ways[name].update(phases=told.get("phases"), blocks=[[b["spp"], b["reason"]] for b in told["blocks"]])
         tool.save(self.ways, self.kept, indent=None)
         off = sum(e > peers.VISIBLE for e in self.ways[name]["errors"])
         print("%s, %s: %.1f processor s, %.1f s, worst block %.2f, %d of %d visibly off" % (
@@ -75,6 +85,7 @@ class Scene:
         self.measure("adaptive", spp=MOST, threshold=THRESHOLD, denoise=True)
         for e in ERRORS:
             self.host("error %d" % e, "--error", str(e))
+        self.measure("ours")
         if self.o.ways:
             return
         wall = self.ways[TIMED]["wall_s"]
@@ -86,7 +97,8 @@ class Scene:
 
 NAMES = {**{"%d samples" % n: "Cycles, %d samples" % n for n in SAMPLES}, "adaptive": "Cycles, adaptive to %g" % THRESHOLD,
          **{"error %d" % e: "`--error %d`" % e for e in ERRORS}, "adaptive, timed": "Cycles, adaptive, in the time of " + TIMED,
-         "timed": "`--time-budget`, the same time"}
+         "timed": "`--time-budget`, the same time", "ours": "`lull-render --denoise`"}
+JUDGED = ["error %d" % e for e in ERRORS] + ["ours"]  # by blocks
 
 
 def as_good(ways, name):
@@ -113,14 +125,14 @@ def scenes_table(scenes):
     rows = []
     for scene, ways in scenes.items():
         row = [scene]
-        for e in ERRORS:
-            w, (seconds, where) = ways["error %d" % e], as_good(ways, "error %d" % e)
+        for name in JUDGED:
+            w, (seconds, where) = ways[name], as_good(ways, name)
             sign = {"<": "≥ ", ">": "≈ "}.get(where, "")
             row += ["%.0f" % (sum(n for n, _ in w["blocks"]) / len(w["blocks"])), "%.1f" % w["s"], "%.2f" % max(w["errors"]),
                     "%s%.2f" % (sign, w["s"] / seconds)]
         rows.append(row)
-    return tables.table(["scene"] + [head % e for e in ERRORS for head in
-                                     ("%d: samples", "%d: s", "%d: worst block", "%d: of Cycles' seconds for it")], rows)
+    return tables.table(["scene"] + [head % name.replace("error ", "") for name in JUDGED for head in
+                                     ("%s: samples", "%s: s", "%s: worst block", "%s: of Cycles' seconds for it")], rows)
 
 
 def phases_table(scenes):

@@ -81,13 +81,12 @@ class Cycles:
             self.process.wait()
 
 
-def ours_seconds(pbrt, o, seed, out, *words):
-    """Processor seconds of lull-render as a whole, its denoiser's included."""
+def ours(pbrt, size, block, seed, out, *words):
+    """Renders with lull-render: its processor seconds, its denoiser's included, and those of the clock, as Cycles.render gives them."""
     before = os.times()
-    tool.run(tool.RENDER, "-q", pbrt, "--size", "%dx%d" % (o.size, o.size), "--block", o.block, "--filter", "box", "-t", 1, "--seed", seed,
-             "-o", out, *words)
+    tool.run(tool.RENDER, "-q", pbrt, "--size", size, "--block", block, "--filter", "box", "--seed", seed, "-o", out, *words)
     after = os.times()
-    return after.children_user + after.children_system - before.children_user - before.children_system
+    return {"s": after.children_user + after.children_system - before.children_user - before.children_system, "wall_s": after.elapsed - before.elapsed}
 
 
 class Scene:
@@ -111,11 +110,14 @@ class Scene:
             if not os.path.exists(path):
                 made = path[:-4] + ".part.exr"
                 if renderer == "ours":
-                    ours_seconds(self.pbrt, self.o, seed, made, "--spp", self.o.reference_spp)
+                    self.render(seed, made, "--spp", self.o.reference_spp)
                 else:
                     self.cycles.render(file=self.blend, out=made, seed=seed, spp=self.o.reference_spp)
                 os.replace(made, path)
         return paths
+
+    def render(self, seed, out, *words):
+        return ours(self.pbrt, "%dx%d" % (self.o.size, self.o.size), self.o.block, seed, out, "-t", 1, *words)["s"]
 
     def agree(self):
         """Whether the renderers' references do in every cell; how much they differ is kept."""
@@ -147,7 +149,7 @@ class Scene:
         return max(self.found["ways"]["%d %s" % (seed, name)]["errors"])
 
     def ours(self, seed, name, *words):
-        return self.way(seed, name, "ours", lambda out: ours_seconds(self.pbrt, self.o, seed, out, *words))
+        return self.way(seed, name, "ours", lambda out: self.render(seed, out, *words))
 
     def cycles_way(self, seed, name, **request):
         return self.way(seed, name, "cycles", lambda out: self.cycles.render(file=self.blend, out=out, seed=seed, **request)["s"])
