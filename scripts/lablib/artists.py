@@ -11,7 +11,7 @@ import statistics
 
 from lablib import peers, tables, tool
 
-SCENES = "cornell-box soft-shadow chess plaza".split()
+SCENES = "cornell-box soft-shadow chess plaza fruit-bowl glossy".split()
 SAMPLES, ERRORS, MOST, THRESHOLD = (64, 128, 256), (1, 2, 3), 4096, 0.01
 TIMED = "%d samples" % SAMPLES[1]  # whose seconds the ways with a limit of time get
 PHASES = ("samples", "synchronisation", "copies", "looks", "denoising")
