@@ -1,5 +1,6 @@
 /* Colours and indices of refraction from parameters: rgb, xyz, spectra by list, name or file, black bodies. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -7,9 +8,40 @@
 #include "pbrt/number.h"
 #include "pbrt/spectra.h"
 
+static int by_wavelength(const void *a, const void *b)
+{
+    const double *x = a, *y = b;
+    const int k = x[0] == y[0]; /* then by value */
+    return (x[k] > y[k]) - (x[k] < y[k]);
+}
+
+/* A spectrum of pairs: where its wavelengths do not rise, pbrt-v3 sorts them and v4 refuses it. `file` is "" or names the
+ * file that they are from, with ": " behind it. */
+static int read_pairs(struct pt_builder *b, const struct pt_param *param, const char *file, const double *pairs,
+                      size_t count, int extend, struct pt_spd *out)
+{
+    size_t i = 1;
+    while (i < count && (pairs[2 * i] > pairs[2 * i - 2] || (b->is_v3 && pairs[2 * i] == pairs[2 * i - 2])))
+        i++;
+    if (i < count && !b->is_v3)
+        return pt_diag_fail(&b->diag, param->loc, "%swavelength %g after %g (expected rising ones)", file, pairs[2 * i],
+                            pairs[2 * i - 2]);
+    double *sorted = i < count ? malloc(2 * count * sizeof *sorted) : NULL;
+    if (i < count && !sorted)
+        return pt_diag_nomem(&b->diag, "spectrum");
+    if (sorted) {
+        memcpy(sorted, pairs, 2 * count * sizeof *sorted);
+        qsort(sorted, count, 2 * sizeof *sorted, by_wavelength);
+    }
+    pt_spd_from_pairs(sorted ? sorted : pairs, count, extend, out);
+    free(sorted);
+    return 0;
+}
+
 /* Pairs of a .spd file: numbers separated by blanks, # to the end of the line is a comment. The text may begin with a mark
  * (U+FEFF), and its lines end in LF, CR LF or CR, as those of scenes. */
-static int read_spd_file(struct pt_builder *b, const struct pt_param *param, const char *name, struct pt_spd *out)
+static int read_spd_file(struct pt_builder *b, const struct pt_param *param, const char *name, int extend,
+                         struct pt_spd *out)
 {
     char path[2048];
     char *bytes = NULL;
@@ -41,8 +73,10 @@ static int read_spd_file(struct pt_builder *b, const struct pt_param *param, con
     }
     if (!b->diag.rc && (n < 2 || n % 2 != 0))
         pt_diag_fail(&b->diag, param->loc, "%s: %zu numbers (expected pairs of wavelength and value)", path, n);
+    char file[sizeof path + 2];
+    snprintf(file, sizeof file, "%s: ", path);
     if (!b->diag.rc)
-        pt_spd_from_pairs(numbers, n / 2, 1, out);
+        read_pairs(b, param, file, numbers, n / 2, extend, out);
     free(numbers);
     free(bytes);
     return b->diag.rc;
@@ -70,7 +104,7 @@ static int read_spectrum(struct pt_builder *b, struct pt_params *p, struct pt_pa
         const char *name = pt_params_string_at(p, param, 0);
         if (param->count != 1)
             return pt_diag_fail(&b->diag, param->loc, "spectrum has %zu names (expected 1)", param->count);
-        return pt_spd_named(name, out) ? 0 : read_spd_file(b, param, name, out);
+        return pt_spd_named(name, out) ? 0 : read_spd_file(b, param, name, extend, out);
     }
     if (param->count == 1) { /* pbrt-v4: a constant */
         pt_spd_constant(v[0], out);
@@ -79,11 +113,7 @@ static int read_spectrum(struct pt_builder *b, struct pt_params *p, struct pt_pa
     if (param->count == 0 || param->count % 2 != 0)
         return pt_diag_fail(&b->diag, param->loc, "spectrum has %zu numbers (expected pairs of wavelength and value)",
                             param->count);
-    for (size_t i = 2; i < param->count; i += 2)
-        if (!(v[i] > v[i - 2]))
-            return pt_diag_fail(&b->diag, param->loc, "wavelength %g after %g (expected rising ones)", v[i], v[i - 2]);
-    pt_spd_from_pairs(v, param->count / 2, extend, out);
-    return 0;
+    return read_pairs(b, param, "", v, param->count / 2, extend, out);
 }
 
 static pt_vec3 light_colour(struct pt_builder *b, const struct pt_param *param, const struct pt_spd *spd)

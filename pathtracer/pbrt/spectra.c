@@ -55,23 +55,51 @@ void pt_spd_constant(double value, struct pt_spd *out)
         out->v[i] = value;
 }
 
-void pt_spd_from_pairs(const double *pairs, size_t count, int extend, struct pt_spd *out)
+/* The lines through the pairs, and the end values beyond them. */
+static double line_at(const double *pairs, size_t count, double nm)
 {
     size_t k = 0;
-    for (int i = 0; i < PT_SPD_COUNT; i++) {
-        double nm = PT_SPD_FIRST_NM + i * PT_SPD_STEP_NM;
-        while (k + 1 < count && pairs[2 * (k + 1)] <= nm)
-            k++;
-        double nm0 = pairs[2 * k], v0 = pairs[2 * k + 1];
-        if (nm < nm0) {
-            out->v[i] = extend ? v0 : 0;
-        } else if (k + 1 >= count) {
-            out->v[i] = extend || nm <= nm0 ? v0 : 0;
-        } else {
-            double nm1 = pairs[2 * k + 2], v1 = pairs[2 * k + 3];
-            out->v[i] = nm1 > nm0 ? v0 + (v1 - v0) * (nm - nm0) / (nm1 - nm0) : v0;
-        }
+    while (k + 1 < count && pairs[2 * (k + 1)] <= nm)
+        k++;
+    double nm0 = pairs[2 * k], v0 = pairs[2 * k + 1];
+    if (nm < nm0 || k + 1 >= count)
+        return v0;
+    double nm1 = pairs[2 * k + 2], v1 = pairs[2 * k + 3];
+    return v0 + (v1 - v0) * (nm - nm0) / (nm1 - nm0);
+}
+
+/* Their mean over the step around nm. */
+static double mean_around(const double *pairs, size_t count, int extend, double nm)
+{
+    double from = nm - 0.5 * PT_SPD_STEP_NM, to = nm + 0.5 * PT_SPD_STEP_NM, sum = 0;
+    if (!extend) {
+        from = fmax(from, pairs[0]);
+        to = fmin(to, pairs[2 * count - 2]);
     }
+    if (!(from < to))
+        return 0;
+    double at = from, v = line_at(pairs, count, from);
+    for (size_t i = 0; i < count && pairs[2 * i] < to; i++) {
+        if (pairs[2 * i] <= from)
+            continue;
+        sum += 0.5 * (v + pairs[2 * i + 1]) * (pairs[2 * i] - at);
+        at = pairs[2 * i];
+        v = pairs[2 * i + 1];
+    }
+    return (sum + 0.5 * (v + line_at(pairs, count, to)) * (to - at)) / PT_SPD_STEP_NM;
+}
+
+void pt_spd_from_pairs(const double *pairs, size_t count, int extend, struct pt_spd *out)
+{
+    for (int i = 0; i < PT_SPD_COUNT; i++)
+        out->v[i] = mean_around(pairs, count, extend, PT_SPD_FIRST_NM + i * PT_SPD_STEP_NM);
+}
+
+/* Of the tables here, which are smooth. */
+static void from_table(const double *pairs, size_t count, struct pt_spd *out)
+{
+    for (int i = 0; i < PT_SPD_COUNT; i++)
+        out->v[i] = line_at(pairs, count, PT_SPD_FIRST_NM + i * PT_SPD_STEP_NM);
 }
 
 static double planck(double nm, double kelvin)
@@ -103,7 +131,7 @@ static int noble_metal(const char *metal, int is_k, struct pt_spd *out)
         pairs[2 * i] = 1239.84198 / noble_metals[i].ev;
         pairs[2 * i + 1] = nk[is_k];
     }
-    pt_spd_from_pairs(pairs, NOBLE_COUNT, 1, out);
+    from_table(pairs, NOBLE_COUNT, out);
     return 1;
 }
 
@@ -135,11 +163,11 @@ int pt_spd_named(const char *name, struct pt_spd *out)
     if (noble_metal(metal, is_k, out))
         return 1;
     if (strcmp(metal, "Al") == 0) {
-        pt_spd_from_pairs(is_k ? al_k : al_eta, sizeof al_k / sizeof al_k[0] / 2, 1, out);
+        from_table(is_k ? al_k : al_eta, sizeof al_k / sizeof al_k[0] / 2, out);
         return 1;
     }
     if (strcmp(metal, "CuZn") == 0) {
-        pt_spd_from_pairs(is_k ? cuzn_k : cuzn_eta, sizeof cuzn_k / sizeof cuzn_k[0] / 2, 1, out);
+        from_table(is_k ? cuzn_k : cuzn_eta, sizeof cuzn_k / sizeof cuzn_k[0] / 2, out);
         return 1;
     }
     if (strcmp(metal, "MgO") == 0 || strcmp(metal, "TiO2") == 0) {

@@ -10,13 +10,13 @@
 
 enum { PT_SPD_COUNT = 81, PT_SPD_FIRST_NM = 380, PT_SPD_STEP_NM = 5 };
 
-/* A spectrum sampled every 5 nm from 380 to 780 nm. */
+/* A spectrum, its means over steps of 5 nm around 380, 385 … 780 nm. */
 struct pt_spd {
     double v[PT_SPD_COUNT];
 };
 
 /* Linear interpolation between (wavelength nm, value) pairs, sorted by wavelength; beyond the ends 0, or the end value when
- * `extend`. count >= 1 pairs. */
+ * `extend`. count >= 1 pairs. However narrow a line is, its light counts. */
 void pt_spd_from_pairs(const double *pairs, size_t count, int extend, struct pt_spd *out);
 void pt_spd_constant(double value, struct pt_spd *out);
 /* Planck's law, scaled so that its largest value over all wavelengths is 1. Kelvin > 0. */

@@ -37,6 +37,23 @@ refused 's.spd:3: "x" (expected a number)' cr.pbrt -q --spp 1 -o x.exr
 refused 'cr.pbrt:7:20: ' cr.pbrt -q --spp 1 -o x.exr
 refused 'crlf.pbrt:7:20: ' crlf.pbrt -q --spp 1 -o x.exr
 
+# A file says what a list of the same pairs says: in v4 nothing beyond its ends, in v3 its end values. v3 sorts both, v4 refuses them.
+line='531 0 532 8 533 0' back='533 0 531 0 532 8' edge='500 2 560 2'
+lamp() { # film, where the pairs come from
+	printf 'Film "%s" "integer xresolution" 4 "integer yresolution" 4\nCamera "orthographic"\nWorldBegin\n' "$1"
+	printf 'LightSource "infinite" "spectrum L" %s\nTranslate 0 0 5 Shape "disk" "float radius" 9\n' "$2"
+}
+listed() { lamp "$1" "[ $2 ]" >list.pbrt; lamp "$1" '"s.spd"' >file.pbrt; echo "$3" >s.spd; }
+as_listed() { listed "$@" && picture list list.exr && picture file file.exr && cmp list.exr file.exr; }
+t "a line of two nanometres: from a file as from a list" as_listed rgb "$line" "$line"
+t "what ends within the light that is seen" as_listed rgb "$edge" "$edge"
+t "the same in version 3" as_listed image "$edge" "$edge"
+t "a line in version 3" as_listed image "$line" "$line"
+t "sorted in version 3" as_listed image "$line" "$back"
+t "a list, too" as_listed image "$back" "$line"
+listed rgb "$line" "$back"
+refused 's.spd: wavelength 531 after 533 (expected rising ones)' file.pbrt -q --spp 1 -o x.exr
+
 { printf '\377\376'; sed 's/./&\x00/g; s/$/\r\x00/' lf.pbrt; } >u16.pbrt
 refused 'u16.pbrt:1:1: the text is UTF-16 (expected UTF-8)' u16.pbrt -q --spp 1 -o x.exr
 { printf '\376\377'; sed 's/./\x00&/g' lf.pbrt; } >u16.part

@@ -109,12 +109,32 @@ static void lists(void **state)
     const double pairs[] = {400, 1, 500, 3};
     struct pt_spd spd;
     pt_spd_from_pairs(pairs, 2, 0, &spd);
-    assert_true(spd.v[0] == 0 && spd.v[4] == 1 && spd.v[14] == 2 && spd.v[24] == 3 && spd.v[25] == 0);
+    assert_true(spd.v[0] == 0 && spd.v[3] == 0 && fabs(spd.v[14] - 2) < 1e-12 && spd.v[25] == 0);
+    assert_true(fabs(spd.v[4] - 0.5 * 1.025) < 1e-12 && fabs(spd.v[24] - 0.5 * 2.975) < 1e-12); /* half of their steps */
     pt_spd_from_pairs(pairs, 2, 1, &spd);
     assert_true(spd.v[0] == 1 && spd.v[PT_SPD_COUNT - 1] == 3);
     const double one[] = {550, 7};
     pt_spd_from_pairs(one, 1, 1, &spd);
     assert_true(spd.v[0] == 7 && spd.v[80] == 7);
+}
+
+/* A laser, a discharge lamp: what lies between the steps of a spectrum counts by its area. */
+static void narrow_lines_keep_their_light(void **state)
+{
+    (void)state;
+    for (double nm = 500; nm < 505; nm += 0.37)
+        for (double width = 0.01; width < 30; width *= 2) {
+            const double line[] = {nm - width, 0, nm, 7, nm + width, 0};
+            struct pt_spd spd;
+            double area = 0, moment = 0;
+            pt_spd_from_pairs(line, 3, 0, &spd);
+            for (int i = 0; i < PT_SPD_COUNT; i++) {
+                area += spd.v[i] * PT_SPD_STEP_NM;
+                moment += spd.v[i] * PT_SPD_STEP_NM * (PT_SPD_FIRST_NM + i * PT_SPD_STEP_NM);
+            }
+            assert_true(fabs(area - 7 * width) < 1e-9);
+            assert_true(fabs(moment / area - nm) < 0.5 * PT_SPD_STEP_NM); /* it is where it was, to a step */
+        }
 }
 
 static void colour_spaces(void **state)
@@ -137,6 +157,7 @@ int main(void)
                                        cmocka_unit_test(black_bodies),
                                        cmocka_unit_test(metals),
                                        cmocka_unit_test(lists),
+                                       cmocka_unit_test(narrow_lines_keep_their_light),
                                        cmocka_unit_test(what_absorbs_nothing),
                                        cmocka_unit_test(colour_spaces)};
     return cmocka_run_group_tests(tests, NULL, NULL);
