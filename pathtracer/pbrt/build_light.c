@@ -85,6 +85,7 @@ static void make_spot(struct context *c)
     read_direction(c);
     c->light->cos_total = (float)cos_total;
     c->light->cos_start = (float)cos_start;
+    c->light->is_quartic = c->b->is_v3;
     pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
 }
 

@@ -1,4 +1,4 @@
-/* Lights of no size: point, spot (smoothstep between the cones, as in pbrt), distant. */
+/* Lights of no size: point, spot (between the cones as in pbrt-v4 or v3), distant. */
 #ifndef PT_SHADE_LIGHT_POINT_H
 #define PT_SHADE_LIGHT_POINT_H
 
@@ -27,7 +27,7 @@ static inline int pt_light_delta_sample(const struct pt_light *light, float pmf,
         float t = fminf(1.0f, fmaxf(0.0f, (c - light->cos_total) / (light->cos_start - light->cos_total)));
         if (!(c > light->cos_total))
             return 0;
-        out->radiance = v3_scale(out->radiance, t * t * (3.0f - 2.0f * t));
+        out->radiance = v3_scale(out->radiance, t * t * (light->is_quartic ? t * t : 3.0f - 2.0f * t));
     }
     return 1;
 }

@@ -126,6 +126,12 @@ static void lights(void **state)
     near(s->lights[5].emission.x, 10 / (4 * 3.14159265 * 3.14159265), 1e-5); /* Φ / (π area) */
     assert_true(s->effects == (PT_FX_DELTA_LIGHT | PT_FX_ENVIRONMENT | PT_FX_MANY_LIGHTS | PT_FX_QUADRIC));
     pt_scene_destroy(s);
+    for (int v3 = 0; v3 < 2; v3++) { /* each has its own fall-off */
+        s = text_scene(v3 ? "Film \"image\" WorldBegin LightSource \"spot\"" : "WorldBegin LightSource \"spot\"", NULL,
+                       NULL);
+        assert_int_equal(s->lights[0].is_quartic, v3);
+        pt_scene_destroy(s);
+    }
     /* v3: [T scale], absolute */
     s = text_scene("Film \"image\" WorldBegin LightSource \"infinite\" \"blackbody L\" [ 5000 3 ] \"rgb scale\" [ 2 2 2 ]",
                    NULL, NULL);

@@ -520,6 +520,11 @@ static void delta_lights(void **state)
     float r = 2.0f * sqrtf(1.0f - 0.85f * 0.85f) / 0.85f; /* half way between the cones: smoothstep is 1/2 */
     assert_int_equal(pt_light_delta_sample(&spot, 1.0f, v3(r, 0, 0), &s), 1);
     assert_true(fabsf(s.radiance.x - 0.5f * 8.0f / (4.0f + r * r)) < 1e-4f);
+    spot.is_quartic = 1; /* and (1/2)⁴ in pbrt-v3 */
+    assert_int_equal(pt_light_delta_sample(&spot, 1.0f, v3(r, 0, 0), &s), 1);
+    assert_true(fabsf(s.radiance.x - 0.0625f * 8.0f / (4.0f + r * r)) < 1e-4f);
+    assert_int_equal(pt_light_delta_sample(&spot, 1.0f, v3(0, 0, 0), &s), 1);
+    assert_true(fabsf(s.radiance.x - 2.0f) < 1e-6f);
     assert_int_equal(pt_light_delta_sample(&distant, 1.0f, v3(5, 6, 7), &s), 1);
     assert_true(!s.finite && s.wi.z == 1.0f && s.radiance.x == 3.0f);
 }
