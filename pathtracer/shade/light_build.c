@@ -226,7 +226,8 @@ static int bound_emitter(const struct pt_scene *scene, const struct pt_emitter *
         bound_quadric(shape, &scene->quadrics[shape->data], out);
     } else if (light->kind == PT_LIGHT_SPOT) {
         out->axis = light->direction;
-        out->normals_rad = acosf(light->cos_start);
+        /* light goes no further than a right angle off what counts as a normal */
+        out->normals_rad = fmaxf(acosf(light->cos_start), acosf(light->cos_total) - 0.5f * PT_PI);
         out->emission_rad = acosf(light->cos_total) - out->normals_rad + SPOT_SLACK;
     }
     /* power over all directions → what is sent one way */

@@ -161,6 +161,31 @@ static void lights_are_weighed(void **state)
     test_scene_end(&s);
 }
 
+/* Spots that fade over more than a right angle shine behind themselves, too. */
+static void wide_spots_shine_backwards(void **state)
+{
+    (void)state;
+    struct pt_scene s;
+    test_scene_begin(&s);
+    for (int i = 0; i < 3; i++) {
+        struct pt_light spot = {.kind = PT_LIGHT_SPOT,
+                                .shape = -1,
+                                .image = -1,
+                                .emission = {3, 2, 1},
+                                .direction = {0, 0, -1},
+                                .position = {(float)i, 0, 0},
+                                .cos_total = cosf(2.6f),
+                                .cos_start = 1.0f};
+        test_add_light(&s, &spot);
+    }
+    test_scene_finish(&s);
+    for (float a = 0; a < 2.55f; a += 0.05f) {
+        struct pt_receiver at = {{1000 * sinf(a), 0, -1000 * cosf(a)}, {0, 0, 0}, PT_RECEIVER_VOLUME};
+        check_support(&s, &at);
+    }
+    test_scene_end(&s);
+}
+
 /* Nine spots, side by side and down: outside of their cones the lamp far above is all that is left, at every level of the
  * hierarchy; inside they are selected. An area light sends as far as a quarter turn from its normal. */
 static void cones_end(void **state)
@@ -267,6 +292,7 @@ int main(void)
         cmocka_unit_test(frequencies_are_probabilities),
         cmocka_unit_test(nothing_that_arrives_is_cut_off),
         cmocka_unit_test(lights_are_weighed),
+        cmocka_unit_test(wide_spots_shine_backwards),
         cmocka_unit_test(cones_end),
         cmocka_unit_test(power_has_no_hierarchy),
     };
