@@ -7,8 +7,11 @@ static float beer(float sigma, float t) { return sigma > 0.0f ? expf(-sigma * t)
 
 static pt_vec3 beer_rgb(pt_vec3 sigma, float t) { return v3(beer(sigma.x, t), beer(sigma.y, t), beer(sigma.z, t)); }
 
-/* ∫ exp(-σ t) dt over [0, t] */
-static float optical_mean(float sigma, float t) { return sigma > 0.0f ? -expm1f(-sigma * t) / sigma : t; }
+/* ∫ emission exp(-σ t) dt over [0, t], however far: what emits absorbs. */
+static float glow(float emission, float sigma, float t)
+{
+    return emission > 0.0f ? emission * (sigma > 0.0f ? -expm1f(-sigma * t) / sigma : t) : 0.0f;
+}
 
 int pt_media_build(struct pt_scene *scene, struct base_err *err)
 {
@@ -32,8 +35,8 @@ static void homogeneous_sample(const struct pt_medium *m, float t_max, pt_vec3 t
     pt_vec3 sigma_t = v3_add(m->sigma_a, m->sigma_s);
     event->emitted = v3_splat(0.0f);
     if (!v3_is_black(m->emission))
-        event->emitted = v3(m->emission.x * optical_mean(sigma_t.x, t_max), m->emission.y * optical_mean(sigma_t.y, t_max),
-                            m->emission.z * optical_mean(sigma_t.z, t_max));
+        event->emitted = v3(glow(m->emission.x, sigma_t.x, t_max), glow(m->emission.y, sigma_t.y, t_max),
+                            glow(m->emission.z, sigma_t.z, t_max));
     event->scattered = 0;
     event->t = t_max;
     if (v3_is_black(m->sigma_s)) {

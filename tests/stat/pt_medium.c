@@ -36,6 +36,19 @@ static void absorption_is_beer_lambert(void **state)
     assert_true(tr.x == 0.0f && tr.y == 1.0f && tr.z == 0.0f);
 }
 
+/* Fog that glows and absorbs red, all the way to the horizon: as bright as what it emits for each unit of absorption. */
+static void unbounded_glow_is_finite(void **state)
+{
+    (void)state;
+    struct pt_medium m = homogeneous(v3(0.5f, 0.0f, 0.0f), v3_splat(0.0f));
+    m.emission = v3(0.5f * 3.0f, 0.0f, 0.0f);
+    struct pt_rng rng = pt_rng_make(SEED);
+    struct pt_medium_event e;
+    pt_medium_sample_distance(&m, v3_splat(0.0f), v3(0, 0, 1), INFINITY, v3_splat(1.0f), &rng, &e);
+    assert_true(fabsf(e.emitted.x - 3.0f) < 1e-6f && e.emitted.y == 0.0f && e.emitted.z == 0.0f);
+    assert_true(e.weight.x == 0.0f && e.weight.y == 1.0f);
+}
+
 /* What the path carries so far: it decides which colour is followed, and the means are the same. */
 static pt_vec3 throughput = {1, 1, 1};
 
@@ -246,9 +259,13 @@ static void rays_that_miss_the_grid_pass(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(absorption_is_beer_lambert),       cmocka_unit_test(homogeneous_sampling_is_unbiased),
-        cmocka_unit_test(constant_grid_equals_homogeneous), cmocka_unit_test(tracking_through_a_varying_grid_is_unbiased),
-        cmocka_unit_test(majorant_bounds_the_density),      cmocka_unit_test(rays_that_miss_the_grid_pass),
+        cmocka_unit_test(absorption_is_beer_lambert),
+        cmocka_unit_test(unbounded_glow_is_finite),
+        cmocka_unit_test(homogeneous_sampling_is_unbiased),
+        cmocka_unit_test(constant_grid_equals_homogeneous),
+        cmocka_unit_test(tracking_through_a_varying_grid_is_unbiased),
+        cmocka_unit_test(majorant_bounds_the_density),
+        cmocka_unit_test(rays_that_miss_the_grid_pass),
         cmocka_unit_test(nothing_is_lost_or_won),
     };
     print_message("seed %d\n", SEED);
