@@ -331,6 +331,32 @@ static void media(void **state)
     pt_scene_destroy(s);
 }
 
+/* Figures of both tables that pbrt has, with their case and blanks; what is in neither is milk, and said. */
+static void presets_of_media(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        int warnings;
+        double absorbed_red, scattered_blue;
+    } cases[] = {{"Skin1", 0, 0.032, 1.01},
+                 {"Espresso", 0, 4.7984, 1.0247},
+                 {"Head & Shoulders Shampoo", 0, 0.084621, 0.034306},
+                 {"Pacific Ocean Surface Water", 0, 0.031845, 0.00019617},
+                 {"espresso", 1, 0.0011, 3.77}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[200];
+        int warnings = 0;
+        snprintf(text, sizeof text,
+                 "WorldBegin MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"string preset\" \"%s\"", cases[i].name);
+        struct pt_scene *s = text_scene(text, NULL, &warnings);
+        assert_int_equal(warnings, cases[i].warnings);
+        near(s->media[0].sigma_a.x, cases[i].absorbed_red, 1e-6);
+        near(s->media[0].sigma_s.z, cases[i].scattered_blue, 1e-6);
+        pt_scene_destroy(s);
+    }
+}
+
 /* A grid medium has one place, where it was made: that it does not follow an object is said once, and refused by --strict. */
 static void grids_that_stay(void **state)
 {
@@ -674,6 +700,7 @@ int main(void)
                                        cmocka_unit_test(patches_of_two_triangles),
                                        cmocka_unit_test(trapezoid),
                                        cmocka_unit_test(tubes),
+                                       cmocka_unit_test(presets_of_media),
                                        cmocka_unit_test(grids_that_stay),
                                        cmocka_unit_test(glow_of_grids),
                                        cmocka_unit_test(spheres_of_any_limits),
