@@ -357,6 +357,32 @@ static void presets_of_media(void **state)
     }
 }
 
+/* A grid that is denser than steps of a ray can be is as dense as they allow, and says so. */
+static void grids_of_any_density(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *more;
+        int warnings;
+        double sigma; /* of a box of 3 x 4 x 12, whose diagonal is 13, and a density of 2 at most */
+    } cases[] = {{"\"float scale\" 1000", 0, 2000}, {"\"float scale\" 1e9", 1, 1e5 / (2 * 13)}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[600];
+        int warnings = 0;
+        snprintf(text, sizeof text,
+                 "Camera \"perspective\" WorldBegin Rotate 30 1 2 3 MakeNamedMedium \"m\" \"string type\" \"uniformgrid\" "
+                 "\"integer nx\" 2 \"float density\" [ 2 0 ] \"point3 p1\" [ 3 4 12 ] \"rgb Le\" [ 1 1 1 ] %s "
+                 "MediumInterface \"m\" \"\" Shape \"sphere\"",
+                 cases[i].more);
+        struct pt_scene *s = text_scene(text, NULL, &warnings);
+        const struct pt_medium *m = &s->media[0];
+        assert_int_equal(warnings, cases[i].warnings);
+        near(m->sigma_a.x + m->sigma_s.x, cases[i].sigma, 1e-4 * cases[i].sigma);
+        assert_true(m->emission.x == m->sigma_a.x); /* as hot as it was */
+        pt_scene_destroy(s);
+    }
+}
+
 /* A grid medium has one place, where it was made: that it does not follow an object is said once, and refused by --strict. */
 static void grids_that_stay(void **state)
 {
@@ -701,6 +727,7 @@ int main(void)
                                        cmocka_unit_test(trapezoid),
                                        cmocka_unit_test(tubes),
                                        cmocka_unit_test(presets_of_media),
+                                       cmocka_unit_test(grids_of_any_density),
                                        cmocka_unit_test(grids_that_stay),
                                        cmocka_unit_test(glow_of_grids),
                                        cmocka_unit_test(spheres_of_any_limits),
