@@ -326,6 +326,18 @@ static void make_bilerp(struct context *c, struct pt_texture *t)
     read_mapping(c, t);
 }
 
+/* pbrt-v4's filters: what is no single texel is bilinear here. */
+static int reads_nearest(struct context *c)
+{
+    static const char *const filters[] = {"point", "bilinear", "trilinear", "EWA", "ewa", NULL};
+    const char *name = pt_params_string(c->p, "filter", "bilinear");
+    int filter = base_word_index(filters, name, strlen(name));
+    if (filter < 0)
+        pt_diag_fail(&c->b->diag, pt_params_loc(c->p, "filter"),
+                     "unknown filter \"%.40s\" (expected point, bilinear, trilinear or ewa)", name);
+    return filter == 0;
+}
+
 static void make_imagemap(struct context *c, struct pt_texture *t)
 {
     static const char *const wraps[] = {"repeat", "black", "clamp", "octahedralsphere", NULL}; /* by enum pt_wrap */
@@ -342,11 +354,12 @@ static void make_imagemap(struct context *c, struct pt_texture *t)
     if (t->wrap < 0)
         pt_diag_fail(&c->b->diag, pt_params_find(p, "wrap")->loc, "unknown wrap \"%.40s\" (expected repeat, black or clamp)",
                      wrap);
+    t->is_nearest = reads_nearest(c);
     t->scale = (float)pt_params_float(p, "scale", 1);
     t->invert = pt_params_bool(p, "invert", 0);
     t->is_signed = c->is_float && !t->invert;
     read_mapping(c, t);
-    pt_params_ignore(p, "filter maxanisotropy trilinear");
+    pt_params_ignore(p, "maxanisotropy trilinear");
     struct pt_param *named = pt_params_find(p, "filename");
     t->image = -1;
     if (!c->b->diag.rc)

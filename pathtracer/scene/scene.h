@@ -72,7 +72,8 @@ struct pt_texture {
     int32_t kind;          /* enum pt_texture_kind */
     int32_t image;         /* id, IMAGE only */
     int32_t wrap;          /* enum pt_wrap, IMAGE only */
-    int32_t invert;        /* IMAGE only: 1 - value, before scale; never below 0 */
+    int32_t is_nearest;    /* IMAGE only: the nearest texel instead of the bilinear blend of four */
+    int32_t invert;        /* IMAGE only: 1 - value, after scale; never below 0 */
     int32_t is_signed;     /* IMAGE only, of floats that are not inverted (heights): else what is below 0 is 0 */
     int32_t channel;       /* IMAGE: PT_CHANNEL_… (shade/texture.h) */
     float scale;           /* IMAGE only */

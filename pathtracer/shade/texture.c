@@ -66,10 +66,19 @@ static inline pt_vec3 blend4(pt_vec3 a, pt_vec3 b, pt_vec3 c, pt_vec3 d, float d
     return v3_madd(v3_scale(top, 1.0f - dy), dy, bottom);
 }
 
+/* Beyond this, texel indices have no meaning left in float; also catches NaN. */
+static const float limit = 1e9f;
+
+static pt_vec3 nearest(const struct pt_image_map *image, int32_t wrap, int32_t channel, float s, float t)
+{
+    float x = floorf(s * (float)image->width), y = floorf(t * (float)image->height);
+    if (!(fabsf(x) < limit && fabsf(y) < limit))
+        x = y = 0.0f;
+    return pt_image_texel(image, wrap, channel, (int64_t)x, (int64_t)y);
+}
+
 pt_vec3 pt_image_bilinear(const struct pt_image_map *image, int32_t wrap, int32_t channel, float s, float t)
 {
-    /* Beyond this, texel indices have no meaning left in float; also catches NaN. */
-    const float limit = 1e9f;
     float fx = s * (float)image->width - 0.5f, fy = t * (float)image->height - 0.5f;
     if (!(fabsf(fx) < limit && fabsf(fy) < limit))
         fx = fy = 0.0f;
@@ -91,7 +100,10 @@ pt_vec3 pt_image_bilinear(const struct pt_image_map *image, int32_t wrap, int32_
 static pt_vec3 eval_image(const struct pt_scene *scene, const struct pt_texture *t, float s, float v)
 {
     /* Image rows run downwards, texture coordinates upwards. */
-    pt_vec3 value = v3_scale(pt_image_bilinear(&scene->images[t->image], t->wrap, t->channel, s, 1.0f - v), t->scale);
+    const struct pt_image_map *image = &scene->images[t->image];
+    pt_vec3 texels = t->is_nearest ? nearest(image, t->wrap, t->channel, s, 1.0f - v)
+                                   : pt_image_bilinear(image, t->wrap, t->channel, s, 1.0f - v);
+    pt_vec3 value = v3_scale(texels, t->scale);
     if (t->invert)
         value = v3_sub(v3_splat(1.0f), value);
     return t->is_signed ? value : v3_most(value, v3_splat(0.0f));

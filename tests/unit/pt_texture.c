@@ -98,6 +98,28 @@ static void kinds_of_texture(void **state)
     assert_true(near(pt_texture_eval(&scene, 7, 0.5f, 0.25f).x, 0.7f));
 }
 
+/* The filter "point" of pbrt-v4 blends nothing. */
+static void nearest_texels(void **state)
+{
+    (void)state;
+    struct pt_texture textures[] = {
+        {.kind = PT_TEXTURE_IMAGE, .wrap = PT_WRAP_REPEAT, .is_nearest = 1, .scale = 1, .su = 1, .sv = 1},
+        {.kind = PT_TEXTURE_IMAGE, .wrap = PT_WRAP_BLACK, .is_nearest = 1, .scale = 2, .su = 1, .sv = 1}};
+    struct pt_scene scene = {.images = images, .textures = textures, .image_count = 1, .texture_count = 2};
+    for (int y = 0; y < 2; y++)
+        for (int x = 0; x < 2; x++)
+            for (float in = 0.01f; in < 1.0f; in += 0.245f) {
+                float u = 0.5f * ((float)x + in), v = 1.0f - 0.5f * ((float)y + in);
+                pt_vec3 want = pt_image_texel(&images[0], PT_WRAP_CLAMP, 0, x, y);
+                assert_true(near3(pt_texture_eval(&scene, 1, u - 3.0f, v + 5.0f), want.x, want.y, want.z));
+                assert_true(near3(pt_texture_eval(&scene, 2, u, v), 2 * want.x, 2 * want.y, 2 * want.z));
+                assert_true(v3_is_black(pt_texture_eval(&scene, 2, u + 1.0f, v)));
+            }
+    const float odd[] = {NAN, INFINITY, -INFINITY, 1e30f, -3e9f};
+    for (int i = 0; i < 5; i++)
+        assert_true(v3_is_finite(pt_texture_eval(&scene, 1, odd[i], odd[i])));
+}
+
 /* Whatever reads coordinates reads them at (su u + du, sv v + dv), as the file says them. */
 static void scale_and_offset(void **state)
 {
@@ -155,6 +177,7 @@ int main(void)
         cmocka_unit_test(bytes_are_linearised),
         cmocka_unit_test(bilinear_interpolates_between_centres),
         cmocka_unit_test(kinds_of_texture),
+        cmocka_unit_test(nearest_texels),
         cmocka_unit_test(scale_and_offset),
         cmocka_unit_test(constants_never_enter_texture_code),
     };
