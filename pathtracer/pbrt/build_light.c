@@ -5,6 +5,7 @@
 #include "base/colour.h"
 #include "base/pi.h"
 #include "pbrt/build.h"
+#include "shade/texture.h"
 
 /* "L" or "I" with both kinds of scale (v4: float, v3: colour), as RGB. */
 static pt_vec3 scaled_colour(struct pt_builder *b, struct pt_params *p, const char *name)
@@ -276,6 +277,33 @@ int pt_build_light(struct pt_builder *b, struct pt_params *p)
     return b->diag.rc;
 }
 
+/* Mean colour of an image. */
+static pt_vec3 mean_of(const struct pt_image_map *map)
+{
+    double sum[3] = {0}, n = (double)map->width * map->height;
+    for (int32_t y = 0; y < map->height; y++)
+        for (int32_t x = 0; x < map->width; x++) {
+            pt_vec3 c = v3_most(pt_image_texel(map, PT_WRAP_CLAMP, PT_CHANNEL_RGB, x, y), v3_splat(0));
+            sum[0] += (double)c.x;
+            sum[1] += (double)c.y;
+            sum[2] += (double)c.z;
+        }
+    return v3((float)(sum[0] / n), (float)(sum[1] / n), (float)(sum[2] / n));
+}
+
+/* The lamp sends as much as with its image, but evenly; a "power" is that of both. */
+static void even_out(struct pt_builder *b, struct pt_params *p, struct pt_area_light *light)
+{
+    struct pt_loc loc = pt_params_loc(p, "filename");
+    pt_diag_warn(&b->diag, loc, "the image of an area light is replaced by even light");
+    int32_t id = pt_build_image_map(b, loc, pt_params_string(p, "filename", ""), NULL, PT_IMAGE_COLOUR);
+    if (id < 0)
+        return;
+    pt_vec3 mean = mean_of((struct pt_image_map *)b->images.items + id);
+    float y = v3_luminance(mean);
+    light->emission = v3_mul(light->emission, light->power > 0 && y > 0 ? v3_scale(mean, 1 / y) : mean);
+}
+
 int pt_build_area_light(struct pt_builder *b, struct pt_params *p, struct pt_area_light *out)
 {
     const char *kind = pt_params_kind(p);
@@ -285,10 +313,8 @@ int pt_build_area_light(struct pt_builder *b, struct pt_params *p, struct pt_are
     light.emission = scaled_colour(b, p, "L");
     light.two_sided = pt_params_bool(p, "twosided", 0);
     light.power = pt_params_float(p, "power", -1);
-    if (pt_params_find(p, "filename")) {
-        pt_diag_warn(&b->diag, pt_params_find(p, "filename")->loc, "the image of an area light is replaced by even light");
-        pt_params_ignore(p, "filename");
-    }
+    if (pt_params_find(p, "filename"))
+        even_out(b, p, &light);
     pt_params_ignore(p, "nsamples samples");
     pt_params_check_used(p);
     if (!b->diag.rc)

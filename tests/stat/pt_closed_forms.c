@@ -423,8 +423,8 @@ static double sky_at(const struct pt_image_map *map, double x, double y, double 
     return (double)((const float *)map->pixels)[3 * (row * map->width + column) + 1];
 }
 
-/* From a file: pictures are read from the disk only. */
-static struct pt_scene *stretched_sky_scene(struct pt_scene_defaults *defaults)
+/* From a file: pictures are read from the disk only. `format` has a %s for the folder of this tree. */
+static struct pt_scene *scene_of_file(const char *format, struct pt_scene_defaults *defaults)
 {
     char path[] = "/tmp/pt_closed_forms_XXXXXX", here[2048];
     int fd = mkstemp(path);
@@ -432,11 +432,7 @@ static struct pt_scene *stretched_sky_scene(struct pt_scene_defaults *defaults)
     struct base_err err = {0};
     struct pt_scene *scene = NULL;
     assert_true(file && getcwd(here, sizeof here));
-    fprintf(file,
-            HEAD(BOX, "") "AttributeBegin ConcatTransform [ 1 0 0 0 0 1 0 0 0 1.5 3 0 0 0 0 1 ] LightSource \"infinite\" "
-                          "\"string filename\" \"%s/scenes/textures/evening.pfm\" AttributeEnd " WHITE QUAD
-                          "[ -9 -9 1 9 -9 1 9 9 1 -9 9 1 ]",
-            here);
+    fprintf(file, format, here);
     assert_int_equal(fclose(file), 0);
     int rc = pt_scene_load(path, NULL, &scene, defaults, &err);
     unlink(path);
@@ -451,7 +447,11 @@ static void stretched_sky(void **state)
     (void)state;
     enum { STEPS = 1000 };
     struct pt_scene_defaults defaults;
-    struct pt_scene *scene = stretched_sky_scene(&defaults);
+    struct pt_scene *scene = scene_of_file(
+        HEAD(BOX, "") "AttributeBegin ConcatTransform [ 1 0 0 0 0 1 0 0 0 1.5 3 0 0 0 0 1 ] LightSource \"infinite\" "
+                      "\"string filename\" \"%s/scenes/textures/evening.pfm\" AttributeEnd " WHITE QUAD
+                      "[ -9 -9 1 9 -9 1 9 9 1 -9 9 1 ]",
+        &defaults);
     double want = 0.0;
     for (int i = 0; i < STEPS; i++)
         for (int k = 0; k < STEPS; k++) { /* even over the disk that the floor sees */
@@ -463,6 +463,30 @@ static void stretched_sky(void **state)
     double got = pixel_mean(scene, &defaults.integrator, 3, 3);
     printf("# figure stretched sky: %.5f instead of %.5f\n", got, want);
     assert_true(fabs(got - want) < 0.01 * want); /* of 4096 points, half of them chosen by the image */
+    pt_scene_destroy(scene);
+}
+
+/* Of a lamp with an image, which is not followed, the light is that of all of it: its mean, and its "power". */
+static void lamps_with_images(void **state)
+{
+    (void)state;
+#define PICTURED(more) \
+    HEAD(BOX, "") \
+    "AreaLightSource \"diffuse\" \"float scale\" 3 \"string filename\" \"%s/scenes/textures/evening.pfm\" " more QUAD \
+    "[ -9 -9 1 9 -9 1 9 9 1 -9 9 1 ]"
+    struct pt_scene_defaults defaults;
+    struct pt_scene *scene = scene_of_file(PICTURED(""), &defaults);
+    const struct pt_image_map *map = &scene->images[0];
+    double mean[3] = {0};
+    for (int32_t i = 0; i < 3 * map->width * map->height; i++)
+        mean[i % 3] += 3 * (double)((const float *)map->pixels)[i] / map->width / map->height;
+    pt_vec3 light = scene->lights[0].emission;
+    assert_true(fabs((double)light.x / mean[0] - 1) < 1e-5 && fabs((double)light.z / mean[2] - 1) < 1e-5);
+    pt_scene_destroy(scene);
+    scene = scene_of_file(PICTURED("\"float power\" 50 "), &defaults);
+    pt_vec3 powered = scene->lights[0].emission;
+    assert_true(fabs((double)v3_luminance(powered) * BASE_PI * 18 * 18 / (3 * 50) - 1) < 1e-5);
+    assert_true(fabs((double)(powered.x / powered.z) / (mean[0] / mean[2]) - 1) < 1e-5);
     pt_scene_destroy(scene);
 }
 
@@ -518,6 +542,7 @@ int main(void)
         cmocka_unit_test(surfaces_at_one_place),
         cmocka_unit_test(sheared_instances),
         cmocka_unit_test(shadows_of_what_is_close_to_the_light),
+        cmocka_unit_test(lamps_with_images),
         cmocka_unit_test(floors_with_bent_normals_are_opaque),
         cmocka_unit_test(stretched_sky),
     };
