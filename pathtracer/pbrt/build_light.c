@@ -163,7 +163,8 @@ static int32_t float_rgb(struct pt_builder *b, int32_t id)
     return pt_list_add(b, &b->images, &map);
 }
 
-/* v4's "portal": the corners of a rectangle, in order around it, in the light's space. Any parallelogram will do here. */
+/* v4's "portal": the corners of a rectangle in the world, in order around it, however the light is turned. Any parallelogram
+ * will do here. */
 static void make_portal(struct context *c)
 {
     size_t n;
@@ -174,9 +175,10 @@ static void make_portal(struct context *c)
         return;
     pt_vec3 corner[4];
     float area = 0.0f, off = 0.0f;
+    struct context world = {.b = c->b, .ctm = pt_xform_identity()};
     if (n == 4) {
         for (size_t i = 0; i < 4; i++)
-            place(c, xyz + 3 * i, &corner[i]);
+            place(&world, xyz + 3 * i, &corner[i]);
         light->portal = corner[0];
         light->portal_u = v3_sub(corner[1], corner[0]);
         light->portal_v = v3_sub(corner[3], corner[0]);
