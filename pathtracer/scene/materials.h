@@ -51,6 +51,7 @@ struct pt_material {
     struct pt_input base_roughness_u, base_roughness_v; /* coated conductor: the metal */
     struct pt_input eta_rgb, k_rgb;                     /* conductor */
     struct pt_input thickness, g, albedo;               /* coatings */
+    struct pt_input max_depth;                          /* coatings: interactions in the layer, 0 = as many as by default */
     float eta;                                          /* dielectric interface, inside / outside */
     const float *coat_table; /* see pt_bsdf.coat_table; made by shade/, in the arena or static; NULL = none */
 };

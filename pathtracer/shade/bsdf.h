@@ -33,9 +33,10 @@ struct pt_bsdf {
     float base_alpha_x, base_alpha_y; /* coated conductor: roughness of the metal */
     float thickness, g;               /* coatings: thickness of the layer, Henyey–Greenstein asymmetry inside */
     pt_vec3 albedo;                   /* coatings: single-scattering albedo of the layer; black = clear */
+    int32_t more_events;              /* coatings: interactions in the layer beyond PT_LAYER_EVENTS */
     uint32_t walk_key;                /* coatings that are evaluated stochastically: any number, new for every path vertex */
-    const float *coat_table; /* borrows until scene release: table of the coating (coat_table.h), may be NULL but for coated
-                                 diffuse */
+    const float
+        *coat_table; /* borrows until scene release: table of the coating (coat_table.h); the walk does without, NULL */
 };
 
 enum {

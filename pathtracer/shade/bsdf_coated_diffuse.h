@@ -1,11 +1,11 @@
 /*
  * Diffuse base under a dielectric coating. A layer that scatters light is left to the walk (coat_walk.h); for a clear one,
  * because the base forgets directions, the layered solution factors exactly:
- *     f = f_interface + A(μo) A(μi) R S / (π η²),   S = Σ_{n<5} (R Fi)^n
+ *     f = f_interface + A(μo) A(μi) R S / (π η²),   S = Σ_{n<N} (R Fi)^n
  * with A(μ) the flux that reaches the base from direction cosine μ (refraction and the layer's extinction exp(-t/|cos|),
  * unit coefficient, on the way) and Fi the flux that the interface returns to the base from diffuse light below it. Rough
- * interfaces have A, Fi and the albedo of f_interface tabulated (coat_table.h); smooth ones need Fi only. Five base bounces
- * is what pbrt-v4's walk of depth 10 admits.
+ * interfaces have A, Fi and the albedo of f_interface tabulated (coat_table.h); smooth ones need Fi only. N = 5 base bounces
+ * is what pbrt-v4's walk of depth 10 admits. A textured thickness has no table: it is left to the walk, too.
  *
  * Known difference: pbrt-v4 weighs its two ways out of a rough interface by densities of different events (direction inside
  * given outside, and the reverse), which sum to more than 1 and brighten light at grazing incidence: 2 % at 25°, 9 % at 72°
@@ -48,6 +48,9 @@ static inline void pt_coat_split(const struct pt_bsdf *b, float mu, float *base,
     *base = cos_t > 0.0f ? (1.0f - r) * expf(-b->thickness / cos_t) : 0.0f;
 }
 
+/* Σ_{k<n} q^k, q in [0, 1] */
+static inline float pt_coat_sum(float q, int n) { return q < 1.0f ? (1.0f - powf(q, (float)n)) / (1.0f - q) : (float)n; }
+
 /* R S / (π η²) per channel */
 static inline pt_vec3 pt_coat_base_factor(const struct pt_bsdf *b)
 {
@@ -57,6 +60,9 @@ static inline pt_vec3 pt_coat_base_factor(const struct pt_bsdf *b)
     pt_vec3 one = v3_splat(1.0f), s = v3_add(one, v3_mul(q, v3_add(one, q)));
     pt_vec3 q3 = v3_mul(q, v3_mul(q, q));
     s = v3_add(s, v3_mul(q3, v3_add(one, q))); /* 1 + q + q² + q³ + q⁴ */
+    if (b->more_events)
+        s = v3(pt_coat_sum(q.x, pt_layer_bounces(b)), pt_coat_sum(q.y, pt_layer_bounces(b)),
+               pt_coat_sum(q.z, pt_layer_bounces(b)));
     return v3_scale(v3_mul(r, s), norm);
 }
 
@@ -128,9 +134,13 @@ static inline int pt_coat_clear_sample(pt_effects fx, const struct pt_bsdf *b, p
     return out->pdf_solid > 0.0f;
 }
 
+static inline int pt_coat_is_factored(const struct pt_bsdf *b) { return b->coat_table && v3_is_black(b->albedo); }
+
 static inline pt_vec3 pt_coated_diffuse_albedo(const struct pt_bsdf *b, pt_vec3 wo)
 {
-    float base, spec;
+    float base, spec = pt_fresnel_dielectric(fabsf(wo.z), b->eta);
+    if (!b->coat_table)
+        return v3_madd(v3_splat(spec), (1.0f - spec) * (1.0f - spec), b->reflectance);
     pt_coat_split(b, fabsf(wo.z), &base, &spec);
     return v3_madd(v3_splat(spec), 0.95f * PT_PI * base, pt_coat_base_factor(b));
 }
@@ -138,13 +148,13 @@ static inline pt_vec3 pt_coated_diffuse_albedo(const struct pt_bsdf *b, pt_vec3 
 static inline pt_vec3 pt_coated_diffuse_eval(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi,
                                              float *pdf_solid)
 {
-    return v3_is_black(b->albedo) ? pt_coat_clear_eval(fx, b, wo, wi, pdf_solid) : pt_coat_walk_eval(b, wo, wi, pdf_solid);
+    return pt_coat_is_factored(b) ? pt_coat_clear_eval(fx, b, wo, wi, pdf_solid) : pt_coat_walk_eval(b, wo, wi, pdf_solid);
 }
 
 static inline int pt_coated_diffuse_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0,
                                            float u1, struct pt_bsdf_sample *out)
 {
-    return v3_is_black(b->albedo) ? pt_coat_clear_sample(fx, b, wo, u_lobe, u0, u1, out)
+    return pt_coat_is_factored(b) ? pt_coat_clear_sample(fx, b, wo, u_lobe, u0, u1, out)
                                   : pt_coat_walk_sample(b, wo, u_lobe, u0, u1, out);
 }
 

@@ -1,7 +1,8 @@
 /*
  * Random walk between the interface of a coating and its base: the reference solution of the layered model (Guo, Hašan and
  * Zhao 2018, "Position-Free Monte Carlo Simulation for Arbitrary Layered BSDFs", in the form of pbrt-v4: unit extinction in
- * a layer of `thickness` mean free paths, at most PT_LAYER_EVENTS interactions). One call is one unbiased estimate.
+ * a layer of `thickness` mean free paths, at most PT_LAYER_EVENTS interactions if the scene does not say). One call is one
+ * unbiased estimate.
  *
  * The path tracer uses it where no factored solution exists (coated metals, coatings that scatter inside); tests use it as
  * the oracle of the others.
@@ -22,6 +23,9 @@ struct pt_layer_ray {
     float weight;    /* f |cos| / pdf */
     float pdf_solid; /* 0 for a delta */
 };
+
+/* How often light in a clear layer meets the base at most: every other time. */
+static inline int pt_layer_bounces(const struct pt_bsdf *b) { return (PT_LAYER_EVENTS + b->more_events) / 2; }
 
 /* Base of the layer as a closure of its own. */
 static inline struct pt_bsdf pt_layer_base(const struct pt_bsdf *b)
@@ -223,7 +227,7 @@ static inline pt_vec3 pt_layer_walk_eval(const struct pt_bsdf *b, pt_vec3 wo, pt
     int scatters = !v3_is_black(b->albedo);
     k.w = enter.wi;
     k.beta = v3_splat(enter.weight / (b->eta * b->eta));
-    for (int depth = 0; depth < PT_LAYER_EVENTS; depth++) {
+    for (int depth = 0; depth < PT_LAYER_EVENTS + b->more_events; depth++) {
         if (!pt_layer_survives(&k.beta, depth, rng) || k.w.z == 0.0f)
             break;
         if (scatters) {
@@ -286,7 +290,7 @@ static inline int pt_layer_walk_sample(const struct pt_bsdf *b, pt_vec3 wo, floa
         *weight = beta;
         return 1;
     }
-    for (int depth = 0; depth < PT_LAYER_EVENTS; depth++) {
+    for (int depth = 0; depth < PT_LAYER_EVENTS + b->more_events; depth++) {
         if (!pt_layer_survives(&beta, depth, rng) || w.z == 0.0f)
             return 0;
         if (scatters) {

@@ -18,7 +18,8 @@
 /* What both coated models read of the layer between interface and base. */
 #define PT_COAT_READS \
     PT_READ_INTO(thickness, NUMBER, "thickness", 0.01), PT_READ_INTO(g, NUMBER, "g", 0), \
-        PT_READ_INTO(albedo, COLOUR, "albedo", 0), PT_READ(IGNORED, "maxdepth nsamples", 0)
+        PT_READ_INTO(albedo, COLOUR, "albedo", 0), PT_READ_INTO(max_depth, NUMBER, "maxdepth", 0), \
+        PT_READ(IGNORED, "nsamples", 0)
 
 static inline void pt_coat_closure(pt_effects fx, const struct pt_scene *scene, const struct pt_material *m,
                                    const struct pt_surface *s, struct pt_bsdf *b)
@@ -29,6 +30,9 @@ static inline void pt_coat_closure(pt_effects fx, const struct pt_scene *scene, 
     b->g = pt_input_float(fx, scene, &m->g, s->u, s->v);
     b->albedo = pt_material_colour(fx, scene, &m->albedo, s);
     b->coat_table = m->coat_table;
+    b->more_events = 0;
+    if (m->max_depth.value.x > 0.0f) /* what meets the base leaves through the interface: even numbers */
+        b->more_events = 2 * (int32_t)ceilf(0.5f * fminf(m->max_depth.value.x, 1e3f)) - PT_LAYER_EVENTS;
     b->walk_key = 0; /* for the caller to set */
 }
 
@@ -112,7 +116,7 @@ __attribute__((noinline, unused)) static pt_vec3 pt_coat_walk_eval(const struct 
     return v3_scale(f, wi.z);
 }
 
-/* Reflectance of a smooth interface over smooth metal: F + T² Rc e² Σ_{n<5} (F Rc e²)^n with e the layer's transmittance. */
+/* Reflectance of a smooth interface over smooth metal: F + T² Rc e² Σ_{n<N} (F Rc e²)^n with e the layer's transmittance. */
 static inline pt_vec3 pt_coated_mirror(const struct pt_bsdf *b, float mu)
 {
     float cos_t, r = pt_fresnel_dielectric_t(mu, b->eta, &cos_t);
@@ -120,7 +124,7 @@ static inline pt_vec3 pt_coated_mirror(const struct pt_bsdf *b, float mu)
         return v3_splat(r);
     float e2 = expf(-2.0f * b->thickness / cos_t), t2 = (1.0f - r) * (1.0f - r);
     pt_vec3 once = v3_scale(pt_fresnel_conductor_rgb(cos_t, b->eta_rgb, b->k_rgb), e2), sum = v3_splat(0.0f), term = once;
-    for (int n = 0; n < PT_LAYER_EVENTS / 2; n++) {
+    for (int n = 0; n < pt_layer_bounces(b); n++) {
         sum = v3_add(sum, term);
         term = v3_scale(v3_mul(term, once), r);
     }

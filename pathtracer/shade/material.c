@@ -122,7 +122,7 @@ int pt_materials_build(struct pt_scene *scene, struct base_err *err)
         m->transmittance.value = pt_clamp_unit(m->transmittance.value);
         m->albedo.value = pt_clamp_unit(m->albedo.value);
         m->coat_table = NULL;
-        if (m->kind != PT_BSDF_COATED_DIFFUSE)
+        if (m->kind != PT_BSDF_COATED_DIFFUSE || m->thickness.texture)
             continue;
         struct coat_key key = coat_key(scene, m);
         m->coat_table = find_table(scene, i, &key);

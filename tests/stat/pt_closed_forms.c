@@ -528,6 +528,36 @@ static void floors_with_bent_normals_are_opaque(void **state)
     }
 }
 
+/* --- coats --------------------------------------------------------------------------------------------------------------- */
+
+/* Before a white sky: a coat whose thickness is a texture is as one whose thickness is that number, and a clear one over white, in
+ * which light may be reflected as often as it likes, loses nothing. */
+static void coats_by_texture_and_depth(void **state)
+{
+    (void)state;
+#define ONES "\"float v00\" 1 \"float v01\" 1 \"float v10\" 1 \"float v11\" 1 "
+#define COAT \
+    "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ] Texture \"one\" \"float\" \"bilerp\" " ONES \
+    "Material \"coateddiffuse\" \"rgb reflectance\" [ 1 1 1 ] "
+#define SHEET QUAD "[ -50 -50 5  50 -50 5  50 50 5  -50 50 5 ]"
+    static const char *const thick[2][2] = {
+        {HEAD(BOX, "") COAT "\"float roughness\" .3 \"float thickness\" 1 " SHEET,
+         HEAD(BOX, "") COAT "\"float roughness\" .3 \"texture thickness\" \"one\" " SHEET},
+        {HEAD(BOX, "") COAT "\"float thickness\" 1 " SHEET, HEAD(BOX, "") COAT "\"texture thickness\" \"one\" " SHEET}};
+    for (int i = 0; i < 2; i++) {
+        double mean[2];
+        for (int k = 0; k < 2; k++) {
+            struct pt_scene_defaults defaults;
+            struct pt_scene *scene = text_scene(thick[i][k], &defaults, NULL);
+            mean[k] = pixel_mean(scene, &defaults.integrator, 3, 3);
+            pt_scene_destroy(scene);
+        }
+        if (!(fabs(mean[0] - mean[1]) < CHANCE_ERROR))
+            fail_msg("thickness by number: %g, by texture: %g (%d)", mean[0], mean[1], i);
+    }
+    check_image(HEAD(BOX, "") COAT "\"float thickness\" 0 \"integer maxdepth\" 1000 " SHEET, white, CHANCE_ERROR);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -543,6 +573,7 @@ int main(void)
         cmocka_unit_test(sheared_instances),
         cmocka_unit_test(shadows_of_what_is_close_to_the_light),
         cmocka_unit_test(lamps_with_images),
+        cmocka_unit_test(coats_by_texture_and_depth),
         cmocka_unit_test(floors_with_bent_normals_are_opaque),
         cmocka_unit_test(stretched_sky),
     };

@@ -66,6 +66,26 @@ static double mean_f(struct pt_bsdf b, pt_vec3 wo, pt_vec3 wi, int keys, double 
     return sum / keys;
 }
 
+/* More or fewer interactions than by default: the sum of the base's reflections against the walk. */
+static void depth_of_the_layer(void **state)
+{
+    (void)state;
+    static const int events[] = {2, 4, 40};
+    double before = 0.0;
+    for (int i = 0; i < 3; i++) {
+        struct pt_bsdf b = bsdf_coated_diffuse(0.3f, 1.5f, 1.0f, 0.05f), walked;
+        b.more_events = events[i] - PT_LAYER_EVENTS;
+        walked = b;
+        walked.coat_table = NULL;
+        pt_vec3 wo = case_direction(0.8f), wi = v3_norm(v3(0.2f, 0.5f, 0.6f));
+        double e0, e1, c = mean_f(b, wo, wi, 1, &e0), f = mean_f(walked, wo, wi, 100000, &e1);
+        if (fabs(c - f) > 0.01 * c + 4.0 * e1)
+            fail_msg("%d events: factored %g, walk %g ± %g", events[i], c, f, e1);
+        assert_true(c > 1.1 * before);
+        before = c;
+    }
+}
+
 /* A layer with a faint scattering albedo is nearly a clear one: the two code paths meet. */
 static void clear_and_scattering_layers_meet(void **state)
 {
@@ -138,8 +158,11 @@ static void blended_rows_agree_with_single_ones(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(factored_coating_agrees_with_the_walk),     cmocka_unit_test(clear_and_scattering_layers_meet),
-        cmocka_unit_test(coated_metal_starts_from_its_first_bounce), cmocka_unit_test(coated_mirror_is_bounded),
+        cmocka_unit_test(factored_coating_agrees_with_the_walk),
+        cmocka_unit_test(depth_of_the_layer),
+        cmocka_unit_test(clear_and_scattering_layers_meet),
+        cmocka_unit_test(coated_metal_starts_from_its_first_bounce),
+        cmocka_unit_test(coated_mirror_is_bounded),
         cmocka_unit_test(blended_rows_agree_with_single_ones),
     };
     print_message("seed %d\n", SEED);
