@@ -55,6 +55,13 @@ static struct pt_input read_share(struct pt_making *c, const char *name, float f
     return pt_input_grey((double)v3_luminance(in.value));
 }
 
+/* What glass lets through is all but what it reflects. */
+static void say_clear(struct pt_making *c, struct pt_input kt)
+{
+    if (kt.texture || v3_luminance(kt.value) < 0.999f)
+        pt_diag_warn(&c->b->diag, pt_params_loc(c->p, "Kt"), "Kt of an uber material without Kd is taken as 1");
+}
+
 /* A sum of four lobes there. Here it is the one that stands alone, or else a coated diffuse surface. */
 static void make_uber(struct pt_making *c)
 {
@@ -69,6 +76,7 @@ static void make_uber(struct pt_making *c)
         c->info->has_opacity = c->info->opacity.texture || c->info->opacity.value.x < 1;
     }
     if (!is_black(kt) && is_black(kd)) {
+        say_clear(c, kt);
         c->m->kind = PT_BSDF_DIELECTRIC;
         c->m->roughness_u = c->m->roughness_v = pt_input_grey(0);
     } else if (!is_black(kr) && is_black(kd) && is_black(ks)) {

@@ -540,6 +540,21 @@ static void coloured_shares_are_said(void **state)
     }
 }
 
+/* So is the tint of an uber material that is glass here. */
+static void tinted_uber_glass_is_said(void **state)
+{
+    (void)state;
+    static const char *const tints[] = {"1 1 1", ".2 .9 .2"};
+    for (int i = 0; i < 2; i++) {
+        char text[200];
+        int warnings = 0;
+        snprintf(text, sizeof text, "Film \"image\" WorldBegin Material \"uber\" \"rgb Kd\" [ 0 0 0 ] \"rgb Kt\" [ %s ]",
+                 tints[i]);
+        pt_scene_destroy(text_scene(text, NULL, &warnings));
+        assert_int_equal(warnings, i);
+    }
+}
+
 static void warnings_come_once_and_strict_refuses(void **state)
 {
     (void)state;
@@ -720,6 +735,7 @@ int main(void)
                                        cmocka_unit_test(graphics_state),
                                        cmocka_unit_test(interface_lamps_are_dark),
                                        cmocka_unit_test(coloured_shares_are_said),
+                                       cmocka_unit_test(tinted_uber_glass_is_said),
                                        cmocka_unit_test(mixed_with_nothing),
                                        cmocka_unit_test(warnings_come_once_and_strict_refuses),
                                        cmocka_unit_test(tessellated),
