@@ -42,7 +42,7 @@ static void build_shutter(struct pt_builder *b)
 /* Of v4: as long as the shutter is open, unless the film says it, as early files did. */
 static double exposure_time(struct pt_builder *b, struct pt_params *film)
 {
-    if (b->is_v3 || pt_params_find(film, "exposuretime"))
+    if (pt_params_find(film, "exposuretime"))
         return pt_params_float_in(film, "exposuretime", 1, 0, 1e6);
     const double open_s = b->shutter[1] - b->shutter[0];
     if (!(open_s > 0 && open_s <= 1e6))
@@ -110,9 +110,9 @@ static void build_film(struct pt_builder *b)
                      d->height);
     set_crop(b, p, file_size);
     snprintf(d->film_path, sizeof d->film_path, "%s", pt_params_string(p, "filename", ""));
-    double exposure = exposure_time(b, p), iso = pt_params_float_in(p, "iso", 100, 0, 1e9);
-    double scale = pt_params_float_in(p, "scale", 1, 0, 1e12);
-    b->scene->radiance_scale = (float)(b->is_v3 ? scale : exposure * iso / 100);
+    double scale = b->is_v3 ? pt_params_float_in(p, "scale", 1, 0, 1e12)
+                            : exposure_time(b, p) * pt_params_float_in(p, "iso", 100, 0, 1e9) / 100;
+    b->scene->radiance_scale = (float)scale;
     const char *sensor = pt_params_string(p, "sensor", "cie1931");
     if (strcmp(sensor, "cie1931") != 0)
         pt_diag_warn(&b->diag, pt_params_find(p, "sensor")->loc, "sensor \"%s\" is rendered as an ideal one", sensor);
