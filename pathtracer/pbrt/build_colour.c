@@ -118,7 +118,8 @@ static int read_spectrum(struct pt_builder *b, struct pt_params *p, struct pt_pa
 
 static pt_vec3 light_colour(struct pt_builder *b, const struct pt_param *param, const struct pt_spd *spd)
 {
-    pt_vec3 rgb = pt_spd_emission_rgb(spd);
+    /* without the negative light of what is out of Rec.709 */
+    pt_vec3 rgb = v3_most(pt_spd_emission_rgb(spd), v3_splat(0));
     float y = v3_luminance(rgb);
     int v3_pair = param->type == PT_PARAM_BLACKBODY && param->count == 2;
     /* pbrt-v4 scales lights so that a spectrum of any strength emits luminance 1; "scale" then sets it. */

@@ -126,6 +126,13 @@ static void lights(void **state)
     near(s->lights[5].emission.x, 10 / (4 * 3.14159265 * 3.14159265), 1e-5); /* Φ / (π area) */
     assert_true(s->effects == (PT_FX_DELTA_LIGHT | PT_FX_ENVIRONMENT | PT_FX_MANY_LIGHTS | PT_FX_QUADRIC));
     pt_scene_destroy(s);
+    /* that of any spectrum, also of colours beyond Rec.709: a blue and a green laser */
+    s = world_scene("LightSource \"point\" \"spectrum I\" [ 454 0 455 1 456 0 ] LightSource \"point\" \"spectrum I\" [ 531 "
+                    "0 532 1 533 0 ] "
+                    "LightSource \"point\" \"blackbody I\" 1000");
+    for (int i = 0; i < 3; i++)
+        near(v3_luminance(s->lights[i].emission), 1, 1e-5);
+    pt_scene_destroy(s);
     for (int v3 = 0; v3 < 2; v3++) { /* each has its own fall-off */
         s = text_scene(v3 ? "Film \"image\" WorldBegin LightSource \"spot\"" : "WorldBegin LightSource \"spot\"", NULL,
                        NULL);
