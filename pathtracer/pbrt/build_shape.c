@@ -128,22 +128,26 @@ static int store_positions(const struct pt_soup *soup, const struct pt_xform *t,
     return 1;
 }
 
-/* What has no length, or a component that is no number, is no normal: zero. */
+static double largest(const double v[3]) { return fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2]))); }
+
+/* Normals keep the lengths that they are given with, which are their weights between the corners, as in pbrt; but not what
+ * the transform does to all of them alike, and none may leave float's range when its length is squared. What has no length,
+ * or a component that is no number, is no normal: zero. */
 static void store_normals(const struct pt_soup *soup, const struct pt_xform *inverse, int negate, struct pt_vertex *out)
 {
+    const double most = fmax(largest(inverse->m[0]), fmax(largest(inverse->m[1]), largest(inverse->m[2])));
     for (size_t i = 0; i < soup->vertex_count; i++) {
-        double n[3];
-        float o[3];
+        double n[3], o[3];
         for (size_t k = 0; k < 3; k++)
-            n[k] = value(soup->nd, soup->nf, 3 * i + k);
-        for (size_t k = 0; k < 3; k++) {
-            double v = inverse->m[0][k] * n[0] + inverse->m[1][k] * n[1] + inverse->m[2][k] * n[2];
-            o[k] = (float)(negate ? -v : v);
-        }
-        /* Scenes scaled by 1e±6 must not leave float's range when the length is squared. */
-        float big = fmaxf(fabsf(o[0]), fmaxf(fabsf(o[1]), fabsf(o[2])));
-        int some = big > 0 && isfinite(o[0]) && isfinite(o[1]) && isfinite(o[2]);
-        out[i].n = some ? v3(o[0] / big, o[1] / big, o[2] / big) : v3_splat(0);
+            n[k] = value(soup->nd, soup->nf, 3 * i + k) / most;
+        for (size_t k = 0; k < 3; k++)
+            o[k] = inverse->m[0][k] * n[0] + inverse->m[1][k] * n[1] + inverse->m[2][k] * n[2];
+        double size = largest(o), by = negate ? -1 : 1;
+        if (!(size > 0 && isfinite(o[0] + o[1] + o[2])))
+            by = 0;
+        else if (size < 1e-15 || size > 1e15)
+            by /= size;
+        out[i].n = by != 0 ? v3((float)(by * o[0]), (float)(by * o[1]), (float)(by * o[2])) : v3_splat(0);
     }
 }
 

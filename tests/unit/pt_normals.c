@@ -150,8 +150,41 @@ static void none_are_as_without(void **state)
         }
 }
 
+/* The octahedron's normals are its corners, so that between them, weighted by the lengths that they are given with, lies the
+ * hit point itself: however it is turned, and taken along as a normal where it is stretched. */
+static void lengths_are_weights(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *way;
+        float by[3];
+    } cases[] = {{"", {1, 1, 1}},
+                 {"Rotate 35 1 2 3", {1, 1, 1}},
+                 {"Rotate -70 3 -1 1 Scale 1e-6 1e-6 1e-6", {1, 1, 1}},
+                 {"Scale 1 2 5", {1, 4, 25}},
+                 {"Scale 1e6 2e6 -5e6 ReverseOrientation", {-1, -4, -25}}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct pt_scene *scene = scene_of(cases[i].way, &(struct normals){"", 0}, (int)i % 2);
+        struct pt_rng rng = pt_rng_make(1);
+        for (int k = 0; k < RAYS; k++) {
+            float u = pt_rng_float(&rng);
+            pt_vec3 d = pt_sample_sphere(u, pt_rng_float(&rng));
+            struct pt_ray ray = {v3_splat(0.0f), d, 0.0f, INFINITY, 0.0f};
+            struct pt_hit hit;
+            struct pt_place at;
+            assert_true(pt_accel_intersect(scene, &ray, &hit));
+            pt_place_at_hit(PT_FX_ALL, scene, &ray, &hit, &at);
+            pt_vec3 want = v3_norm(v3(d.x / cases[i].by[0], d.y / cases[i].by[1], d.z / cases[i].by[2]));
+            if (!(v3_len(v3_sub(at.s.n_shading, want)) < 1e-5f))
+                fail_msg("%s: (%g, %g, %g) instead of (%g, %g, %g)", cases[i].way, (double)at.s.n_shading.x,
+                         (double)at.s.n_shading.y, (double)at.s.n_shading.z, (double)want.x, (double)want.y, (double)want.z);
+        }
+        pt_scene_destroy(scene);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(none_are_as_without)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(none_are_as_without), cmocka_unit_test(lengths_are_weights)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
