@@ -24,7 +24,7 @@ long long pt_accel_bytes(const struct pt_scene *scene);
 struct pt_ray {
     pt_vec3 origin, direction;
     float t_min, t_max;
-    float time; /* in [0, 1] over the shutter */
+    float time; /* in [0, 1] over the time in which things move */
 };
 
 struct pt_hit {

@@ -500,8 +500,11 @@ PT_KERNEL_INLINE void pt_path_start(pt_effects fx, struct pt_path *path, float x
     float time = 0.0f;
     if ((fx & PT_FX_DEFOCUS) && camera->lens_radius > 0.0f)
         lens = pt_path_2d(path, PT_DIM_LENS);
-    if (fx & PT_FX_MOTION)
-        time = pt_sampler_1d(&path->sampler, PT_DIM_TIME);
+    if (fx & PT_FX_MOTION) {
+        const float *still = path->scene->still;
+        time = (pt_sampler_1d(&path->sampler, PT_DIM_TIME) - still[0]) / (1.0f - still[0] - still[1]);
+        time = fminf(1.0f, fmaxf(0.0f, time));
+    }
     pt_camera_ray(fx, camera, x, y, lens.x, lens.y, time, &path->ray);
     path->medium = fx & PT_FX_MEDIA ? camera->medium : -1;
     if (path->trace)

@@ -28,7 +28,7 @@ static struct pt_loc shutter_loc(const struct pt_params *camera)
     return pt_params_loc(camera, pt_params_find(camera, "shutterclose") ? "shutterclose" : "shutteropen");
 }
 
-/* The camera's, but the film depends on it. */
+/* The camera's, but the film depends on it. What moves stands before the first of the transforms' times and after the last. */
 static void build_shutter(struct pt_builder *b)
 {
     struct pt_params *p = begin(b, PT_HEADER_CAMERA, "perspective");
@@ -37,6 +37,12 @@ static void build_shutter(struct pt_builder *b)
     if (!(b->shutter[1] >= b->shutter[0]))
         pt_diag_fail(&b->diag, shutter_loc(p), "the shutter closes at %g, before it opens at %g", b->shutter[1],
                      b->shutter[0]);
+    const double open_s = b->shutter[1] - b->shutter[0], before = fmax(b->transform_times[0] - b->shutter[0], 0) / open_s,
+                 after = fmax(b->shutter[1] - b->transform_times[1], 0) / open_s;
+    if (before + after < 0.999999) { /* else nothing moves, or for no time that floats would tell */
+        b->scene->still[0] = (float)before;
+        b->scene->still[1] = (float)after;
+    }
 }
 
 /* Of v4: as long as the shutter is open, unless the film says it, as early files did. */

@@ -275,6 +275,7 @@ struct pt_scene {
     int32_t light_selection; /* enum pt_light_selection: what is wanted where there are enough lights */
     float radiance_scale;    /* the film's exposure: factor from radiance to pixel value */
     pt_effects effects;      /* needed or forced */
+    float still[2];          /* shares of the shutter, before and after things move; the rest is their time from 0 to 1 */
 
     /* derived by pt_accel_build */
     struct pt_accel *accel;         /* owns; released by pt_accel_release */

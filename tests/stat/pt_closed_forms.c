@@ -137,6 +137,16 @@ static double moving(int x, int y)
     return mean;
 }
 
+/* The same sheet, which stands for a quarter of the time, then goes, then stands again: TransformTimes within the shutter. */
+static double moving_between(int x, int y)
+{
+    double mean = 0.0;
+    (void)y;
+    for (int i = 0; i < 1000; i++)
+        mean += (1.0 - box_share(EDGE_X + fmin(1.0, fmax(0.0, (i + 0.5) / 500.0 - 0.5)) - x - 0.5, 0.5)) / 1000.0;
+    return mean;
+}
+
 /* A lens or a shutter that shared its numbers with the pixel would have other edges. */
 static void unsharp_and_moving_edges(void **state)
 {
@@ -150,6 +160,11 @@ static void unsharp_and_moving_edges(void **state)
                               "ActiveTransform EndTime Translate 1 0 0 ActiveTransform All " BLACK QUAD
                               "[ -50 -50 5  .3 -50 5  .3 50 5  -50 50 5 ]",
                 moving, CAMERA_ERROR);
+    check_image(
+        HEAD(BOX, " TransformTimes .25 .75") "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]\n"
+                                             "ActiveTransform EndTime Translate 1 0 0 ActiveTransform All " BLACK QUAD
+                                             "[ -50 -50 5  .3 -50 5  .3 50 5  -50 50 5 ]",
+        moving_between, CAMERA_ERROR);
 }
 
 /* --- a texture's squares ------------------------------------------------------------------------------------------------- */
