@@ -158,17 +158,18 @@ static RTCGeometry make_quadric(RTCDevice device, struct pt_quadric *quadric)
 }
 
 /* M = T · Q · U with Q a rotation and U upper triangular (Gram–Schmidt on the columns), which is what Embree interpolates:
- * Q spherically, the rest linearly. A mirror goes into U. */
-static void decompose(const struct pt_mat34 *t, struct RTCQuaternionDecomposition *out)
+ * Q spherically, the rest linearly. A mirror goes into U, as does a shift by `origin` before all that. */
+static void decompose(const struct pt_mat34 *t, pt_vec3 origin, struct RTCQuaternionDecomposition *out)
 {
     pt_vec3 c0 = v3(t->m[0], t->m[4], t->m[8]), c1 = v3(t->m[1], t->m[5], t->m[9]), c2 = v3(t->m[2], t->m[6], t->m[10]);
     pt_vec3 q0 = v3_norm(c0);
     float u01 = v3_dot(q0, c1);
-    pt_vec3 q1 = v3_norm(v3_madd(c1, -u01, q0)), q2 = v3_cross(q0, q1);
+    pt_vec3 q1 = v3_norm(v3_madd(c1, -u01, q0)), q2 = v3_cross(q0, q1), at = pt_mat34_vector(t, origin);
     rtcInitQuaternionDecomposition(out);
     rtcQuaternionDecompositionSetTranslation(out, t->m[3], t->m[7], t->m[11]);
     rtcQuaternionDecompositionSetScale(out, v3_dot(q0, c0), v3_dot(q1, c1), v3_dot(q2, c2));
     rtcQuaternionDecompositionSetSkew(out, u01, v3_dot(q0, c2), v3_dot(q1, c2));
+    rtcQuaternionDecompositionSetShift(out, v3_dot(q0, at), v3_dot(q1, at), v3_dot(q2, at));
     /* Shepperd 1978: divide by the largest of the four */
     float trace = q0.x + q1.y + q2.z, r, i, j, k;
     if (trace > 0.0f) {
@@ -196,7 +197,7 @@ static void set_transforms(RTCGeometry g, const struct pt_instance *instance)
     rtcSetGeometryTimeStepCount(g, 2);
     for (unsigned i = 0; i < 2; i++) {
         struct RTCQuaternionDecomposition q;
-        decompose(&instance->to_render[i], &q);
+        decompose(&instance->to_render[i], instance->origin, &q);
         rtcSetGeometryTransformQuaternion(g, i, &q);
     }
 }

@@ -8,40 +8,97 @@
 #include "pbrt/ply.h"
 #include "shade/light_area.h"
 
-/* Coordinates beyond this lose visible precision in float: an object defined out there gets an origin of its own. */
-static const double far_away = 1e4;
+/* What is further than so many times its size from the origin of the space in which it is kept loses visible precision in
+ * float: it gets an origin of its own. */
+static const double far_away = 256;
 
 struct placement {
     struct pt_xform xform; /* the shape's own space → where its vertices are stored */
-    int animated;          /* stored as it is; `at` places it */
+    int animated;          /* stored about `origin`; `at` places it */
+    double origin[3];
     struct pt_xform at[2]; /* own → world at shutter open and close */
+};
+
+/* Bounds in a shape's own space. */
+struct box {
+    double low[3], high[3];
 };
 
 /* --- where a shape goes ------------------------------------------------------------------------------------------------ */
 
-static struct placement place(struct pt_builder *b, const struct pt_params *p, const double probe[3])
+static void box_add(struct box *box, const double p[3], int is_first)
+{
+    for (int i = 0; i < 3; i++) {
+        box->low[i] = is_first ? p[i] : fmin(box->low[i], p[i]);
+        box->high[i] = is_first ? p[i] : fmax(box->high[i], p[i]);
+    }
+}
+
+/* An origin for what lies in `box` and goes where `t` takes it, in that space; stays as it is if that is near enough. */
+static void find_origin(const struct pt_xform *t, const struct box *box, double origin[3])
+{
+    struct box to = {{0}, {0}};
+    double size = 0, far = 0;
+    for (int corner = 0; corner < 8; corner++) {
+        double p[3], q[3];
+        for (int i = 0; i < 3; i++)
+            p[i] = corner >> i & 1 ? box->high[i] : box->low[i];
+        pt_xform_point(t, p, q);
+        box_add(&to, q, corner == 0);
+    }
+    for (int i = 0; i < 3; i++) {
+        size = fmax(size, to.high[i] - to.low[i]);
+        far = fmax(far, fmax(fabs(to.low[i]), fabs(to.high[i])));
+    }
+    for (int i = 0; i < 3 && far > far_away * size; i++)
+        origin[i] = (double)(float)(0.5 * (to.low[i] + to.high[i])); /* an instance stores it in float */
+}
+
+static struct placement place(struct pt_builder *b, const struct pt_params *p, const struct box *box)
 {
     struct placement pl = {.animated = 0};
     pt_builder_at_shutter(b, b->state->ctm, pl.at);
     pl.animated = !pt_xform_equal(&pl.at[0], &pl.at[1]);
     if (b->open_object >= 0) {
-        double *offset = b->object_offsets[b->open_object], first[3];
-        const struct pt_object *o = &((struct pt_object *)b->objects.items)[b->open_object];
+        double *origin = b->object_offsets[b->open_object];
         if (pl.animated)
             pt_diag_warn(&b->diag, p->loc, "a moving shape within an object stays at its place at shutter open");
         pl.animated = 0;
-        pt_xform_point(&pl.at[0], probe, first);
-        if (o->shape_count == 0 && fmax(fabs(first[0]), fmax(fabs(first[1]), fabs(first[2]))) > far_away)
-            memcpy(offset, first, sizeof first);
+        if (((struct pt_object *)b->objects.items)[b->open_object].shape_count == 0)
+            find_origin(&pl.at[0], box, origin);
         pl.xform = pl.at[0];
         for (int i = 0; i < 3; i++)
-            pl.xform.m[i][3] -= offset[i];
+            pl.xform.m[i][3] -= origin[i];
     } else if (pl.animated) {
         pl.xform = pt_xform_identity();
+        find_origin(&pl.xform, box, pl.origin);
+        for (int i = 0; i < 3; i++)
+            pl.xform.m[i][3] -= pl.origin[i];
     } else {
         pl.xform = pt_builder_to_render(b, &pl.at[0]);
     }
     return pl;
+}
+
+/* Places an object that is kept about `origin`. */
+static int add_instance(struct pt_builder *b, int32_t object, const struct pt_xform at[2], const double origin[3],
+                        struct pt_loc loc)
+{
+    struct pt_instance instance = {.object = object, .animated = !pt_xform_equal(&at[0], &at[1])};
+    const struct pt_xform shift = pt_xform_translate(origin[0], origin[1], origin[2]);
+    int turns = 0;
+    for (int i = 0; i < 9; i++)
+        turns |= at[0].m[i / 3][i % 3] != at[1].m[i / 3][i % 3];
+    for (int i = 0; i < 2; i++) {
+        struct pt_xform t = pt_builder_to_render(b, &at[i]);
+        if (!turns)
+            t = pt_xform_mul(&t, &shift);
+        instance.to_render[i] = pt_xform_to_mat34(&t);
+    }
+    if (turns) /* not about the object's origin, but about the one that the file has */
+        instance.origin = v3((float)origin[0], (float)origin[1], (float)origin[2]);
+    pt_builder_effect(b, PT_FX_INSTANCES | (instance.animated ? PT_FX_MOTION : 0u), loc);
+    return pt_list_add(b, &b->instances, &instance) < 0 ? b->diag.rc : 0;
 }
 
 /* What every shape has: material, alpha, media, side, light. */
@@ -94,15 +151,9 @@ static int add_shape(struct pt_builder *b, struct pt_params *p, const struct pla
         pt_list_add(b, &b->object_shapes, shape);
     } else if (pl->animated) {
         struct pt_object object = {(int32_t)b->object_shapes.count, 1};
-        struct pt_instance instance = {.animated = 1};
-        instance.object = pt_list_add(b, &b->objects, &object);
+        int32_t id = pt_list_add(b, &b->objects, &object);
         pt_list_add(b, &b->object_shapes, shape);
-        for (int i = 0; i < 2; i++) {
-            struct pt_xform t = pt_builder_to_render(b, &pl->at[i]);
-            instance.to_render[i] = pt_xform_to_mat34(&t);
-        }
-        pt_list_add(b, &b->instances, &instance);
-        pt_builder_effect(b, PT_FX_MOTION | PT_FX_INSTANCES, p->loc);
+        add_instance(b, id, pl->at, pl->origin, p->loc);
     } else {
         pt_list_add(b, &b->world_shapes, shape);
     }
@@ -196,7 +247,7 @@ static int store_mesh(struct pt_builder *b, struct pt_params *p, const struct pt
 int pt_build_mesh(struct pt_builder *b, struct pt_params *p, const struct pt_soup *soup)
 {
     struct pt_mesh mesh;
-    double probe[3] = {0, 0, 0};
+    struct box box = {{0}, {0}};
     if (soup->triangle_count == 0 || soup->vertex_count == 0) {
         pt_diag_warn(&b->diag, p->loc, "a mesh without triangles is left out");
         pt_params_ignore(p, "alpha shadowalpha");
@@ -205,9 +256,12 @@ int pt_build_mesh(struct pt_builder *b, struct pt_params *p, const struct pt_sou
     }
     if (soup->vertex_count > INT32_MAX || soup->triangle_count > INT32_MAX)
         return pt_diag_fail(&b->diag, p->loc, "a mesh of %zu triangles is too large", soup->triangle_count);
-    for (size_t k = 0; k < 3; k++)
-        probe[k] = value(soup->pd, soup->pf, k);
-    struct placement pl = place(b, p, probe);
+    for (size_t i = 0; i < soup->vertex_count; i++) {
+        const double v[3] = {value(soup->pd, soup->pf, 3 * i), value(soup->pd, soup->pf, 3 * i + 1),
+                             value(soup->pd, soup->pf, 3 * i + 2)};
+        box_add(&box, v, i == 0);
+    }
+    struct placement pl = place(b, p, &box);
     struct pt_shape shape = common(b, p);
     if (b->diag.rc || store_mesh(b, p, soup, &pl.xform, &mesh) != 0)
         return b->diag.rc;
@@ -327,9 +381,10 @@ static int make_ply_mesh(struct pt_builder *b, struct pt_params *p)
 
 static int add_quadric(struct pt_builder *b, struct pt_params *p, struct pt_quadric *q)
 {
-    const double probe[3] = {0, 0, 0};
+    const double r = (double)q->radius;
+    const struct box box = {{-r, -r, (double)q->z_min}, {r, r, (double)q->z_max}};
     struct pt_xform inverse;
-    struct placement pl = place(b, p, probe);
+    struct placement pl = place(b, p, &box);
     struct pt_shape shape = common(b, p);
     if (!pt_xform_invert(&pl.xform, &inverse))
         return pt_diag_fail(&b->diag, p->loc, "singular transform of a shape");
@@ -430,23 +485,14 @@ int pt_build_object_begin(struct pt_builder *b, const char *name, struct pt_loc 
 
 int pt_build_instance(struct pt_builder *b, const char *name, struct pt_loc loc)
 {
-    struct pt_instance instance = {.object = pt_names_get(&b->object_names, name)};
+    const int32_t object = pt_names_get(&b->object_names, name);
     struct pt_xform at[2];
-    if (instance.object < 0)
+    if (object < 0)
         return pt_diag_fail(&b->diag, loc, "unknown object \"%s\" (expected one made by ObjectBegin before)", name);
     if (b->open_object >= 0)
         return pt_diag_fail(&b->diag, loc, "ObjectInstance within an object");
-    if (((struct pt_object *)b->objects.items)[instance.object].shape_count == 0)
+    if (((struct pt_object *)b->objects.items)[object].shape_count == 0)
         return 0;
-    const double *offset = b->object_offsets[instance.object];
-    struct pt_xform shift = pt_xform_translate(offset[0], offset[1], offset[2]);
     pt_builder_at_shutter(b, b->state->ctm, at);
-    instance.animated = !pt_xform_equal(&at[0], &at[1]);
-    for (int i = 0; i < 2; i++) {
-        struct pt_xform t = pt_builder_to_render(b, &at[i]);
-        t = pt_xform_mul(&t, &shift);
-        instance.to_render[i] = pt_xform_to_mat34(&t);
-    }
-    pt_builder_effect(b, PT_FX_INSTANCES | (instance.animated ? PT_FX_MOTION : 0u), loc);
-    return pt_list_add(b, &b->instances, &instance) < 0 ? b->diag.rc : 0;
+    return add_instance(b, object, at, b->object_offsets[object], loc);
 }

@@ -133,7 +133,8 @@ struct pt_instance {
     int32_t object;
     int32_t animated;             /* to_render[1] counts: interpolated as translation, rotation (slerp), scale over the
                                      shutter */
-    struct pt_mat34 to_render[2]; /* object → render at shutter open and close */
+    struct pt_mat34 to_render[2]; /* object, moved by `origin` → render, at first and at last */
+    pt_vec3 origin;               /* 0 unless animated; the motion turns about the point that to_render takes 0 to */
 };
 
 /* --- lights ----------------------------------------------------------------------------------------------------------- */

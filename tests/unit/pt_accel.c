@@ -265,8 +265,8 @@ static void instances(void **state)
     scene.objects[scene.object_count++] = (struct pt_object){1, 1};
     struct pt_mat34 turned = {{0, 0, 2, 4, 0, 2, 0, 0, -2, 0, 0, 10}}, shifted = turned;
     shifted.m[3] = 8.0f;
-    scene.instances[scene.instance_count++] = (struct pt_instance){0, 0, {turned, turned}};
-    scene.instances[scene.instance_count++] = (struct pt_instance){0, 1, {turned, shifted}};
+    scene.instances[scene.instance_count++] = (struct pt_instance){0, 0, {turned, turned}, v3_splat(0.0f)};
+    scene.instances[scene.instance_count++] = (struct pt_instance){0, 1, {turned, shifted}, v3_splat(0.0f)};
     scene.instances[1].to_render[0].m[7] = scene.instances[1].to_render[1].m[7] = 20.0f;
     test_scene_finish(&scene);
 
@@ -401,7 +401,7 @@ static void many_rays_are_as_single_ones(void **state)
     scene.objects[scene.object_count++] = (struct pt_object){2, 1};
     struct pt_mat34 here = {{1, 0, 0, 0.2f, 0, 1, 0, -0.3f, 0, 0, 1, 0}}, there = here;
     there.m[3] = 0.9f;
-    scene.instances[scene.instance_count++] = (struct pt_instance){0, 1, {here, there}};
+    scene.instances[scene.instance_count++] = (struct pt_instance){0, 1, {here, there}, v3_splat(0.0f)};
     test_scene_finish(&scene);
     for (int count = 1; count <= RAYS; count++)
         for (int coherent = 0; coherent < 2; coherent++)

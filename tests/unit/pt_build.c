@@ -85,6 +85,42 @@ static void far_from_the_origin(void **state)
     pt_scene_destroy(s[1]);
 }
 
+/* What is far away for its size, in an object or in the space that it moves in, keeps its shape and its way. */
+static void small_and_far_away(void **state)
+{
+    (void)state;
+    static const char format[] = "LookAt %d 0 -.005  %d 0 0  0 1 0 Camera \"perspective\" WorldBegin\n"
+                                 "ObjectBegin \"o\" Shape \"trianglemesh\" \"point3 P\" [ %d 0 0  %d.001 0 0  %d 0.001 0 ]\n"
+                                 "ObjectEnd ObjectInstance \"o\" ActiveTransform EndTime %s ActiveTransform All\n"
+                                 "Shape \"trianglemesh\" \"point3 P\" [ %d 0 0  %d.001 0 0  %d 0.001 0 ]";
+    static const char *const ways[] = {"Translate .003 0 .002", "Rotate 30 1 0 0"};
+    for (int way = 0; way < 2; way++) {
+        struct pt_scene *s[2];
+        for (int i = 0; i < 2; i++) {
+            const int at = i * 5000;
+            char text[1024];
+            snprintf(text, sizeof text, format, at, at, at, at, at, ways[way], at, at, at);
+            s[i] = text_scene(text, NULL, NULL);
+        }
+        for (int instance = 0; instance < 2; instance++)
+            for (int corner = 0; corner < 3; corner++) {
+                pt_vec3 q[2], edge[2];
+                for (int i = 0; i < 2; i++) {
+                    const struct pt_vertex *v = s[i]->meshes[instance].vertices;
+                    struct pt_mat34 t;
+                    pt_accel_instance_transform(s[i], instance, instance ? 0.7f : 0.0f, &t);
+                    q[i] = pt_mat34_point(&t, v[corner].p);
+                    edge[i] = pt_mat34_vector(&t, v3_sub(v[(corner + 1) % 3].p, v[corner].p));
+                }
+                near(v3_len(v3_sub(edge[1], edge[0])), 0, 1e-7);
+                near(v3_len(v3_sub(q[1], q[0])), 0,
+                     instance && way ? 1e-3 : 1e-7); /* two roundings of 5000, where it turns */
+            }
+        pt_scene_destroy(s[0]);
+        pt_scene_destroy(s[1]);
+    }
+}
+
 static void orientation(void **state)
 {
     (void)state;
@@ -731,6 +767,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(film_and_camera),
                                        cmocka_unit_test(far_from_the_origin),
+                                       cmocka_unit_test(small_and_far_away),
                                        cmocka_unit_test(orientation),
                                        cmocka_unit_test(lights),
                                        cmocka_unit_test(power_of_stretched_lamps),

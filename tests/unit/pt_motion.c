@@ -90,20 +90,23 @@ static void the_camera_turns_evenly(void **state)
         }
 }
 
-/* A small ball off the centre of an object: where it is met is where it should have got to. */
+/* A small ball off the centre of an object, or the centre of an object that is off the origin about which it turns: where it is
+ * met is where it should have got to. */
 static void instances_turn_evenly(void **state)
 {
     (void)state;
     const double ball[3] = {0.3, 0.7, -0.5};
     struct way w;
     for (int k = 0; next_way(&k, &w);) {
+        const pt_vec3 off = v3((float)ball[0], (float)ball[1], (float)ball[2]), none = v3_splat(0.0f);
         struct pt_scene scene;
         test_scene_begin(&scene);
         int32_t grey = test_add_diffuse(&scene, v3_splat(0.5f));
-        test_add_sphere(&scene, grey, v3((float)ball[0], (float)ball[1], (float)ball[2]), 0.01f);
+        test_add_sphere(&scene, grey, k / 2 % 2 ? off : none, 0.01f);
         scene.world_shape_count = 0;
         scene.objects[scene.object_count++] = (struct pt_object){0, 1};
-        scene.instances[scene.instance_count++] = (struct pt_instance){0, 1, {matrix_at(&w, 0), matrix_at(&w, 1)}};
+        scene.instances[scene.instance_count++] =
+            (struct pt_instance){0, 1, {matrix_at(&w, 0), matrix_at(&w, 1)}, k / 2 % 2 ? none : off};
         test_scene_finish(&scene);
         for (int step = 0; step <= 4; step++) {
             double t = step / 4.0, m[12], at[3];
