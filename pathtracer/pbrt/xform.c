@@ -124,7 +124,13 @@ void pt_xform_point(const struct pt_xform *t, const double p[3], double out[3])
         out[i] += t->m[i][3];
 }
 
-int pt_xform_equal(const struct pt_xform *a, const struct pt_xform *b) { return memcmp(a, b, sizeof *a) == 0; }
+int pt_xform_equal(const struct pt_xform *a, const struct pt_xform *b)
+{
+    for (int i = 0; i < 12; i++)
+        if (a->m[i / 4][i % 4] != b->m[i / 4][i % 4]) /* numbers, not bytes: 0 is -0 */
+            return 0;
+    return 1;
+}
 
 /* Linear part = rotation · stretch, by averaging with the inverse transpose. */
 static void polar(const struct pt_xform *t, struct pt_xform *rotation, struct pt_xform *stretch)

@@ -540,6 +540,19 @@ static void part_of_the_motion(void **state)
     pt_scene_destroy(s);
 }
 
+/* What two transforms write in different ways, but is the same, does not move. */
+static void the_same_twice_stands_still(void **state)
+{
+    (void)state;
+    struct pt_scene *s =
+        world_scene("Translate 0 0 5 ActiveTransform StartTime Scale 1 1 1 ActiveTransform EndTime\n"
+                    "ConcatTransform [ 1 0 -0 0 -0 1 0 0 0 -0 1 0 -0 0 0 1 ] ActiveTransform All\n"
+                    "AreaLightSource \"diffuse\" Shape \"sphere\" Transform [ -1 0 0 0 0 1 0 0 0 0 1 0 0 0 5 1 ]\n"
+                    "ActiveTransform EndTime Transform [ -1 -0 0 0 -0 1 -0 0 0 -0 1 0 0 0 5 1 ] Shape \"disk\"");
+    assert_true(s->instance_count == 0 && s->light_count == 2);
+    pt_scene_destroy(s);
+}
+
 static void graphics_state(void **state)
 {
     (void)state;
@@ -776,6 +789,7 @@ int main(void)
                                        cmocka_unit_test(media),
                                        cmocka_unit_test(instances_and_motion),
                                        cmocka_unit_test(part_of_the_motion),
+                                       cmocka_unit_test(the_same_twice_stands_still),
                                        cmocka_unit_test(graphics_state),
                                        cmocka_unit_test(interface_lamps_are_dark),
                                        cmocka_unit_test(coloured_shares_are_said),
