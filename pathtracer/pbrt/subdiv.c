@@ -187,7 +187,8 @@ static int subdivide(struct mesh *m)
     return 1;
 }
 
-/* Tangents of the limit surface: Hoppe et al. 1994, appendix A, boundaries by differences along and across. */
+/* Across the tangents of the limit surface: Hoppe et al. 1994, appendix A, boundaries by differences along and across. Of
+ * its two sides it is that of pbrt, whose rings go the other way round: against the right-hand rule. Unit, or 0. */
 static void limit_normal(const struct mesh *m, const uint32_t *ring, int count, int boundary, size_t v, double out[3])
 {
     double s[3] = {0, 0, 0}, t[3] = {0, 0, 0};
@@ -205,9 +206,10 @@ static void limit_normal(const struct mesh *m, const uint32_t *ring, int count, 
         t[k] = count > 2 ? t[k] / (count - 2) - m->p[3 * v + k]
                          : m->p[3 * (size_t)ring[0] + k] + m->p[3 * (size_t)ring[1] + k] - 2 * m->p[3 * v + k];
     }
-    out[0] = s[1] * t[2] - s[2] * t[1];
-    out[1] = s[2] * t[0] - s[0] * t[2];
-    out[2] = s[0] * t[1] - s[1] * t[0];
+    const double n[3] = {t[1] * s[2] - t[2] * s[1], t[2] * s[0] - t[0] * s[2], t[0] * s[1] - t[1] * s[0]};
+    const double len = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (size_t k = 0; k < 3; k++)
+        out[k] = len > 0 ? n[k] / len : 0;
 }
 
 /* Moves all vertices to the limit surface and makes normals; [vertices][3], malloc'ed. */
