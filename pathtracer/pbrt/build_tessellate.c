@@ -220,14 +220,15 @@ static void turn_frame(struct pt_frame *f, pt_vec3 axis)
     *f = (struct pt_frame){s, v3_cross(axis, s), axis};
 }
 
-static int add_ring(struct grower *g, const double p[3], const struct pt_frame *f, double width, double v)
+/* u runs along the curve, v around it. */
+static int add_ring(struct grower *g, const double p[3], const struct pt_frame *f, double width, double u)
 {
     for (int i = 0; i < CURVE_SIDES; i++) {
         double a = 2 * BASE_PI * i / CURVE_SIDES;
         pt_vec3 out = v3_add(v3_scale(f->s, (float)cos(a)), v3_scale(f->t, (float)sin(a)));
         const double n[3] = {(double)out.x, (double)out.y, (double)out.z};
         const double q[3] = {p[0] + width / 2 * n[0], p[1] + width / 2 * n[1], p[2] + width / 2 * n[2]};
-        if (!add_vertex(g, q, n, (double)i / CURVE_SIDES, v))
+        if (!add_vertex(g, q, n, u, (double)i / CURVE_SIDES))
             return 0;
     }
     return 1;
@@ -262,8 +263,8 @@ int pt_build_curve(struct pt_builder *b, struct pt_params *p)
             spline_to_bezier(P + 3 * i, degree, c);
         else
             memcpy(c, P + 3 * i * step, corners * 3 * sizeof *c);
-        /* A segment begins with the ring that ends the one before. */
-        for (int k = i > 0; k <= CURVE_CUTS && ok; k++) {
+        /* Each segment has rings of its own, because u is 0 where it begins, as in pbrt. */
+        for (int k = 0; k <= CURVE_CUTS && ok; k++) {
             double t = (double)k / CURVE_CUTS, v = ((double)i + t) / (double)segments, q[3], d[3] = {0, 0, 0};
             bezier(c, degree, t, q, d);
             direct(c, degree, t, d, &axis);
@@ -271,11 +272,11 @@ int pt_build_curve(struct pt_builder *b, struct pt_params *p)
                 frame = pt_frame_from_normal(axis);
             else
                 turn_frame(&frame, axis);
-            ok = add_ring(&g, q, &frame, (1 - v) * w0 + v * w1, v);
+            ok = add_ring(&g, q, &frame, (1 - v) * w0 + v * w1, t);
         }
     }
     for (size_t ring = 0; ok && (ring + 1) * CURVE_SIDES < g.vertices; ring++)
-        for (size_t i = 0; i < CURVE_SIDES && ok; i++) {
+        for (size_t i = 0; i < CURVE_SIDES && ok && (ring + 1) % (CURVE_CUTS + 1) != 0; i++) {
             size_t a = ring * CURVE_SIDES + i, next = ring * CURVE_SIDES + (i + 1) % CURVE_SIDES;
             ok = add_quad(&g, a, next, a + CURVE_SIDES, next + CURVE_SIDES);
         }

@@ -735,6 +735,10 @@ static void tubes(void **state)
                              (unsigned)ring);
             }
         }
+        for (uint32_t k = 0; k < tube->vertex_count; k++) { /* u along each segment, v around */
+            near(tube->vertices[k].u, k / 6 % 9 / 8.0, 1e-6);
+            near(tube->vertices[k].v, k % 6 / 6.0, 1e-6);
+        }
         for (uint32_t k = 0; k < tube->vertex_count && i >= 2 && i <= 5; k++)
             assert_true(fabsf(tube->vertices[k].p.x) < 0.6f + 1e-5f);
         pt_scene_destroy(s);
