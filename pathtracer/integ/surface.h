@@ -117,6 +117,18 @@ static inline void pt_place_quadric(const struct pt_scene *scene, const struct p
     pt_quadric_uv(q, hit->geometric, &at->s.u, &at->s.v, &at->s.dpdu, &at->s.dpdv);
 }
 
+/* Of a huge quadric the place on the ray is known far better than that on the surface: a ball of radius 1e5 as a floor. */
+static inline void pt_place_on_ray(const struct pt_ray *ray, float t, struct pt_place *at)
+{
+    pt_vec3 o = ray->origin, way = v3_scale(ray->direction, t), e = at->error;
+    pt_vec3 error = v3(PT_OFFSET_ERROR * (fabsf(o.x) + fabsf(way.x)), PT_OFFSET_ERROR * (fabsf(o.y) + fabsf(way.y)),
+                       PT_OFFSET_ERROR * (fabsf(o.z) + fabsf(way.z)));
+    if (16.0f * (error.x + error.y + error.z) < e.x + e.y + e.z) {
+        at->p = v3_add(o, way);
+        at->error = error;
+    }
+}
+
 /* Object → render space. Out of line in surface.c: only instances need it. */
 void pt_place_instance(const struct pt_scene *scene, int32_t instance, float time, struct pt_place *at);
 
@@ -130,12 +142,15 @@ static inline void pt_place_at_hit(pt_effects fx, const struct pt_scene *scene, 
 {
     at->shape = &scene->shapes[hit->shape];
     at->primitive = hit->primitive;
-    if ((fx & PT_FX_QUADRIC) && at->shape->kind == PT_SHAPE_QUADRIC)
+    const int quadric = (fx & PT_FX_QUADRIC) && at->shape->kind == PT_SHAPE_QUADRIC;
+    if (quadric)
         pt_place_quadric(scene, hit, at);
     else
         pt_place_mesh(fx, scene, hit, at);
     if ((fx & PT_FX_INSTANCES) && hit->instance >= 0)
         pt_place_instance(scene, hit->instance, ray->time, at);
+    else if (quadric)
+        pt_place_on_ray(ray, hit->t, at);
 }
 
 #endif

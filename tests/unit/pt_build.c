@@ -136,6 +136,29 @@ static void orientation(void **state)
     pt_scene_destroy(s);
 }
 
+/* A ball of radius 1e6 as a floor, two units below: rays leave it as close to it as they would leave a small one. */
+static void a_ball_as_a_floor(void **state)
+{
+    (void)state;
+    struct pt_scene *s = world_scene("Translate 0 -1000002 0 Shape \"sphere\" \"float radius\" 1e6");
+    for (int i = 0; i < 9; i++) {
+        struct pt_ray ray = {
+            {0, 0, 0}, v3_norm(v3((float)(i % 3) * 0.7f - 0.5f, -1, (float)(i / 3) * 0.7f - 0.3f)), 0, INFINITY, 0};
+        struct pt_hit hit;
+        struct pt_place at;
+        assert_true(pt_accel_intersect(s, &ray, &hit));
+        pt_place_at_hit(PT_FX_ALL, s, &ray, &hit, &at);
+        near(at.p.y, -2, 1e-5);
+        pt_vec3 p = pt_offset_point(at.p, at.s.n_geometric, at.error, v3(0, 1, 0));
+        near(p.y, -2, 2e-5);
+        for (int k = 0; k < 9; k++) { /* and do not meet it again */
+            ray = (struct pt_ray){p, v3_norm(v3((float)(k % 3) - 1.0f, 0.01f, (float)(k / 3) - 1.0f)), 0, INFINITY, 0};
+            assert_false(pt_accel_intersect(s, &ray, &hit));
+        }
+    }
+    pt_scene_destroy(s);
+}
+
 static void lights(void **state)
 {
     (void)state;
@@ -786,6 +809,7 @@ int main(void)
                                        cmocka_unit_test(far_from_the_origin),
                                        cmocka_unit_test(small_and_far_away),
                                        cmocka_unit_test(orientation),
+                                       cmocka_unit_test(a_ball_as_a_floor),
                                        cmocka_unit_test(lights),
                                        cmocka_unit_test(power_of_stretched_lamps),
                                        cmocka_unit_test(materials_of_both_versions),
