@@ -164,7 +164,8 @@ static void build_filter(struct pt_builder *b)
            y = pt_params_float_in(p, "yradius", fallback, 1e-3, 100);
     it->filter_x = (float)pt_params_float_in(p, "xwidth", x, 1e-3, 100);
     it->filter_y = (float)pt_params_float_in(p, "ywidth", y, 1e-3, 100);
-    it->filter_sigma = (float)sigma;
+    /* half the width of Mitchell's main lobe grows with the radius, that of the sinc does not */
+    it->filter_sigma = strcmp(kind, "mitchell") == 0 ? 0.25f * it->filter_x : (float)sigma;
     pt_params_check_used(p);
 }
 

@@ -53,6 +53,8 @@ static void film_filter_and_sampler(void **state)
          1, 0.5, 1},
         {"PixelFilter \"mitchell\" \"float B\" 0.3 \"float C\" 0.3 WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL,
          PT_FILTER_GAUSSIAN, 2, 2, 0.5, 1},
+        {"PixelFilter \"mitchell\" \"float xradius\" 1.5 \"float yradius\" 1.5 WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL,
+         PT_FILTER_GAUSSIAN, 1.5, 1.5, 0.375, 1},
         {"PixelFilter \"sinc\" \"float tau\" 3 WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 2, 2, 0.5,
          1},
         {"Sampler \"stratified\" WorldBegin", 1280, 720, 16, PT_SAMPLER_SOBOL, PT_FILTER_GAUSSIAN, 1.5, 1.5, 0.5, 1},
