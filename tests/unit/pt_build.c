@@ -523,7 +523,12 @@ static void spheres_of_any_limits(void **state)
 {
     (void)state;
     struct pt_scene *s = world_scene("Shape \"sphere\" \"float zmin\" 0.5 \"float zmax\" -0.25\n"
-                                     "Shape \"sphere\" \"float zmin\" 7 \"float zmax\" -0.25");
+                                     "Shape \"sphere\" \"float zmin\" 7 \"float zmax\" -0.25\n"
+                                     "Shape \"paraboloid\" \"float radius\" 2 \"float zmin\" 4 \"float zmax\" 1");
+    for (uint32_t i = 0; i < s->meshes[0].vertex_count; i++) {
+        pt_vec3 v = s->meshes[0].vertices[i].p;
+        near(hypotf(v.x, v.y), 2 * sqrt((double)v.z / 4), 1e-5); /* of the radius at the greater z */
+    }
     assert_true(s->quadrics[0].z_min == -0.25f && s->quadrics[0].z_max == 0.5f);
     assert_true(s->quadrics[1].z_min == -0.25f && s->quadrics[1].z_max == 1.0f);
     pt_scene_destroy(s);
