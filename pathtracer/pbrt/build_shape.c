@@ -1,4 +1,5 @@
 /* Shapes, objects and instances. */
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -80,17 +81,39 @@ static struct placement place(struct pt_builder *b, const struct pt_params *p, c
     return pl;
 }
 
-/* Places an object that is kept about `origin`. */
+/* Of a mesh its transform may make a flat one; nothing else is left. */
+static int leave_out_flattened(struct pt_builder *b, struct pt_loc loc, const char *what)
+{
+    pt_diag_warn(&b->diag, loc, "a transform without an inverse (Scale 0) leaves nothing of %s", what);
+    return b->diag.rc;
+}
+
+/* Whether a transform has no inverse that floats hold, as Embree needs it. */
+static int is_flat(const struct pt_xform *t)
+{
+    struct pt_xform inverse;
+    return !pt_xform_invert(t, &inverse) || fabs(pt_xform_det(t)) < (double)FLT_MIN;
+}
+
+/* Places an object that is kept about `origin`. What grows from nothing does so from a millionth of what it becomes: rays have
+ * to find into its space at all times. */
 static int add_instance(struct pt_builder *b, int32_t object, const struct pt_xform at[2], const double origin[3],
                         struct pt_loc loc)
 {
     struct pt_instance instance = {.object = object, .animated = !pt_xform_equal(&at[0], &at[1])};
     const struct pt_xform shift = pt_xform_translate(origin[0], origin[1], origin[2]);
+    const int flat[2] = {is_flat(&at[0]), is_flat(&at[1])};
     int turns = 0;
+    if (!(fmax(fabs(pt_xform_det(&at[0])), fabs(pt_xform_det(&at[1]))) < (double)FLT_MAX))
+        return pt_diag_fail(&b->diag, loc, "the scale of an instance is too large for floats");
+    if (flat[0] && flat[1])
+        return leave_out_flattened(b, loc, "an instance");
     for (int i = 0; i < 9; i++)
         turns |= at[0].m[i / 3][i % 3] != at[1].m[i / 3][i % 3];
     for (int i = 0; i < 2; i++) {
         struct pt_xform t = pt_builder_to_render(b, &at[i]);
+        for (int k = 0; k < 9 && flat[i]; k++)
+            t.m[k / 3][k % 3] += 1e-6 * at[1 - i].m[k / 3][k % 3];
         if (!turns)
             t = pt_xform_mul(&t, &shift);
         instance.to_render[i] = pt_xform_to_mat34(&t);
@@ -224,15 +247,13 @@ static int store_mesh(struct pt_builder *b, struct pt_params *p, const struct pt
     size_t n = soup->vertex_count;
     struct pt_vertex *vertices = pt_arena_alloc(arena, n + 1, sizeof *vertices); /* one more: to begin at a multiple of 32 */
     uint32_t *indices = pt_arena_alloc(arena, soup->triangle_count, 3 * sizeof *indices);
-    int has_n = soup->nd || soup->nf, has_uv = soup->uvd || soup->uvf;
+    int has_n = (soup->nd || soup->nf) && pt_xform_invert(t, &inverse), has_uv = soup->uvd || soup->uvf;
     if (!vertices || !indices)
         return pt_diag_nomem(&b->diag, "a mesh");
     vertices = (struct pt_vertex *)(((uintptr_t)vertices + sizeof *vertices - 1) & ~(uintptr_t)(sizeof *vertices - 1));
     if (!store_positions(soup, t, vertices))
         return pt_diag_fail(&b->diag, pt_params_loc(p, soup->pd ? "P" : "filename"),
                             "a vertex is not finite after its transform");
-    if (!pt_xform_invert(t, &inverse))
-        return pt_diag_fail(&b->diag, p->loc, "singular transform of a shape");
     if (has_n)
         store_normals(soup, &inverse, b->state->reverse_orientation, vertices);
     for (size_t i = 0; has_uv && i < n; i++) {
@@ -386,9 +407,11 @@ static int add_quadric(struct pt_builder *b, struct pt_params *p, struct pt_quad
     struct pt_xform inverse;
     struct placement pl = place(b, p, &box);
     struct pt_shape shape = common(b, p);
-    if (!pt_xform_invert(&pl.xform, &inverse))
-        return pt_diag_fail(&b->diag, p->loc, "singular transform of a shape");
     q->phi_max = (float)(pt_params_float_in(p, "phimax", 360, 1e-3, 360) * BASE_PI / 180);
+    if (!pt_xform_invert(&pl.xform, &inverse)) {
+        pt_params_check_used(p);
+        return leave_out_flattened(b, p->loc, pt_params_kind(p));
+    }
     q->to_render = pt_xform_to_mat34(&pl.xform);
     q->from_render = pt_xform_to_mat34(&inverse);
     if (b->diag.rc)

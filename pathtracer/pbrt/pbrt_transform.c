@@ -1,17 +1,19 @@
 /* The directives that change or name the current transformation matrix. */
+#include <math.h>
 #include <string.h>
 
 #include "pbrt/pbrt_parser.h"
 
+/* A transform may flatten what comes (Scale 0 hides things in animations): who needs its inverse sees to that. */
 static int concat(struct parser *p, const struct pt_xform *t, int replace)
 {
-    struct pt_xform inverse;
     for (int i = 0; i < 2; i++) {
         if ((p->state.active >> i & 1) == 0)
             continue;
         struct pt_xform next = replace ? *t : pt_xform_mul(&p->state.ctm[i], t);
-        if (!pt_xform_invert(&next, &inverse))
-            return pt_diag_fail(&p->b->diag, p->loc, "singular transform (expected one that can be inverted)");
+        for (int k = 0; k < 12; k++)
+            if (!isfinite(next.m[k / 4][k % 4]))
+                return pt_diag_fail(&p->b->diag, p->loc, "the transform is out of range (expected finite numbers)");
         p->state.ctm[i] = next;
     }
     return 0;

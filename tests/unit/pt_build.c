@@ -581,6 +581,53 @@ static void the_same_twice_stands_still(void **state)
     pt_scene_destroy(s);
 }
 
+/* A transform without an inverse hides things, as exporters and animations use it, or makes a mesh flat, which pbrt shows. */
+static void flattened(void **state)
+{
+    (void)state;
+    int warnings = 0;
+    struct pt_scene *s = text_scene(
+        "WorldBegin ObjectBegin \"o\" Shape \"sphere\" ObjectEnd AreaLightSource \"diffuse\"\n"
+        "AttributeBegin Scale 1 1 0 Shape \"trianglemesh\" " TRIANGLE " \"normal N\" [ 0 0 1 0 1 1 1 0 1 ] AttributeEnd\n"
+        "AttributeBegin Scale 0 0 0 Shape \"trianglemesh\" " TRIANGLE " Shape \"sphere\" \"float phimax\" 90\n"
+        "ObjectInstance \"o\" AttributeEnd Shape \"cylinder\"",
+        NULL, &warnings);
+    assert_int_equal(warnings, 2);
+    assert_true(s->world_shape_count == 3 && s->instance_count == 0);
+    struct pt_ray ray = {{0.2f, 0.2f, -1}, {0, 0, 1}, 0.0f, INFINITY, 0.0f};
+    struct pt_hit hit;
+    assert_true(pt_accel_intersect(s, &ray, &hit) && hit.shape == 0);
+    near(hit.t, 1, 1e-6);
+    pt_scene_destroy(s);
+    /* too small, or too large, for Embree to invert: it ends the program */
+    s = world_scene("Scale 1e-20 1e-20 1e-20 ObjectBegin \"o\" Shape \"sphere\" ObjectEnd ObjectInstance \"o\"\n"
+                    "ActiveTransform EndTime Translate 1 0 0 ActiveTransform All Shape \"sphere\"");
+    assert_int_equal(s->instance_count, 0);
+    pt_scene_destroy(s);
+    struct base_err err;
+    assert_int_equal(
+        text_scene_error("WorldBegin Scale 1e20 1e20 1e20 ActiveTransform EndTime Translate 1 0 0 Shape \"sphere\"", 0,
+                         &err),
+        BASE_EINVAL);
+    assert_int_equal(text_scene_error("Scale 1 0 1 Camera \"perspective\" WorldBegin", 0, &err), BASE_EINVAL);
+}
+
+/* What grows from nothing: a ball of half its size half way. */
+static void grows_from_nothing(void **state)
+{
+    (void)state;
+    struct pt_scene *s =
+        world_scene("Translate 0 0 5 Rotate 30 1 2 3 ActiveTransform StartTime Scale 0 0 0 ActiveTransform All "
+                    "Shape \"sphere\"");
+    for (int i = 0; i <= 4; i++) {
+        struct pt_ray ray = {{0, 0, 0}, {0, 0, 1}, 0.0f, INFINITY, (float)i / 4.0f};
+        struct pt_hit hit;
+        assert_true(pt_accel_intersect(s, &ray, &hit));
+        near(hit.t, 5 - i / 4.0, 1e-4);
+    }
+    pt_scene_destroy(s);
+}
+
 static void graphics_state(void **state)
 {
     (void)state;
@@ -823,6 +870,8 @@ int main(void)
                                        cmocka_unit_test(instances_and_motion),
                                        cmocka_unit_test(part_of_the_motion),
                                        cmocka_unit_test(the_same_twice_stands_still),
+                                       cmocka_unit_test(flattened),
+                                       cmocka_unit_test(grows_from_nothing),
                                        cmocka_unit_test(graphics_state),
                                        cmocka_unit_test(interface_lamps_are_dark),
                                        cmocka_unit_test(coloured_shares_are_said),
