@@ -17,7 +17,7 @@ import numpy as np  # noqa: E402
 import lull  # noqa: E402
 import tap  # noqa: E402
 from lull import Rect, exr  # noqa: E402
-from lull.blender import ui, view  # noqa: E402
+from lull.blender import cycles, ui, view  # noqa: E402
 from lull.blender.cycles import WAVE, Cycles, HostError, merge  # noqa: E402
 from lull.blender.session import Session, Settings  # noqa: E402
 from tap import raises  # noqa: E402
@@ -147,6 +147,22 @@ def test_halves():
     wrong = np.sqrt(((mean - one_render(scene, 4096)) ** 2).mean())
     apart = np.sqrt(((half - mean) ** 2).mean())
     assert .5 * wrong < apart < 2 * wrong, (apart, wrong)
+
+
+def test_animated_seed():
+    """a driver or a key of the seed, or of what else a wave needs, leaves the halves apart and is there again afterwards"""
+    for animate in (lambda scene: setattr(scene.driver_add("cycles.seed").driver, "expression", "frame"),
+                    lambda scene: scene.keyframe_insert("cycles.seed", frame=1),
+                    lambda scene: setattr(scene.driver_add("cycles.sample_offset").driver, "expression", "0")):
+        scene = cube(32, 24)
+        animate(scene)
+        scene.frame_set(1)
+        with Session(scene, Settings("halfbuf", {"threshold": "1e-9"}, block=32, spp_max=32)) as session:
+            assert session.driver.run().outcome == "done"
+            mean, half = session.frame.mean(), session.frame.mean("half")
+            assert np.abs(mean - half).max() > 1e-3
+            assert np.abs(mean - whole_picture(session.host, 32)).max() < SAME
+        assert not any(curve.mute for curve in cycles.curves_of(scene))
 
 
 def test_phases():

@@ -15,7 +15,7 @@ import contextlib
 import os
 import sys
 import time
-from typing import Iterator, Sequence
+from typing import Container, Iterator, Sequence
 
 import bpy
 import numpy as np
@@ -116,6 +116,17 @@ def choose_device(name: str) -> None:
         raise HostError(f"device {name}: Cycles finds none on this machine")
 
 
+def curves_of(scene: bpy.types.Scene) -> Iterator[bpy.types.FCurve]:
+    """Drivers and curves of the scene's own properties."""
+    if (data := scene.animation_data) is None:
+        return
+    yield from data.drivers
+    for action in filter(None, [data.action, *(strip.action for track in data.nla_tracks for strip in track.strips)]):
+        bags = [bag for layer in getattr(action, "layers", ()) for strip in layer.strips for bag in strip.channelbags]
+        for owner in bags or [action]:
+            yield from getattr(owner, "fcurves", ())
+
+
 class Cycles:
     """Use as a context manager around everything that renders. scene: borrowed; spp_max: the most samples of a pixel;
     denoised: its denoising passes are rendered, too; view_layer: which one, by name, "" = the first that is used. notes: lines
@@ -210,11 +221,23 @@ class Cycles:
         return self
 
     def _set(self, owner: object, **settings: object) -> None:
-        """Sets those of the settings that this Blender has, to be put back on exit."""
+        """Sets those of the settings that this Blender has, to be put back on exit. What animates them would set them back in
+        each render: halves of one seed would be equal."""
         known = {name: value for name, value in settings.items() if hasattr(owner, name)}
         self._touched += [(owner, name, getattr(owner, name)) for name in known]  # before one changes another
+        for curve in curves_of(self.scene):
+            if not curve.mute and self._animates(curve, owner, known):
+                self._touched.append((curve, "mute", False))
+                curve.mute = True
         for name, value in known.items():
             setattr(owner, name, value)
+
+    def _animates(self, curve: bpy.types.FCurve, owner: object, names: Container[str]) -> bool:
+        place, _, name = curve.data_path.rpartition(".")
+        try:
+            return name in names and self.scene.path_resolve(place) == owner
+        except ValueError:  # what it animated is gone
+            return False
 
     def _find_passes(self) -> None:
         """Switches on the colours by which Cycles divides light, and asks one sample of one pixel which passes there are."""
