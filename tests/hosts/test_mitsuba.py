@@ -295,6 +295,10 @@ def test_bad_input():
         raises(ValueError, f"channels {shown}: expected RGB", lull.mitsuba.render, other, "halfbuf")
     splats = box(('type="path"', 'type="ptracer"'))
     raises(ValueError, "splats light over the whole film", lull.mitsuba.render, splats, "halfbuf")
+    film = {"type": "hdrfilm", "width": 8, "height": 8, "pixel_format": "rgb"}
+    batch = mi.load_dict({"type": "scene", "integrator": {"type": "path"}, "sensor": {
+        "type": "batch", "a": {"type": "perspective"}, "b": {"type": "perspective", "fov": 20}, "film": film}})
+    raises(ValueError, "the sensor BatchSensor has other rays", lull.mitsuba.render, batch, "halfbuf")
     raises(lull.LullError, "reads moment2, which this host does not supply", lull.mitsuba.render, scene("box"), "variance")
     raises(ValueError, "wave 0", lull.mitsuba.render, scene("box"), "halfbuf", wave=0)
     raises(ValueError, "time_budget_s nan", lull.mitsuba.render, scene("box"), "halfbuf", time_budget_s=math.nan)

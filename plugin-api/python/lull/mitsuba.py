@@ -52,12 +52,26 @@ class Film(scenes.Film):
         self.splats = self.film.rfilter().radius() > 0.5 + 1e-3  # neighbouring pixels share samples
         # a film that samples its own border does so for every crop
         self.border = 0 if self.film.sample_border() else int(self.film.rfilter().border_size())
+        if not self._keeps_to_crops():
+            raise ValueError(f"the sensor {self.sensor.class_name()} has other rays where its film is cropped, and cannot be "
+                             "rendered by blocks: render the sensors of a batch one by one")
         self._channels = self._find_channels()
         self.layers = [name for name in self._channels if name not in ("R", "G", "B", "W")]
         if denoised and not self.integrator.aov_names():
             self.integrator = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal", "i": self.integrator})
             self._channels = self._find_channels()
         self.supplies = [plane for plane, names in _AOVS.items() if set(names) <= set(self._channels)]
+
+    def _keeps_to_crops(self) -> bool:
+        """Does a pixel have the same ray in a crop as in the whole film?"""
+        quarter, rays = Rect(0, 0, -(-self.width // 2), -(-self.height // 2)), []
+        for area in (Rect(0, 0, self.width, self.height), quarter):
+            self._set_crop(area)
+            at = [.6 * quarter.width / area.width, .7 * quarter.height / area.height]
+            ray, _ = self.sensor.sample_ray(0.0, .5, at, [.5, .5])
+            rays.append(np.ravel([ray.o, ray.d]))
+        self._set_crop(self.crop)
+        return np.allclose(*rays, rtol=1e-3, atol=1e-4)
 
     def _find_channels(self) -> list[str]:
         """Of the film's sums, in order; ValueError if it makes other colours of them."""
