@@ -224,7 +224,7 @@ def test_one_call():
         shades = np.zeros((96, 96, 3), np.uint8)
         shades[3, 3] = 255
         files.write_png(painted, shades)
-        masked = go(mask=painted, threshold=.02, spp_max=512)
+        masked = go(mask=Path(painted), threshold=.02, spp_max=512)
         same = go(mask=shades[..., 0] / 255., threshold=.02, spp_max=512)
         plain = go(threshold=.02, spp_max=512)
         counts = [[b.spp for b in p.driver.frame.blocks] for p in (masked, same, plain)]

@@ -105,7 +105,7 @@ def load(spec: str = "observer", *, threads: Optional[int] = None, log: Optional
 
 
 def _texts(parameters: Mapping[str, object]) -> dict[str, str]:
-    return {key.replace("_", "-"): str(int(value)) if isinstance(value, bool) else
+    return {key.replace("_", "-"): str(int(value)) if isinstance(value, (bool, np.bool_)) else
             repr(float(value)) if isinstance(value, float) else str(value) for key, value in parameters.items()}
 
 

@@ -93,7 +93,7 @@ def quote(render_scene: Callable[..., Picture], criterion: Union[str, Criterion]
 
 def render(open_film: Callable[[], Film], criterion: Union[str, Criterion], *, seed: int, wave: int, denoise: str,
            read_mask: Callable[[str], np.ndarray], spp_min: int = 16, spp_max: int = 1024, time_budget_s: float = 0.0,
-           block: Optional[int] = None, mask: Union[np.ndarray, str, None] = None, checkpoint: str = "",
+           block: Optional[int] = None, mask: Union[np.ndarray, str, os.PathLike[str], None] = None, checkpoint: str = "",
            resume: bool = False, checkpoint_every_s: float = 60.0, after_call: Optional[Callable[[Driver], None]] = None,
            tell: Optional[Callable[[str], None]] = print_line, display_server: str = "", **parameters: Any) -> Picture:
     """Renders what open_film gives; each block until the criterion stops it.
@@ -107,6 +107,7 @@ def render(open_film: Callable[[], Film], criterion: Union[str, Criterion], *, s
     is not raised: see Picture.result. Raises LullError, ValueError, TypeError and OSError for bad input, before anything
     is rendered.
     """
+    mask = os.fspath(mask) if isinstance(mask, os.PathLike) else mask
     if resume and not checkpoint:
         raise ValueError("resume: there is no checkpoint to go on from: name one with checkpoint=")
     if checkpoint:
