@@ -6,6 +6,7 @@
 #include <sched.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 struct worker {
     struct base_threads *pool;
@@ -29,6 +30,7 @@ struct base_threads {
     atomic_int sleeping, finishing;
     atomic_int quit;
     int count, started, looks;
+    pid_t owner; /* a child of fork has the pool, but none of its workers */
     long n;
     atomic_long next;
     void (*fn)(void *, long, int);
@@ -119,6 +121,7 @@ struct base_threads *base_threads_create(int count, struct base_err *err)
     pthread_cond_init(&t->work, NULL);
     pthread_cond_init(&t->done, NULL);
     t->count = count;
+    t->owner = getpid();
     t->looks = count <= base_threads_available() ? LOOKS : 0; /* who looks keeps no processor from who works */
     for (int i = 1; i < count; i++) {
         t->workers[i] = (struct worker){.pool = t, .id = i};
@@ -134,17 +137,17 @@ struct base_threads *base_threads_create(int count, struct base_err *err)
 
 void base_threads_destroy(struct base_threads *t)
 {
-    if (!t)
-        return;
-    pthread_mutex_lock(&t->lock);
-    atomic_store(&t->quit, 1);
-    pthread_cond_broadcast(&t->work);
-    pthread_mutex_unlock(&t->lock);
-    for (int i = 1; i <= t->started; i++)
-        pthread_join(t->workers[i].thread, NULL);
-    pthread_mutex_destroy(&t->lock);
-    pthread_cond_destroy(&t->work);
-    pthread_cond_destroy(&t->done);
+    if (t && t->owner == getpid()) {
+        pthread_mutex_lock(&t->lock);
+        atomic_store(&t->quit, 1);
+        pthread_cond_broadcast(&t->work);
+        pthread_mutex_unlock(&t->lock);
+        for (int i = 1; i <= t->started; i++)
+            pthread_join(t->workers[i].thread, NULL);
+        pthread_mutex_destroy(&t->lock);
+        pthread_cond_destroy(&t->work);
+        pthread_cond_destroy(&t->done);
+    }
     free(t);
 }
 
@@ -177,7 +180,7 @@ static void finish(struct base_threads *t)
 
 void base_threads_for(struct base_threads *t, long n, void (*fn)(void *, long, int), void *data)
 {
-    if (n <= 1 || !t || t->started == 0) {
+    if (n <= 1 || !t || t->started == 0 || t->owner != getpid()) {
         for (long i = 0; i < n; i++)
             fn(data, i, 0);
         return;

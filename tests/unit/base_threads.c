@@ -3,7 +3,9 @@
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stddef.h>
+#include <sys/wait.h>
 #include <time.h>
+#include <unistd.h>
 #include <cmocka.h>
 
 #include "base/threads.h"
@@ -88,12 +90,41 @@ static void destroys_idle(void **state)
     }
 }
 
+/* A child of fork has none of the workers: it does the work alone, and waits for nobody. */
+static void works_in_a_child_of_fork(void **state)
+{
+    struct base_err err = {0};
+    struct base_threads *t = base_threads_create(THREADS, &err);
+    struct job j = {.everybody = 0};
+    int status = -1;
+    (void)state;
+    assert_non_null(t);
+    expect_once(t, &j, INDICES);
+    const pid_t child = fork();
+    if (child == 0) {
+        alarm(20);
+        for (int i = 0; i < INDICES; i++)
+            atomic_store(&j.taken[i], 0);
+        base_threads_for(t, INDICES, take, &j);
+        int once = 1;
+        for (int i = 0; i < INDICES; i++)
+            once &= atomic_load(&j.taken[i]) == 1;
+        base_threads_destroy(t);
+        _exit(!once);
+    }
+    assert_true(child > 0 && waitpid(child, &status, 0) == child);
+    assert_int_equal(status, 0);
+    expect_once(t, &j, INDICES);
+    base_threads_destroy(t);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_index_once),
         cmocka_unit_test(all_workers_take_part),
         cmocka_unit_test(destroys_idle),
+        cmocka_unit_test(works_in_a_child_of_fork),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
