@@ -23,6 +23,7 @@ struct pt_diag {
     struct base_err *err;     /* may be NULL */
     int rc;                   /* 0 until the first failure */
     int strict;               /* warnings are failures */
+    int is_v3;                /* of pbrt-v3's, which goes on where a parameter is unknown */
     struct base_log *log;     /* may be NULL */
     struct pt_names reported; /* owns: texts of the warnings given, each once */
 };

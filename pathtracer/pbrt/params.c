@@ -241,6 +241,16 @@ static int add_param(struct pt_params *params, const struct pt_param *p)
     return 0;
 }
 
+/* Of a parameter that is given again pbrt takes the last one, but pbrt-v3 a texture before a value. */
+static void replace(struct pt_params *params, struct pt_param *before, const struct pt_param *again)
+{
+    const int stays = before->type == PT_PARAM_TEXTURE && again->type != PT_PARAM_TEXTURE;
+    pt_diag_warn(params->diag, again->loc, "parameter \"%s\" is given twice: the %s counts", pt_param_name(params, again),
+                 stays ? "texture" : "last one");
+    if (!stays)
+        *before = *again;
+}
+
 int pt_params_read(struct pt_params *params, struct pt_lexer *lexer)
 {
     while (pt_lexer_peek(lexer).kind == PT_TOKEN_STRING) {
@@ -251,9 +261,10 @@ int pt_params_read(struct pt_params *params, struct pt_lexer *lexer)
             rc = read_values(params, lexer, &p);
         if (rc)
             return rc;
-        if (pt_params_find(params, pt_param_name(params, &p)))
-            return pt_diag_fail(params->diag, p.loc, "parameter \"%s\" is given twice", pt_param_name(params, &p));
-        if (add_param(params, &p) != 0)
+        struct pt_param *before = pt_params_find(params, pt_param_name(params, &p));
+        if (before)
+            replace(params, before, &p);
+        else if (add_param(params, &p) != 0)
             return params->diag->rc;
     }
     return params->diag->rc;
@@ -311,7 +322,7 @@ void pt_params_check_used(struct pt_params *params)
         const char *name = pt_param_name(params, p);
         if (p->used || p->inherited)
             continue;
-        if (in_list(known_names, name))
+        if (params->diag->is_v3 || in_list(known_names, name))
             pt_diag_warn(params->diag, p->loc, "parameter \"%s\" has no effect on \"%s\"", name, pt_params_kind(params));
         else
             pt_diag_fail(params->diag, p->loc, "unknown parameter \"%s\" of \"%s\"", name, pt_params_kind(params));

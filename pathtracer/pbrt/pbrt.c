@@ -106,12 +106,22 @@ static int fail_open(struct parser *p, const char *name)
                         elsewhere ? top->loc.file : "line ", elsewhere ? ":" : "", top->loc.line);
 }
 
+/* In pbrt-v3 an object is an attribute block, too, and the end of either closes the one that was opened last. */
+static int closes(const struct parser *p, char kind, char opened)
+{
+    return kind == opened || (has_names(p, kind) && has_names(p, opened));
+}
+
 static int pop(struct parser *p, char kind, const char *end_name)
 {
     const struct frame *top = innermost(p);
+    if (!top && p->b->is_v3) { /* pbrt-v3 says so and goes on */
+        pt_diag_warn(&p->b->diag, p->loc, "%s without %s is ignored", end_name, begin_name(kind));
+        return p->b->diag.rc;
+    }
     if (!top || top->kind == 'I')
         return pt_diag_fail(&p->b->diag, p->loc, "%s without %s", end_name, begin_name(kind));
-    if (top->kind != kind)
+    if (!closes(p, kind, top->kind))
         return fail_open(p, end_name);
     /* In v4 TransformBegin is an old name of AttributeBegin, which belongs into the world. */
     if (kind == 'T' && (p->b->is_v3 || !p->in_world)) {
@@ -147,6 +157,8 @@ static int do_object_begin(struct parser *p)
 
 static int do_object_end(struct parser *p)
 {
+    if (p->b->open_object < 0)
+        return pt_diag_fail(&p->b->diag, p->loc, "ObjectEnd without ObjectBegin");
     int rc = pop(p, 'O', "ObjectEnd");
     if (!rc)
         p->b->open_object = -1;
@@ -185,7 +197,7 @@ static int do_film(struct parser *p)
 {
     int rc = read_header(p, PT_HEADER_FILM, "Film");
     if (!rc && strcmp(pt_params_kind(&p->b->header[PT_HEADER_FILM]), "image") == 0)
-        p->b->is_v3 = 1;
+        p->b->is_v3 = p->b->diag.is_v3 = 1;
     return rc;
 }
 
@@ -232,7 +244,7 @@ static int do_world_begin(struct parser *p)
 static int do_world_end(struct parser *p)
 {
     p->ended = 1;
-    return innermost(p) ? fail_open(p, "WorldEnd") : 0;
+    return innermost(p) && !p->b->is_v3 ? fail_open(p, "WorldEnd") : 0;
 }
 
 /* --- world ------------------------------------------------------------------------------------------------------------ */
@@ -506,8 +518,10 @@ static int run_directive(struct parser *p, const struct pt_token *t)
 static int finish(struct parser *p, struct pt_loc loc)
 {
     const struct frame *top = innermost(p);
-    if (top)
-        return pt_diag_fail(&p->b->diag, top->loc, "%s is never closed", begin_name(top->kind));
+    if (p->b->open_object >= 0 || (top && !p->b->is_v3))
+        return pt_diag_fail(&p->b->diag, top ? top->loc : loc, "%s is never closed", begin_name(top ? top->kind : 'O'));
+    if (top) /* pbrt-v3 says so and renders */
+        pt_diag_warn(&p->b->diag, top->loc, "%s is never closed", begin_name(top->kind));
     if (!p->in_world)
         return pt_diag_fail(&p->b->diag, loc, "the file ends without WorldBegin");
     int rc = pt_build_materials_check(p->b);

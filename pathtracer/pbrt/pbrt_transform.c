@@ -104,8 +104,10 @@ static int do_coord_sys_transform(struct parser *p)
     if (rc)
         return rc;
     int32_t id = pt_names_get(&p->system_names, name);
-    if (id < 0)
-        return pt_diag_fail(&p->b->diag, p->loc, "unknown coordinate system \"%s\"", name);
+    if (id < 0) { /* pbrt says so and goes on */
+        pt_diag_warn(&p->b->diag, p->loc, "unknown coordinate system \"%s\": the transform stays", name);
+        return p->b->diag.rc;
+    }
     const struct pt_xform(*systems)[2] = p->systems.items;
     /* Of both times, whatever ActiveTransform says: so pbrt does. */
     memcpy(p->state.ctm, systems[id], sizeof p->state.ctm);
