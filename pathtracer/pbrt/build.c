@@ -33,13 +33,14 @@ void pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_sce
     b->media.size = sizeof(struct pt_medium);
     b->medium_infos.size = sizeof(struct pt_medium_info);
     b->name_undo.size = sizeof(struct pt_name_undo);
+    b->object_infos.size = sizeof(struct pt_object_info);
 }
 
 void pt_builder_release(struct pt_builder *b)
 {
     struct pt_list *lists[] = {&b->images,   &b->textures,     &b->materials,     &b->material_infos, &b->meshes,
                                &b->quadrics, &b->world_shapes, &b->object_shapes, &b->objects,        &b->instances,
-                               &b->lights,   &b->media,        &b->medium_infos,  &b->name_undo};
+                               &b->lights,   &b->media,        &b->medium_infos,  &b->name_undo,      &b->object_infos};
     struct pt_names *names[] = {&b->float_textures, &b->colour_textures, &b->named_materials,
                                 &b->media_names,    &b->object_names,    &b->image_names};
     const struct pt_material_info *infos = b->material_infos.items;
@@ -54,7 +55,6 @@ void pt_builder_release(struct pt_builder *b)
         pt_names_release(names[i]);
     for (int i = 0; i < PT_HEADER_COUNT; i++)
         pt_params_release(&b->header[i]);
-    free(b->object_offsets);
     pt_diag_release(&b->diag);
 }
 

@@ -67,6 +67,12 @@ struct pt_medium_info {
     const char *name;                 /* in the scene's arena */
 };
 
+struct pt_object_info {
+    double origin[3];   /* of its space in the space it was defined in */
+    const char *wanted; /* of v4: the name that it is instanced by before it is made, in the scene's arena; else NULL */
+    struct pt_loc used; /* by the first instance that came before it; line 0: none did, and its origin is still free */
+};
+
 /* What a name meant. */
 struct pt_name_undo {
     struct pt_names *names;
@@ -97,9 +103,8 @@ struct pt_builder {
     struct pt_list name_undo; /* struct pt_name_undo: what names meant that were set in those */
 
     int32_t open_object;         /* between ObjectBegin and ObjectEnd, else -1 */
-    double (*object_offsets)[3]; /* owns: origin of each object's space in the space it was defined in */
-    size_t object_offset_room;
-    int32_t default_material; /* grey diffuse, made on first use; -1 before */
+    struct pt_list object_infos; /* struct pt_object_info, by object */
+    int32_t default_material;    /* grey diffuse, made on first use; -1 before */
 };
 
 void pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_scene_defaults *defaults,
@@ -207,6 +212,8 @@ int pt_build_media_check(struct pt_builder *b);
 int pt_build_shape(struct pt_builder *b, struct pt_params *p);
 int pt_build_object_begin(struct pt_builder *b, const char *name, struct pt_loc loc);
 int pt_build_instance(struct pt_builder *b, const char *name, struct pt_loc loc);
+/* Fails for an object that was instanced and never made. */
+int pt_build_objects_check(struct pt_builder *b);
 
 /* Triangles before they are placed. Positions: pd or pf; the rest may be NULL. */
 struct pt_soup {

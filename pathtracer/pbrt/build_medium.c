@@ -28,8 +28,8 @@ static int stays(const struct pt_builder *b, const struct pt_instance *instance)
 {
     if (instance->animated) /* perhaps a moving shape of its own, which has no offset */
         return 0;
-    const double *offset = b->object_offsets[instance->object];
-    struct pt_xform shift = pt_xform_translate(offset[0], offset[1], offset[2]), at = pt_builder_to_render(b, &shift);
+    const double *origin = ((const struct pt_object_info *)b->object_infos.items)[instance->object].origin;
+    struct pt_xform shift = pt_xform_translate(origin[0], origin[1], origin[2]), at = pt_builder_to_render(b, &shift);
     struct pt_mat34 there = pt_xform_to_mat34(&at);
     int same = 1;
     for (int i = 0; i < 12; i++) /* but for the rounding of turns there and back */

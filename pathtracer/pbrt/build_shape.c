@@ -61,11 +61,12 @@ static struct placement place(struct pt_builder *b, const struct pt_params *p, c
     pt_builder_at_shutter(b, b->state->ctm, pl.at);
     pl.animated = !pt_xform_equal(&pl.at[0], &pl.at[1]);
     if (b->open_object >= 0) {
-        double *origin = b->object_offsets[b->open_object];
+        struct pt_object_info *info = (struct pt_object_info *)b->object_infos.items + b->open_object;
+        double *origin = info->origin;
         if (pl.animated)
             pt_diag_warn(&b->diag, p->loc, "a moving shape within an object stays at its place at shutter open");
         pl.animated = 0;
-        if (((struct pt_object *)b->objects.items)[b->open_object].shape_count == 0)
+        if (((struct pt_object *)b->objects.items)[b->open_object].shape_count == 0 && info->used.line == 0)
             find_origin(&pl.at[0], box, origin);
         pl.xform = pl.at[0];
         for (int i = 0; i < 3; i++)
@@ -174,6 +175,7 @@ static int add_shape(struct pt_builder *b, struct pt_params *p, const struct pla
         pt_list_add(b, &b->object_shapes, shape);
     } else if (pl->animated) {
         struct pt_object object = {(int32_t)b->object_shapes.count, 1};
+        pt_list_add(b, &b->object_infos, &(struct pt_object_info){0});
         int32_t id = pt_list_add(b, &b->objects, &object);
         pt_list_add(b, &b->object_shapes, shape);
         add_instance(b, id, pl->at, pl->origin, p->loc);
@@ -490,32 +492,76 @@ int pt_build_shape(struct pt_builder *b, struct pt_params *p)
                         pt_params_kind(p));
 }
 
+/* An object without shapes so far; wanted: the name of one that is made further down. */
+static int32_t add_object(struct pt_builder *b, const char *name, const struct pt_object_info *info)
+{
+    const struct pt_object object = {(int32_t)b->object_shapes.count, 0};
+    const int32_t id = pt_list_add(b, &b->object_infos, info) < 0 ? -1 : pt_list_add(b, &b->objects, &object);
+    if (id < 0 || pt_names_set(&b->object_names, name, id) != 0)
+        pt_diag_nomem(&b->diag, "objects");
+    return b->diag.rc ? -1 : id;
+}
+
 int pt_build_object_begin(struct pt_builder *b, const char *name, struct pt_loc loc)
 {
-    struct pt_object object = {(int32_t)b->object_shapes.count, 0};
+    int32_t id = pt_names_get(&b->object_names, name);
     if (b->open_object >= 0)
         return pt_diag_fail(&b->diag, loc, "ObjectBegin within an object");
-    int32_t id = pt_list_add(b, &b->objects, &object);
-    while (id >= 0 && (size_t)id >= b->object_offset_room)
-        if (!pt_grow((void **)&b->object_offsets, &b->object_offset_room, b->object_offset_room, sizeof *b->object_offsets))
-            return pt_diag_nomem(&b->diag, "objects");
-    if (id < 0 || pt_names_set(&b->object_names, name, id) != 0)
-        return pt_diag_nomem(&b->diag, "objects");
-    memset(b->object_offsets[id], 0, sizeof b->object_offsets[id]);
-    b->open_object = id;
-    return 0;
+    struct pt_object_info *infos = b->object_infos.items;
+    if (id >= 0 && infos[id].wanted) {
+        infos[id].wanted = NULL;
+        ((struct pt_object *)b->objects.items)[id].first_shape = (int32_t)b->object_shapes.count;
+    } else {
+        id = add_object(b, name, &(struct pt_object_info){0});
+    }
+    if (id >= 0)
+        b->open_object = id;
+    return b->diag.rc;
+}
+
+/* The object of an instance, or -1. pbrt-v4 looks for it at the end of the scene, pbrt-v3 leaves the instance out. */
+static int32_t find_object(struct pt_builder *b, const char *name, struct pt_loc loc)
+{
+    const int32_t id = pt_names_get(&b->object_names, name);
+    if (id >= 0)
+        return id;
+    if (b->is_v3) {
+        pt_diag_warn(&b->diag, loc, "unknown object \"%s\": its instance is left out", name);
+        return -1;
+    }
+    const struct pt_object_info info = {.wanted = pt_arena_strndup(&b->scene->arena, name, strlen(name)), .used = loc};
+    if (!info.wanted)
+        pt_diag_nomem(&b->diag, "objects");
+    return b->diag.rc ? -1 : add_object(b, name, &info);
 }
 
 int pt_build_instance(struct pt_builder *b, const char *name, struct pt_loc loc)
 {
-    const int32_t object = pt_names_get(&b->object_names, name);
     struct pt_xform at[2];
-    if (object < 0)
-        return pt_diag_fail(&b->diag, loc, "unknown object \"%s\" (expected one made by ObjectBegin before)", name);
     if (b->open_object >= 0)
         return pt_diag_fail(&b->diag, loc, "ObjectInstance within an object");
-    if (((struct pt_object *)b->objects.items)[object].shape_count == 0)
+    const int32_t object = find_object(b, name, loc);
+    if (object < 0)
+        return b->diag.rc;
+    const struct pt_object_info *info = (struct pt_object_info *)b->object_infos.items + object;
+    if (((struct pt_object *)b->objects.items)[object].shape_count == 0 && !info->wanted)
         return 0;
     pt_builder_at_shutter(b, b->state->ctm, at);
-    return add_instance(b, object, at, b->object_offsets[object], loc);
+    return add_instance(b, object, at, info->origin, loc);
+}
+
+int pt_build_objects_check(struct pt_builder *b)
+{
+    const struct pt_object_info *infos = b->object_infos.items;
+    struct pt_instance *instances = b->instances.items;
+    size_t kept = 0;
+    for (size_t i = 0; i < b->object_infos.count; i++)
+        if (infos[i].wanted)
+            return pt_diag_fail(&b->diag, infos[i].used, "unknown object \"%s\" (expected one made by ObjectBegin)",
+                                infos[i].wanted);
+    for (size_t i = 0; i < b->instances.count; i++) /* those of what turned out to be empty go */
+        if (((struct pt_object *)b->objects.items)[instances[i].object].shape_count > 0)
+            instances[kept++] = instances[i];
+    b->instances.count = kept;
+    return b->diag.rc;
 }

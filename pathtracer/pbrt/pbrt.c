@@ -525,6 +525,8 @@ static int finish(struct parser *p, struct pt_loc loc)
     if (!p->in_world)
         return pt_diag_fail(&p->b->diag, loc, "the file ends without WorldBegin");
     int rc = pt_build_materials_check(p->b);
+    if (!rc)
+        rc = pt_build_objects_check(p->b);
     return rc ? rc : pt_build_media_check(p->b);
 }
 

@@ -61,12 +61,22 @@ static void of_both(void **state)
     expect_same("Film \"image\" ", list, sizeof list / sizeof list[0]);
 }
 
+static void of_v4(void **state)
+{
+    static const struct tolerated list[] = {
+        {"Translate 0 0 5 ObjectInstance \"a\" Identity " OBJECT, OBJECT "Translate 0 0 5 ObjectInstance \"a\"", 0},
+    };
+    (void)state;
+    expect_same("", list, sizeof list / sizeof list[0]);
+}
+
 static void of_v3(void **state)
 {
     static const struct tolerated list[] = {
         {"AttributeBegin ObjectBegin \"a\" Shape \"sphere\" AttributeEnd ObjectEnd Shape \"disk\"", OBJECT "Shape \"disk\"", 0},
         {"Shape \"sphere\" AttributeEnd WorldEnd", "Shape \"sphere\"", 1},
         {"AttributeBegin Shape \"sphere\" WorldEnd", "Shape \"sphere\"", 1},
+        {"ObjectInstance \"a\" " OBJECT, OBJECT, 1},
         {"Shape \"sphere\" \"float raduis\" 2", "Shape \"sphere\"", 1},
         {"Texture \"t\" \"spectrum\" \"constant\" \"rgb value\" [ .2 .3 .4 ] "
          "Material \"matte\" \"texture Kd\" \"t\" \"rgb Kd\" [ .5 .5 .5 ] Shape \"disk\"",
@@ -79,6 +89,6 @@ static void of_v3(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(of_both), cmocka_unit_test(of_v3)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(of_both), cmocka_unit_test(of_v4), cmocka_unit_test(of_v3)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
