@@ -1,4 +1,5 @@
 /* Film, filter, sampler, integrator and camera: what the image is, before anything is in it. */
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -124,9 +125,9 @@ static void build_film(struct pt_builder *b)
         pt_diag_warn(&b->diag, pt_params_find(p, "sensor")->loc, "sensor \"%s\" is rendered as an ideal one", sensor);
     if (pt_params_find(p, "whitebalance") && pt_params_float(p, "whitebalance", 0) != 0)
         pt_diag_warn(&b->diag, pt_params_find(p, "whitebalance")->loc, "white balance is ignored");
-    double limit = pt_params_float_in(p, "maxcomponentvalue", INFINITY, 1e-30, 1e30);
+    double limit = pt_params_float_in(p, "maxcomponentvalue", INFINITY, 1e-30, FLT_MAX);
     if (pt_params_find(p, "maxsampleluminance")) /* v3's, of a sample before the film's scale */
-        limit = pt_params_float_in(p, "maxsampleluminance", limit, 1e-30, 1e30) * (double)b->scene->radiance_scale;
+        limit = pt_params_float_in(p, "maxsampleluminance", limit, 1e-30, FLT_MAX) * (double)b->scene->radiance_scale;
     d->integrator.max_component = (float)limit;
     pt_params_ignore(p, "diagonal savefp16 writeframe type coordinatesystem nbuckets lambdamin lambdamax");
     pt_params_check_used(p);

@@ -336,11 +336,22 @@ static uint32_t *read_indices(struct pt_builder *b, struct pt_params *p, size_t 
     return indices;
 }
 
+static int is_empty(const struct pt_params *p, const char *name)
+{
+    const struct pt_param *list = pt_params_find(p, name);
+    return list && list->count == 0;
+}
+
 static int make_triangle_mesh(struct pt_builder *b, struct pt_params *p)
 {
     struct pt_soup soup = {0};
     size_t n_count, uv_count, index_count;
     soup.pd = pt_params_floats(p, "P", 3, &soup.vertex_count);
+    /* So exporters write an object without faces; to pbrt-v4 three points without indices are a triangle. */
+    if (!b->diag.rc && (is_empty(p, "P") || (is_empty(p, "indices") && (b->is_v3 || soup.vertex_count != 3)))) {
+        pt_params_ignore(p, "indices N S uv st faceIndices discarddegenerateUVs");
+        return pt_build_mesh(b, p, &(struct pt_soup){0});
+    }
     if (!soup.pd)
         return pt_diag_fail(&b->diag, p->loc, "a trianglemesh needs \"point3 P\"");
     soup.nd = pt_params_floats(p, "N", 3, &n_count);
@@ -409,7 +420,7 @@ static int add_quadric(struct pt_builder *b, struct pt_params *p, struct pt_quad
     struct pt_xform inverse;
     struct placement pl = place(b, p, &box);
     struct pt_shape shape = common(b, p);
-    q->phi_max = (float)(pt_params_float_in(p, "phimax", 360, 1e-3, 360) * BASE_PI / 180);
+    q->phi_max = (float)(fmin(pt_params_float_in(p, "phimax", 360, 1e-3, 1e30), 360) * BASE_PI / 180);
     if (!pt_xform_invert(&pl.xform, &inverse)) {
         pt_params_check_used(p);
         return leave_out_flattened(b, p->loc, pt_params_kind(p));

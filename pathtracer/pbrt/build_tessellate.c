@@ -311,7 +311,7 @@ int pt_build_revolved(struct pt_builder *b, struct pt_params *p)
 {
     const char *kind = pt_params_kind(p);
     double radius = pt_params_float_in(p, "radius", 1, 1e-30, 1e30),
-           phi = pt_params_float_in(p, "phimax", 360, 1e-3, 360) * BASE_PI / 180;
+           phi = fmin(pt_params_float_in(p, "phimax", 360, 1e-3, 1e30), 360) * BASE_PI / 180;
     double height = pt_params_float(p, "height", 1), zmin = pt_params_float(p, "zmin", 0),
            zmax = pt_params_float(p, "zmax", 1);
     double z0 = fmin(zmin, zmax), z1 = fmax(zmin, zmax);

@@ -484,7 +484,7 @@ static void ends_of_ranges(void **state)
         {"WorldBegin Material \"conductor\" \"float roughness\" %s", "0", "-0.1"},
         {"WorldBegin Shape \"disk\" \"float innerradius\" %s", "0.99", "1"},
         {"WorldBegin Shape \"sphere\" \"float zmin\" %s", "0.99", "1"},
-        {"WorldBegin Shape \"sphere\" \"float phimax\" %s", "360", "361"},
+        {"WorldBegin Shape \"sphere\" \"float phimax\" %s", "361", "0"},
         {"WorldBegin Shape \"cylinder\" \"float zmin\" %s", "0.99", "1"},
         {"WorldBegin Shape \"curve\" \"point3 P\" [ 0 0 0 1 0 0 2 0 0 3 0 0 ] \"float width0\" %s", "0", "-1"},
         {"WorldBegin LightSource \"point\" \"blackbody I\" %s", "100", "99"},

@@ -13,6 +13,7 @@
 #include "pt_text_scene.h"
 #include "support/pt_dump.h"
 
+#define MESH "Shape \"trianglemesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 ] "
 #define OBJECT "ObjectBegin \"a\" Shape \"sphere\" ObjectEnd "
 
 /* The words of the world, after `head`. malloc'ed */
@@ -55,6 +56,13 @@ static void of_both(void **state)
     static const struct tolerated list[] = {
         {"Shape \"sphere\" \"float radius\" 1 \"float radius\" 2", "Shape \"sphere\" \"float radius\" 2", 1},
         {"CoordSysTransform \"moon\" Shape \"sphere\"", "Shape \"sphere\"", 1},
+        {"AttributeBegin Scale 0 0 0 Shape \"sphere\" AttributeEnd Shape \"disk\"", "Shape \"disk\"", 1},
+        {OBJECT "AttributeBegin Scale 0 0 0 ObjectInstance \"a\" AttributeEnd", OBJECT, 1},
+        {"Scale 1 1 0 Shape \"trianglemesh\" \"point3 P\" [ 0 0 3 1 0 4 0 1 5 ]", MESH, 0},
+        {"Shape \"trianglemesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ] \"integer indices\" [ ] Shape \"disk\"",
+         "Shape \"disk\"", 1},
+        {"Shape \"trianglemesh\" \"point3 P\" [ ] \"integer indices\" [ ] Shape \"disk\"", "Shape \"disk\"", 1},
+        {"Shape \"sphere\" \"float phimax\" 360.00001", "Shape \"sphere\"", 0},
     };
     (void)state;
     expect_same("", list, sizeof list / sizeof list[0]);
@@ -77,6 +85,9 @@ static void of_v3(void **state)
         {"Shape \"sphere\" AttributeEnd WorldEnd", "Shape \"sphere\"", 1},
         {"AttributeBegin Shape \"sphere\" WorldEnd", "Shape \"sphere\"", 1},
         {"ObjectInstance \"a\" " OBJECT, OBJECT, 1},
+        {MESH "\"integer indices\" [ ] Shape \"disk\"", "Shape \"disk\"", 1},
+        {"Material \"matte\" \"spectrum Kd\" [ 700 .2 400 .4 ] Shape \"disk\"",
+         "Material \"matte\" \"spectrum Kd\" [ 400 .4 700 .2 ] Shape \"disk\"", 0},
         {"Shape \"sphere\" \"float raduis\" 2", "Shape \"sphere\"", 1},
         {"Texture \"t\" \"spectrum\" \"constant\" \"rgb value\" [ .2 .3 .4 ] "
          "Material \"matte\" \"texture Kd\" \"t\" \"rgb Kd\" [ .5 .5 .5 ] Shape \"disk\"",
