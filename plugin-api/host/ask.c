@@ -33,6 +33,18 @@ struct question {
     struct lull_decision *decisions;
 };
 
+/* What cannot be is not known. */
+static struct lull_decision sensible(struct lull_decision d)
+{
+    if (!(d.p_noisy >= 0.0 && d.p_noisy <= 1.0))
+        d.p_noisy = (double)NAN;
+    if (!(d.predicted_spp >= 0.0))
+        d.predicted_spp = (double)NAN;
+    if (!(d.error >= 0.0))
+        d.error = (double)NAN;
+    return d;
+}
+
 /* Asks the instance of one step about those of the due blocks that are its own. */
 static int32_t evaluate_step(struct lull_host_criterion *c, uint32_t step, const struct lull_view *view,
                              const struct question *q, struct lull_error *e)
@@ -48,12 +60,15 @@ static int32_t evaluate_step(struct lull_host_criterion *c, uint32_t step, const
     }
     if (n == 0)
         return LULL_OK;
+    struct lull_process_state before;
+    lull_thread_state_read(&before);
     int32_t code =
         c->table->evaluate(c->instances[step], view, c->due, sizeof c->due[0], c->answers, sizeof c->answers[0], n, e);
+    lull_host_leave(c, &before, "evaluate");
     n = 0;
     for (uint32_t k = 0; k < q->count && code == LULL_OK; k++)
         if (q->blocks->list[q->due[k]].step == step)
-            q->decisions[k] = c->answers[n++];
+            q->decisions[k] = sensible(c->answers[n++]);
     return code;
 }
 

@@ -10,6 +10,7 @@
 #include "base/err.h"
 #include "base/threads.h"
 #include "picture/font.h"
+#include "src/process_state.h"
 
 enum { LULL_HOST_STEPS = 8 }; /* of a mask */
 static const uint64_t LULL_HOST_MOST_SPP = INT32_MAX;
@@ -46,6 +47,8 @@ struct lull_host_criterion {
     /* The first warning, where the services have no log; the LULL_WARNING_ state says what became of it. */
     atomic_int warning_state;
     char warning[LULL_HOST_LINE];
+
+    atomic_int told_change; /* that a call of it changed what is the renderer's */
 
     /* What was said in its frame, for the report: the first lines of LULL_LOG_INFO or worse. */
     pthread_mutex_t messages_lock;
@@ -236,8 +239,18 @@ struct cJSON;
 struct cJSON *lull_host_report_block(struct cJSON *list, const struct lull_host_block *b, const double *noisy_error,
                                      int *failed);
 
+/* --- leave.c -------------------------------------------------------------------------------------------------------- */
+
+/* After a call of a criterion: puts back what it changed of what was read before, such as rounding, signals or the locale,
+ * and tells that once. */
+void lull_host_leave(struct lull_host_criterion *criterion, const struct lull_process_state *before, const char *call);
+/* `count` tasks of a criterion; each leaves its thread as it found it. */
+int32_t lull_host_tasks(struct lull_host_criterion *criterion, uint64_t count, lull_task_fn fn, void *arg);
+
 /* --- failure.c ------------------------------------------------------------------------------------------------------ */
 
+/* Copies a text of a criterion as one line. */
+void lull_host_line(char *to, size_t room, const char *text);
 /* "criterion ID: ", `what` and its message; returns its code. */
 int32_t lull_host_blame(const struct lull_host_criterion *criterion, const char *what, int32_t code,
                         const struct lull_error *why, struct lull_error *err);

@@ -52,6 +52,36 @@ static int32_t check_offer(const struct lull_host_services *services, const stru
     return code == LULL_OK ? lull_host_check_pairs(pairs, pair_count, err) : code;
 }
 
+/* Of a step of the mask. Nothing is believed of what a failed create leaves behind. */
+static int32_t make_instance(struct lull_host_criterion *c, const struct lull_pair *pairs, uint32_t count, uint32_t step,
+                             struct lull_error *err)
+{
+    struct lull_error e = {.struct_size = sizeof e};
+    struct lull_instance *made = NULL;
+    struct lull_process_state before;
+    lull_process_state_read(&before);
+    const int32_t code = c->table->create(&c->host, pairs, count, sizeof *pairs, &made, &e);
+    lull_host_leave(c, &before, "create");
+    if (code != LULL_OK)
+        return lull_host_blame(c, "", code, &e, err);
+    if (!made)
+        return lull_error_set(err, LULL_E_INTERNAL, "criterion %s: create made no instance", c->table->id);
+    c->instances[step] = made;
+    return LULL_OK;
+}
+
+static int32_t ask_needs(struct lull_host_criterion *c, struct lull_error *err)
+{
+    struct lull_error e = {.struct_size = sizeof e};
+    struct lull_process_state before;
+    lull_thread_state_read(&before);
+    c->needs.struct_size = sizeof c->needs;
+    const int32_t code = c->table->requirements(c->instances[0], &c->needs, &e);
+    c->needs.struct_size = sizeof c->needs;
+    lull_host_leave(c, &before, "requirements");
+    return code == LULL_OK ? code : lull_host_blame(c, "", code, &e, err);
+}
+
 int32_t lull_host_create(const struct lull_host_services *services, const struct lull_criterion *table,
                          const struct lull_pair *pairs, uint32_t pair_count, struct lull_host_criterion **out,
                          struct lull_error *err)
@@ -64,17 +94,13 @@ int32_t lull_host_create(const struct lull_host_services *services, const struct
     }
     c->table = table;
     pthread_mutex_init(&c->messages_lock, NULL);
-    struct lull_error e = {.struct_size = sizeof e};
     code = lull_host_offer(c, services, err);
     if (code == LULL_OK)
         code = copy_pairs(c, pairs, pair_count, err);
     if (code == LULL_OK) {
-        code = table->create(&c->host, pairs, pair_count, sizeof *pairs, &c->instances[0], &e);
-        c->needs.struct_size = sizeof c->needs;
+        code = make_instance(c, pairs, pair_count, 0, err);
         if (code == LULL_OK)
-            code = table->requirements(c->instances[0], &c->needs, &e);
-        if (code != LULL_OK)
-            lull_host_blame(c, "", code, &e, err);
+            code = ask_needs(c, err);
     }
     if (code != LULL_OK) {
         lull_host_close(c);
@@ -126,12 +152,15 @@ void lull_host_close(struct lull_host_criterion *c)
 {
     if (!c)
         return;
+    struct lull_process_state before;
+    lull_thread_state_read(&before);
     for (int s = 0; s <= LULL_HOST_STEPS; s++) {
         if (c->instances[s] && c->open)
             c->table->end_frame(c->instances[s]);
         if (c->instances[s])
             c->table->destroy(c->instances[s]);
     }
+    lull_host_leave(c, &before, "destroy");
     release_frame(c);
     release_pairs(c);
     lull_host_withdraw(c);
@@ -165,18 +194,14 @@ const char *lull_host_parameter(const struct lull_criterion *t, const char *name
 /* An instance like the first one, its quality parameter scaled for this step of the mask. */
 static int32_t create_instance(struct lull_host_criterion *c, uint32_t step, struct lull_error *err)
 {
-    struct lull_error e = {.struct_size = sizeof e};
     char value[32];
     struct lull_pair *pairs = calloc((size_t)c->pair_count + 1, sizeof *pairs);
     if (!pairs)
         return lull_host_no_memory(err, "criterion");
     memcpy(pairs, c->pairs, c->pair_count * sizeof *pairs);
     int32_t code = lull_host_scale_quality(c->table, c->pairs, c->pair_count, step, value, &pairs[c->pair_count], err);
-    if (code == LULL_OK) { /* a later pair wins */
-        code = c->table->create(&c->host, pairs, c->pair_count + 1, sizeof *pairs, &c->instances[step], &e);
-        if (code != LULL_OK)
-            lull_host_blame(c, "", code, &e, err);
-    }
+    if (code == LULL_OK) /* a later pair wins */
+        code = make_instance(c, pairs, c->pair_count + 1, step, err);
     free(pairs);
     return code;
 }
@@ -256,11 +281,14 @@ static int32_t begin_instances(struct lull_host_criterion *c, const struct lull_
             code = create_instance(c, k->step, err);
     }
     struct lull_frame frame = describe(f, c, rects);
+    struct lull_process_state before;
+    lull_thread_state_read(&before);
     for (int s = 0; s <= LULL_HOST_STEPS && code == LULL_OK; s++) {
         code = c->instances[s] ? c->table->begin_frame(c->instances[s], &frame, &e) : LULL_OK;
         if (code != LULL_OK)
-            lull_host_blame(c, "", code, &e, err);
+            code = lull_host_blame(c, "", code, &e, err);
     }
+    lull_host_leave(c, &before, "begin_frame");
     free(rects);
     return code;
 }

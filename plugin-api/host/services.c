@@ -22,7 +22,8 @@ void lull_host_say(struct lull_host_criterion *c, int32_t level, const char *tex
 {
     int none = LULL_WARNING_NONE;
     char line[LULL_HOST_LINE];
-    snprintf(line, sizeof line, "criterion %s: %s", c->table->id, text);
+    snprintf(line, sizeof line, "criterion %s: ", c->table->id);
+    lull_host_line(line + strlen(line), sizeof line - strlen(line), text ? text : "");
     if (level <= LULL_LOG_INFO && !keep_message(c, line) && level == LULL_LOG_INFO)
         return; /* some say it at each check */
     if (c->offered.log)
@@ -49,11 +50,7 @@ static void host_log(const struct lull_host *host, int32_t level, const char *te
 
 static int32_t host_parallel_for(const struct lull_host *host, uint64_t count, lull_task_fn fn, void *arg)
 {
-    const struct lull_host_criterion *c = host->context;
-    if (c->offered.parallel_for)
-        return c->offered.parallel_for(c->offered.context, count, fn, arg);
-    base_threads_tasks(c->threads, count, fn, arg);
-    return LULL_OK;
+    return lull_host_tasks(host->context, count, fn, arg);
 }
 
 int32_t lull_host_offer(struct lull_host_criterion *c, const struct lull_host_services *services, struct lull_error *err)

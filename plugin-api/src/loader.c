@@ -53,12 +53,9 @@ static void compare_process(const struct lull_search *search, const char *path, 
 {
     struct lull_process_state after;
     lull_process_state_read(&after);
-    if (after.fp_control != before->fp_control) {
-        say(search, LULL_LOG_WARNING,
-            "%s: loading changed the floating-point control register from %#llx to %#llx; restored", path,
-            before->fp_control, after.fp_control);
-        lull_process_state_restore(before);
-    }
+    const char *changed = lull_process_state_restore(before);
+    if (changed)
+        say(search, LULL_LOG_WARNING, "%s: loading changed %s; restored", path, changed);
     if (after.thread_count > before->thread_count)
         say(search, LULL_LOG_WARNING, "%s: loading started %ld thread(s)", path, after.thread_count - before->thread_count);
 }

@@ -22,7 +22,8 @@ static void fp_check(struct lc *c, const struct lull_process_state *before, cons
               call, after.fp_control, before->fp_control);
     LC_EXPECT(c, c->concurrent || after.thread_count <= before->thread_count, "%s started %ld thread(s)", call,
               after.thread_count - before->thread_count);
-    lull_process_state_restore(before);
+    const char *changed = lull_process_state_restore(before);
+    LC_EXPECT(c, !changed || after.fp_control != before->fp_control, "%s changed %s", call, changed);
 }
 
 struct lull_instance *lc_create(struct lc *c, const struct lull_host *host)
@@ -182,15 +183,14 @@ static int32_t ask_some(struct lc_session *s, const struct lc_image *image, cons
     struct ask_arrays a = {0};
     int32_t status = LULL_E_MEMORY;
     if (ask_arrays_init(&a, s, image, ids, count) == 0) {
-        struct lull_process_state before, after;
+        struct lull_process_state before;
         lull_process_state_read(&before);
         const void *blocks = a.blocks, *view = a.view;
         void *out = a.decisions;
         status =
             s->check->criterion->evaluate(s->instance, view, blocks, a.block_stride, out, a.decision_stride, count, err);
-        lull_process_state_read(&after);
-        LC_EXPECT(s->check, after.fp_control == before.fp_control, "evaluate changed the floating-point control register");
-        lull_process_state_restore(&before);
+        const char *changed = lull_process_state_restore(&before);
+        LC_EXPECT(s->check, !changed, "evaluate changed %s", changed);
         if (status == LULL_OK)
             ask_arrays_take(s, &a, ids, count, decisions);
     }
