@@ -1,10 +1,11 @@
 #include "base/interrupt.h"
 
+#include <fcntl.h>
 #include <stddef.h>
 
 volatile sig_atomic_t base_interrupted;
 
-static const int requests[] = {SIGINT, SIGTERM, SIGHUP};
+static const int requests[] = {SIGINT, SIGTERM, SIGHUP, SIGXCPU};
 enum { REQUESTS = sizeof requests / sizeof requests[0] };
 
 static void on_request(int number)
@@ -13,15 +14,23 @@ static void on_request(int number)
     base_interrupted = 1;
 }
 
-void base_interrupt_begin(void) { signal(SIGXFSZ, SIG_IGN); }
+void base_interrupt_begin(void)
+{
+    signal(SIGXFSZ, SIG_IGN);
+    for (int fd = 0; fd < 3; fd++)
+        if (fcntl(fd, F_GETFD) < 0)
+            (void)!open("/dev/null", fd == 0 ? O_WRONLY : O_RDONLY); /* whoever uses it fails as before */
+}
 
 void base_interrupt_catch(void)
 {
-    struct sigaction before, action = {.sa_handler = on_request, .sa_flags = (int)SA_RESETHAND};
+    struct sigaction before, action = {.sa_handler = on_request};
     sigemptyset(&action.sa_mask);
-    for (int i = 0; i < REQUESTS; i++)
+    for (int i = 0; i < REQUESTS; i++) {
+        action.sa_flags = requests[i] == SIGXCPU ? SA_RESTART : (int)SA_RESETHAND; /* SIGXCPU comes again each second */
         if (requests[i] != SIGHUP || sigaction(SIGHUP, NULL, &before) != 0 || before.sa_handler != SIG_IGN)
             sigaction(requests[i], &action, NULL);
+    }
     signal(SIGPIPE, SIG_IGN);
 }
 

@@ -36,6 +36,11 @@ for closed in "<&-" "<&- >&-" "<&- >&- 2>&-"; do
 done
 rm -f b.exr b.csv
 
+# --- the soft limit of processor time: the picture so far, as after Ctrl-C ---
+t "a render that has used up its processor time" sh -c "ulimit -S -t 1; $long -t 2 --size 32x32 -o b.exr --checkpoint b.ckp; [ \$? -eq 130 ]"
+t "  …leaves picture and checkpoint" sh -c 'oiiotool --info b.exr | grep -q " 32 x  *32, " && test -s b.ckp'
+rm -f b.exr b.ckp
+
 # --- what cannot be written is known before the work ---
 name=$(printf 'n%.0s' $(seq 1 260))
 mkdir folder folder.exr folder.png folder.json folder.csv folder.ggn

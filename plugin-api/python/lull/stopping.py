@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Requests to stop, for programs: the first SIGINT, SIGTERM or SIGHUP asks for an end, a second one kills, as in the path
-tracer."""
+"""Requests to stop, for programs: the first SIGINT, SIGTERM or SIGHUP asks for an end, a second one kills; SIGXCPU, the soft
+limit of processor time, asks for one too. As in the path tracer."""
 from __future__ import annotations
 
 import signal
@@ -19,12 +19,12 @@ class Stopping:
 
     def _ask(self, number: int, _frame: object) -> None:
         self.asked = True
-        signal.signal(number, signal.SIG_DFL)
+        signal.signal(number, signal.SIG_IGN if number == signal.SIGXCPU else signal.SIG_DFL)  # which comes again each second
         if self.then:
             self.then()
 
     def __enter__(self) -> Stopping:
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU):
             if signal.getsignal(number) is not signal.SIG_IGN:  # nohup
                 self._before[number] = signal.signal(number, self._ask)
         return self
