@@ -10,6 +10,7 @@
 #include "base/list.h"
 #include "base/options.h"
 #include "base/text.h"
+#include "image/exr.h"
 #include "render/checkpoint.h"
 #include "render/output.h"
 #include "scene/arena.h"
@@ -202,7 +203,7 @@ static int render_frame(struct pt_open *o, struct pt_shot_frame *f, const struct
 {
     const char *output = f->paths[PT_OUTPUT], *checkpoint = f->paths[PT_CHECKPOINT];
     int rc = 0;
-    if (is_there(output) && pt_output_is_ours(output)) {
+    if (is_there(output) && pt_output_is_ours(output) && pt_exr_is_whole(output)) {
         base_log_note(o->log, "frame %d: %s is there", f->number, output);
         return 0;
     }

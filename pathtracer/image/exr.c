@@ -132,6 +132,25 @@ static int64_t write_at(exr_const_context_t file, void *data, const void *bytes,
     return (int64_t)size;
 }
 
+int pt_exr_is_whole(const char *path)
+{
+    exr_context_t file = NULL;
+    exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
+    exr_attr_box2i_t stored;
+    int32_t lines = 1;
+    init.error_handler_fn = ignore_message;
+    int whole = base_file_check_input(path, NULL) == 0 && exr_start_read(&file, path, &init) == EXR_ERR_SUCCESS &&
+                exr_get_data_window(file, 0, &stored) == EXR_ERR_SUCCESS &&
+                exr_get_scanlines_per_chunk(file, 0, &lines) == EXR_ERR_SUCCESS;
+    for (int64_t y = whole ? stored.min.y : 0; whole && y <= stored.max.y; y += lines) {
+        exr_chunk_info_t chunk;
+        whole = exr_read_scanline_chunk_info(file, 0, (int)y, &chunk) == EXR_ERR_SUCCESS;
+    }
+    if (file)
+        exr_finish(&file);
+    return whole;
+}
+
 int pt_exr_write(const char *path, const struct pt_exr_image *image, struct base_err *err)
 {
     struct base_file_out out;

@@ -27,4 +27,7 @@ struct pt_exr_image {
 
 int pt_exr_write(const char *path, const struct pt_exr_image *image, struct base_err *err);
 
+/* Whether there is a scan-line file that has all of its pixels: not empty, not cut short. */
+int pt_exr_is_whole(const char *path);
+
 #endif

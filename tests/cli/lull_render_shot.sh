@@ -18,6 +18,12 @@ rm f_002.exr
 "$P" s_%04d.pbrt --frames 1-3 $small --spp 8 -o f_%03d.exr
 t "what is there is left" test f_001.exr -ot s_0001.pbrt -a f_003.exr -ot s_0001.pbrt -a f_002.exr -nt s_0001.pbrt
 
+head -c 3000 f_003.exr >part.exr && mv part.exr f_003.exr # as a copy that was broken off
+: >f_001.exr
+"$P" s_%04d.pbrt --frames 1-3 $small --spp 4 -o f_%03d.exr
+"$P" s_0003.pbrt --frames 3 $small --spp 4 -o third.exr
+t "  …but not what is empty or cut short" sh -c "exrheader f_001.exr && cmp third.exr f_003.exr"
+
 # --- seeds ---
 "$P" "$scene" --frames 1-2 $small --spp 4 -o fresh_%d.exr
 "$P" "$scene" --frames 1-2 $small --spp 4 -o fixed_%d.exr --frame-seed fixed
