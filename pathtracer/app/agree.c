@@ -26,10 +26,25 @@ int pt_agree_identity(const struct pt_open *o, struct base_identity *to, struct 
     return base_identity_check(to, err);
 }
 
+/* Of this program's own file: two builds may have one version. 0 where the system does not show it. */
+static uint32_t program_crc(void)
+{
+    struct base_inputs own = BASE_INPUTS_EMPTY;
+    uint32_t crc = 0;
+    if (base_inputs_add(&own, "/proc/self/exe", NULL) != 0 || base_inputs_crc32(&own, &crc, NULL) != 0)
+        crc = 0;
+    base_inputs_release(&own);
+    return crc;
+}
+
 int pt_agree_handshake(const struct pt_open *o, struct job *job, struct base_err *err)
 {
     struct base_identity all = {0};
     int rc = job ? pt_agree_identity(o, &all, err) : 0;
+    if (!rc && job) {
+        base_identity_add(&all, "program-crc", "%08x", (unsigned)program_crc());
+        rc = base_identity_check(&all, err);
+    }
     if (!rc)
         rc = job_handshake(job, all.text, base_threads_count(o->threads), err);
     base_identity_release(&all);

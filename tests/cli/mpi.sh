@@ -64,6 +64,11 @@ cp "$scene" host1/room.pbrt
 printf x >>host1/mine.so
 each "has plugin-and-mask-crc=" "room.pbrt -q -c ./mine.so --spp-max 20 -o a.exr"
 each "has spp-max=" "room.pbrt -q -c null --spp-max 2\$OMPI_COMM_WORLD_RANK -o a.exr"
+for h in 0 1; do mkdir -p host$h/bin && cp "$P" host$h/bin/ && ln -s "${P%/bin/*}/lib" host$h/lib; done
+own() { mpi_refused "$1" 2 sh -c "cd host\$OMPI_COMM_WORLD_RANK && exec bin/lull-render room.pbrt -q --spp 4 -o a.exr"; }
+t "copies of one program" mpi 2 sh -c "cd host\$OMPI_COMM_WORLD_RANK && exec bin/lull-render room.pbrt -q --spp 4 -o a.exr"
+printf x >>host1/bin/lull-render # behind the end: the same version, another build
+own "has program-crc="
 m=$here/../../ggn/models/lull-3.ggn # and the same in half the bytes, which is another
 if [ -f "$m" ] && [ -f "${P%/bin/*}/lib/lull/ggn.so" ]; then
     "${P%/*}/ggn" convert "$m" host0/m.ggn; cp "$m" host1/m.ggn
