@@ -165,6 +165,8 @@ int32_t lull_host_lay_out(const struct lull_host_config *config, const struct lu
 
 /* Fills block.step of every block. Pixels that are no numbers are black, others are cut to [0, 1]. */
 int32_t lull_host_read_mask(const struct lull_plane *mask, struct lull_host_blocks *blocks, struct lull_error *err);
+/* Writes a number as criteria read it: in the form of the C locale, whatever the renderer has set. 0: no memory. */
+int lull_host_number(double value, char text[32]);
 /* Writes the quality parameter's pair for a step: *pair points to static text and to `value`. */
 int32_t lull_host_scale_quality(const struct lull_criterion *table, const struct lull_pair *pairs, uint32_t pair_count,
                                 uint32_t step, char value[32], struct lull_pair *pair, struct lull_error *err);

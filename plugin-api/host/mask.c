@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "base/options.h"
+#include <lull/criterion_kit.h>
 
 static const double WHITE_SCALE = 0.25;
 
@@ -36,8 +36,20 @@ int32_t lull_host_read_mask(const struct lull_plane *mask, struct lull_host_bloc
 
 double lull_host_mask_factor(uint32_t step) { return pow(WHITE_SCALE, (double)step / LULL_HOST_STEPS); }
 
-static int32_t scale_dial(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count, uint32_t step,
-                          char value[32], struct lull_pair *pair, struct lull_error *err)
+int lull_host_number(double value, char text[32])
+{
+    locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    if (c == (locale_t)0)
+        return 0;
+    locale_t before = uselocale(c);
+    snprintf(text, 32, "%.17g", value);
+    uselocale(before);
+    freelocale(c);
+    return 1;
+}
+
+int32_t lull_host_scale_quality(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count,
+                                uint32_t step, char value[32], struct lull_pair *pair, struct lull_error *err)
 {
     static const char *const names[] = {"error", "visible", "threshold"};
     const char *known = NULL; /* a parameter that has no value */
@@ -47,10 +59,11 @@ static int32_t scale_dial(const struct lull_criterion *t, const struct lull_pair
         double quality;
         if (p && !text && !known)
             known = names[d];
-        if (!text || !base_parse_real(text, p->min, p->max, &quality))
+        if (!text || !lull_kit_number(text, &quality) || !(quality >= p->min && quality <= p->max))
             continue;
         quality *= lull_host_mask_factor(step);
-        snprintf(value, 32, "%.17g", fmin(fmax(quality, p->min), p->max));
+        if (!lull_host_number(fmin(fmax(quality, p->min), p->max), value))
+            return lull_host_no_memory(err, "mask");
         *pair = (struct lull_pair){names[d], value};
         return LULL_OK;
     }
@@ -59,18 +72,4 @@ static int32_t scale_dial(const struct lull_criterion *t, const struct lull_pair
                               t->id, known, known);
     return lull_error_set(err, LULL_E_KEY,
                           "criterion %s has no quality parameter 'visible' or 'threshold' for a mask to scale", t->id);
-}
-
-/* Numbers in text have the form of the C locale, whatever the renderer has set. */
-int32_t lull_host_scale_quality(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t pair_count,
-                                uint32_t step, char value[32], struct lull_pair *pair, struct lull_error *err)
-{
-    locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-    if (c == (locale_t)0)
-        return lull_host_no_memory(err, "mask");
-    locale_t before = uselocale(c);
-    int32_t code = scale_dial(t, pairs, pair_count, step, value, pair, err);
-    uselocale(before);
-    freelocale(c);
-    return code;
 }

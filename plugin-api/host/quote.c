@@ -102,9 +102,8 @@ static uint64_t first_check(const struct lull_host_criterion *own, double limit)
 {
     struct lull_host_criterion *made = NULL;
     char text[32];
-    snprintf(text, sizeof text, "%.17g", limit);
     const struct lull_pair error = {"error", text};
-    if (!own || create_changed(own, &error, &made, NULL) != LULL_OK)
+    if (!own || !lull_host_number(limit, text) || create_changed(own, &error, &made, NULL) != LULL_OK)
         return own ? own->needs.first_spp : 1;
     const uint64_t first = made->needs.first_spp;
     lull_host_close(made);

@@ -4,7 +4,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include <locale.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -45,6 +47,32 @@ static void qualities(void **state)
     assert_null(lull_host_parameter(&table, "other", twice, 2, &found));
     assert_null(found);
     assert_null(lull_host_parameter(&table, "visible", twice, 2, NULL));
+}
+
+/* Renderers set the locale of their windows: numbers for criteria keep their point, and theirs its comma. */
+static void numbers_have_a_point_in_every_locale(void **state)
+{
+    (void)state;
+    char folder[] = "/tmp/lull-locale-XXXXXX", command[160], value[32], text[32], shown[8];
+    struct lull_pair quality, given = {"visible", "0.4"};
+    err = (struct lull_error){.struct_size = sizeof err};
+    assert_non_null(mkdtemp(folder));
+    snprintf(command, sizeof command, "localedef -i de_DE -f UTF-8 %s/de_DE.UTF-8 2>/dev/null", folder);
+    const int made = system(command) != -1; /* it also complains of what does not matter */
+    setenv("LOCPATH", folder, 1);
+    const int set = made && setlocale(LC_ALL, "de_DE.UTF-8") != NULL;
+    snprintf(shown, sizeof shown, "%g", 0.5);
+    const int32_t code = lull_host_scale_quality(&table, &given, 1, 8, value, &quality, &err);
+    const int number = lull_host_number(2.5, text);
+    setlocale(LC_ALL, "C");
+    snprintf(command, sizeof command, "rm -rf %s", folder);
+    assert_int_equal(system(command), 0);
+    assert_int_equal(code, LULL_OK);
+    assert_true(fabs(strtod(value, NULL) - 0.1) < 1e-16 && number);
+    assert_string_equal(text, "2.5");
+    if (!set)
+        skip(); /* Debian's package locales has it */
+    assert_string_equal(shown, "0,5");
 }
 
 /* Blocks of a mask are judged by instances of their own quality, each asked once; the mask may be of either type, from the bottom up. */
@@ -123,6 +151,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(qualities),
+        cmocka_unit_test(numbers_have_a_point_in_every_locale),
         cmocka_unit_test(every_step_has_its_instance),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
