@@ -291,14 +291,22 @@ void find_primaries(const ImageInput &input, const ImageSpec &spec, const pic_ch
             image->has_primaries = 1;
 }
 
-/* without_alpha: the picture is what stands in front of its alpha, if it has one. */
-int read_pixels(ImageInput &input, const pic_request &q, bool without_alpha, pic_image *out, base_err *err)
+/* What a file's first bytes tell, beside what its reader does. */
+struct told {
+    bool without_alpha = false; /* the picture is what stands in front of its alpha, if it has one */
+    bool is_ordered = false;    /* channels are not those that the reader says, but these: */
+    int order[4] = {0, 1, 2, 3};
+};
+
+int read_pixels(ImageInput &input, const pic_request &q, const told &t, pic_image *out, base_err *err)
 {
     pic_choice s = {};
     if (int rc = choose(input, q, &s, err))
         return rc;
-    if (without_alpha && s.count % 2 == 0)
+    if (t.without_alpha && s.count % 2 == 0)
         s.count--;
+    for (int c = 0; c < s.count && t.is_ordered; c++)
+        s.at[c] = t.order[s.at[c]];
     const ImageSpec spec = input.spec(s.part, 0);
     canvas c = {};
     if (int rc = check_size(spec, q.name, err))
@@ -394,6 +402,51 @@ int check_pfm(const char *path, base_err *err)
     return 0;
 }
 
+/* The first bytes of a file that is there, or of what is in memory. */
+std::vector<unsigned char> head_of(const pic_request &q, size_t most)
+{
+    std::vector<unsigned char> head(most);
+    FILE *file = nullptr;
+    if (q.data != nullptr)
+        head.assign(static_cast<const unsigned char *>(q.data),
+                    static_cast<const unsigned char *>(q.data) + std::min(q.size, most));
+    else if (base_file_open(q.name, &file, nullptr) == 0) {
+        head.resize(std::fread(head.data(), 1, most, file));
+        std::fclose(file);
+    } else
+        head.clear();
+    return head;
+}
+
+/* Pixels of 32 bits in a BMP have their colours where its masks say. OpenImageIO takes the bytes for blue, green, red and
+ * alpha in any case. */
+int find_bmp_order(const pic_request &q, told *t, base_err *err)
+{
+    enum { BITS = 28, COMPRESSION = 30, MASKS = 54, END = MASKS + 12 };
+    static const int channel_of_byte[4] = {2, 1, 0, 3};
+    const std::vector<unsigned char> head = head_of(q, END);
+    const auto le32 = [&head](size_t at) {
+        return static_cast<uint32_t>(head[at]) | static_cast<uint32_t>(head[at + 1]) << 8 |
+               static_cast<uint32_t>(head[at + 2]) << 16 | static_cast<uint32_t>(head[at + 3]) << 24;
+    };
+    if (head.size() < END || head[0] != 'B' || head[1] != 'M' || head[BITS] != 32 ||
+        (head[COMPRESSION] != 3 && head[COMPRESSION] != 6))
+        return 0;
+    int left = 0 + 1 + 2 + 3;
+    for (int c = 0; c < 3; c++) {
+        int byte = 0;
+        while (byte < 4 && le32(static_cast<size_t>(MASKS + 4 * c)) != 0xffu << 8 * byte)
+            byte++;
+        if (byte == 4)
+            return base_fail(err, BASE_EINVAL, "%s: a BMP whose colours are no bytes (expected masks of 8 bits)", q.name);
+        t->order[c] = channel_of_byte[byte];
+        left -= byte;
+    }
+    t->order[3] = channel_of_byte[left >= 0 && left < 4 ? left : 3];
+    t->is_ordered = true;
+    return 0;
+}
+
 /* The name of a file's format, which is in small letters whatever the file's own name has. */
 std::string format_of(const char *name)
 {
@@ -410,7 +463,7 @@ struct opened {
     memory data;
     std::unique_ptr<OIIO::Filesystem::IOMemReader> reader;
     std::unique_ptr<ImageInput> input;
-    bool without_alpha = false;
+    told before;
 };
 
 /* Of a PNG that stores no alpha with its pixels (colour types 4 and 6, at byte 25), but a transparent colour or transparent
@@ -426,7 +479,7 @@ int open_memory(const char *name, const void *data, size_t size, opened *out, ba
     if (base_file_has_ending(name, "png"))
         if (int rc = check_png(name, static_cast<const unsigned char *>(data), size, err))
             return rc;
-    out->without_alpha = has_colours_alone(name, data, size);
+    out->before.without_alpha = has_colours_alone(name, data, size);
     out->reader = std::make_unique<OIIO::Filesystem::IOMemReader>(data, size);
     out->input = ImageInput::create(format_of(name), false);
     if (!out->input || out->input->supports("ioproxy") == 0) {
@@ -465,7 +518,9 @@ int answer(const pic_request *q, pic_image *out, base_err *err)
         configure_once();
         opened image;
         int rc = q->data != nullptr ? open_memory(q->name, q->data, q->size, &image, err) : open_file(q->name, &image, err);
-        return rc ? rc : read_pixels(*image.input, *q, image.without_alpha, out, err);
+        if (rc == 0 && base_file_has_ending(q->name, "bmp"))
+            rc = find_bmp_order(*q, &image.before, err);
+        return rc ? rc : read_pixels(*image.input, *q, image.before, out, err);
     } catch (const std::bad_alloc &) {
         return base_fail_nomem(err, q->name);
     } catch (const std::exception &e) {

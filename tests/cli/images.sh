@@ -14,11 +14,19 @@ def png(name, kind, pixel, **others):
                            + b"".join(chunk(n.encode(), bytes(d)) for n, d in others.items()) + chunk(b"IDAT", zlib.compress(row * 2)) + chunk(b"IEND", b""))
 def tga(name, pixel):
     open(name, "wb").write(struct.pack("<BBB9xHHBB", 0, 0, 2, 1, 1, 8 * len(pixel), 8 if len(pixel) == 4 else 0) + bytes(pixel))
+def bmp(name, masks, pixel):
+    head = struct.pack("<IiiHHIIiiII4I", 56, 2, 2, 1, 32, 3, 16, 0, 0, 0, 0, *masks)
+    open(name, "wb").write(b"BM" + struct.pack("<IHHI", 86, 0, 0, 70) + head + bytes(pixel) * 4)
 png("grey.png", 0, [188]), png("grey_alpha.png", 4, [188, 20])
 colours = [188, 90, 40]
 png("colours.png", 2, colours), png("key.png", 2, colours, tRNS=[0, 188, 0, 90, 0, 40])
 png("palette.png", 3, [1], PLTE=[0, 0, 0] + colours, tRNS=[255, 20])
 png("sixty.png", 0, [60]), png("alpha.png", 6, [188, 90, 40, 60])
+byte = [255 << 8 * i for i in range(4)]
+bmp("bgra.bmp", [byte[2], byte[1], byte[0], byte[3]], [40, 90, 188, 20])
+bmp("abgr.bmp", [byte[3], byte[2], byte[1], byte[0]], [20, 40, 90, 188])
+bmp("rgbx.bmp", [byte[0], byte[1], byte[2], 0], [188, 90, 40, 0])
+bmp("ten.bmp", [1023 << 20, 1023 << 10, 1023, 0], [188, 90, 40, 0])
 tga("colour.tga", [40, 90, 188]), tga("colour_alpha.tga", [40, 90, 188, 20])
 E
 cat >float.pbrt <<'S'
@@ -77,6 +85,12 @@ t "  …is compared right side up" sh -c "'${P%lull-render}ggn' flip order-Y+X.h
 oiiotool order-Y+X.hdr -d uint8 --attrib Orientation 4 -o turned.dpx
 sed "s#FILE#turned.dpx#" colour.pbrt >scene.pbrt
 refused "turned.dpx: a DPX whose first pixel is not at the top left" scene.pbrt -q --spp 1 -o x.exr
+
+for file in bgra abgr rgbx; do
+    t "a BMP of 32 bits, $file" same colour colours.png $file.bmp
+done
+sed "s#FILE#ten.bmp#" colour.pbrt >scene.pbrt
+refused "cannot read ten.bmp: a BMP whose colours are no bytes" scene.pbrt -q --spp 1 -o x.exr
 
 # one line, without one of libpng's
 printf '\211PNG\r\n\032\n\0\0\0\0IEND\256B\140\202' >empty.png
