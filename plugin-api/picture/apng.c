@@ -1,5 +1,6 @@
 #include "picture/apng.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <zlib.h>
@@ -44,10 +45,8 @@ static void write_frame_head(struct pic_apng *a)
     put_word(c, a->chunks++);
     put_word(c + 4, (uint32_t)a->width);
     put_word(c + 8, (uint32_t)a->height);
-    c[20] = (uint8_t)(a->delay_ms >> 8);
-    c[21] = (uint8_t)a->delay_ms;
-    c[22] = 1000 >> 8;
-    c[23] = 1000 & 255;
+    for (int i = 0; i < 4; i++)
+        c[20 + i] = (uint8_t)(a->delay[i / 2] >> (i % 2 ? 0 : 8));
     write_chunk(a->file.file, "fcTL", c, sizeof c, NULL, 0);
 }
 
@@ -75,10 +74,12 @@ static void take_chunk(struct pic_apng *a, const uint8_t *chunk, uint32_t size, 
     }
 }
 
-int pic_apng_begin(struct pic_apng *a, const char *path, int32_t width, int32_t height, uint32_t frames, uint16_t delay_ms,
+int pic_apng_begin(struct pic_apng *a, const char *path, int32_t width, int32_t height, uint32_t frames, double fps,
                    struct base_err *err)
 {
-    *a = (struct pic_apng){.width = width, .height = height, .frames = frames, .delay_ms = delay_ms};
+    const uint16_t parts = fps <= 60.0 ? 1000 : 250; /* as fine as 16 bits have room for */
+    *a = (struct pic_apng){
+        .width = width, .height = height, .frames = frames, .delay = {parts, (uint16_t)lround(parts * fps)}};
     return base_file_begin(&a->file, path, err);
 }
 

@@ -15,12 +15,12 @@ struct pic_apng {
     struct base_file_out file;
     int32_t width, height;
     uint32_t frames, frame, chunks; /* announced, written; numbered chunks so far */
-    uint16_t delay_ms;
+    uint16_t delay[2];              /* of a frame, in seconds: what is divided, by what */
 };
 
-/* frames of width x height, each for delay_ms. Then `frames` times pic_apng_add, then pic_apng_end, or pic_apng_abort at any
- * time; after a failure, too. */
-int pic_apng_begin(struct pic_apng *a, const char *path, int32_t width, int32_t height, uint32_t frames, uint16_t delay_ms,
+/* frames of width x height, so many per second (1 to 240). Then `frames` times pic_apng_add, then pic_apng_end, or
+ * pic_apng_abort at any time; after a failure, too. */
+int pic_apng_begin(struct pic_apng *a, const char *path, int32_t width, int32_t height, uint32_t frames, double fps,
                    struct base_err *err);
 /* rgb: [height][width][3], sRGB. */
 int pic_apng_add(struct pic_apng *a, const uint8_t *rgb, struct base_err *err);

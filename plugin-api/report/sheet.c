@@ -110,7 +110,7 @@ int report_sheet(const char *const *pictures, int count, double fps, const char 
         return base_fail_nomem(err, "sheet");
     memset(s.canvas.rgb, 255, bytes);
     paint_scale(&s);
-    rc = pic_apng_begin(&s.out, path, s.canvas.width, s.canvas.height, (uint32_t)count, (uint16_t)lround(1000.0 / fps), err);
+    rc = pic_apng_begin(&s.out, path, s.canvas.width, s.canvas.height, (uint32_t)count, fps, err);
     for (int i = 0; i < count && !rc; i++)
         rc = add_frame(&s, pictures[i], err);
     if (!rc)

@@ -48,12 +48,12 @@ print(count, "%dx%d" % (width, height), *delays)
 PY
 t "frames become an animated PNG" "$report" f_1.exr f_2.exr f_3.exr -o sheet.png
 python3 look.py sheet.png >said 2>&1 || cat said
-t "  …with all frames, 24 a second, every part in order" grep -qx '3 484x202 42/1000 42/1000 42/1000' said
+t "  …with all frames, 24 a second, every part in order" grep -qx '3 484x202 1000/24000 1000/24000 1000/24000' said
 oiiotool f_2.png --resize:filter=box 240x160 -o want.png
 oiiotool frame_2.ppm --cut 240x160+0+0 -o got.png
 t "  …each the picture that is shown" oiiotool --fail 0.004 --warn 0.004 want.png got.png --diff
 "$report" f_1.exr --fps 10 -o one.png
-t "one frame, ten a second" sh -c 'python3 look.py one.png | grep -qx "1 484x202 100/1000"'
+t "one frame, ten a second" sh -c 'python3 look.py one.png | grep -qx "1 484x202 1000/10000"'
 report_refuses() { P=$report refused "$@"; }
 "$P" "$scene" -q --size 32x32 --spp 1 -o small.exr
 oiiotool f_1.exr --ch R,G,B -o plain.exr
