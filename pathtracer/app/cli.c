@@ -353,7 +353,7 @@ const struct base_option pt_cli_options[] = {
     {"effects", 0, NULL, TO(all_effects), .words = effect_words, .help = "all: use the general kernel (same image, slower)"},
     {"strict", 0, NULL, TO(load.strict), .help = "Unsupported scene features are errors"},
     {"threads", 't', "N", TO(threads), 1, 1024,
-     .help = "Worker threads (default: all processors; of several processes on a host, their share)"},
+     .help = "Worker threads (default: all processors that it may use; of several processes on a host, their share)"},
     {"rank-timeout", 0, "SECONDS", TO(rank_timeout_s), 0.1, 1e6,
      .help = "Under mpirun: give up when a process has owed an answer for so long (default 120)"},
     {.help = "What to write:"},

@@ -2,10 +2,13 @@
 #include "base/threads.h"
 
 #include <limits.h>
+#include <math.h>
 #include <pthread.h>
 #include <sched.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 struct worker {
@@ -41,12 +44,75 @@ struct base_threads {
 /* How often one looks before one sleeps: some fifty microseconds, about what waking would take. */
 enum { LOOKS = 2000 };
 
+/* --- what there is ---------------------------------------------------------------------------------------------------- */
+
+static double fewer(double a, double b) { return b > 0 && (a <= 0 || b < a) ? b : a; }
+
+/* Reads up to n numbers of a file; returns how many there are. */
+static int read_numbers(const char *folder, const char *name, double *to, int n)
+{
+    char path[PATH_MAX];
+    int found = 0;
+    FILE *file = snprintf(path, sizeof path, "%s/%s", folder, name) < (int)sizeof path ? fopen(path, "re") : NULL;
+    while (file && found < n && fscanf(file, "%lf", &to[found]) == 1)
+        found++;
+    if (file)
+        fclose(file);
+    return found;
+}
+
+/* Processors' worth of time of one control group, of version 2 ("max": none) or 1 (-1: none); 0: no limit. */
+static double quota_of(const char *folder)
+{
+    double v[2];
+    const int is_there =
+        read_numbers(folder, "cpu.max", v, 2) == 2 ||
+        (read_numbers(folder, "cpu.cfs_quota_us", v, 1) == 1 && read_numbers(folder, "cpu.cfs_period_us", v + 1, 1) == 1);
+    return is_there && v[0] > 0 && v[1] > 0 ? v[0] / v[1] : 0;
+}
+
+/* The least of a group's and of all that it is in. In a container the path may begin elsewhere: what is not there limits
+ * nothing. */
+static double quota_along(const char *root, const char *controller, char *group)
+{
+    double least = 0;
+    for (char *end = group + strlen(group); end; end = strrchr(group, '/')) {
+        char folder[PATH_MAX];
+        *end = '\0';
+        if (snprintf(folder, sizeof folder, "%s/sys/fs/cgroup/%s%s", root, controller, group) < (int)sizeof folder)
+            least = fewer(least, quota_of(folder));
+    }
+    return least;
+}
+
+/* Lines are ID:CONTROLLERS:PATH (cgroups(7)); version 2 has no controllers there. */
+int base_threads_quota(const char *root)
+{
+    char path[PATH_MAX], line[PATH_MAX];
+    double least = 0;
+    FILE *file = snprintf(path, sizeof path, "%s/proc/self/cgroup", root) < (int)sizeof path ? fopen(path, "re") : NULL;
+    while (file && fgets(line, sizeof line, file)) {
+        char *controller = strchr(line, ':'), *group = controller ? strchr(controller + 1, ':') : NULL;
+        if (!group)
+            continue;
+        *group++ = '\0';
+        group[strcspn(group, "\n")] = '\0';
+        if (*++controller == '\0' || strcmp(controller, "cpu") == 0 || strcmp(controller, "cpu,cpuacct") == 0)
+            least = fewer(least, quota_along(root, controller, group));
+    }
+    if (file)
+        fclose(file);
+    return least > 0 && least < INT_MAX ? (int)ceil(least) : INT_MAX;
+}
+
 int base_threads_available(void)
 {
     cpu_set_t set;
-    if (sched_getaffinity(0, sizeof set, &set) == 0 && CPU_COUNT(&set) > 0)
-        return CPU_COUNT(&set);
-    return 1;
+    const long online = sysconf(_SC_NPROCESSORS_ONLN); /* of more than fit into the set */
+    const int quota = base_threads_quota("");
+    int count = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : (int)online;
+    count = count < quota ? count : quota;
+    return count > 0 ? count : 1;
 }
 
 static void take_indices(struct base_threads *t, int worker)

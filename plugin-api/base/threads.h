@@ -13,8 +13,11 @@
 
 struct base_threads;
 
-/* Number of processors this process may use, at least 1. */
+/* Number of processors this process may use, at least 1: those it is bound to, and as many as its control groups (of a
+ * container, of a batch system) give it time for. */
 int base_threads_available(void);
+/* The latter alone, of the system whose files lie below `root` ("" for this one); INT_MAX: no limit. */
+int base_threads_quota(const char *root);
 
 /* count >= 1 workers including the caller; owns count-1 threads until destroy. NULL on failure (err says why). */
 struct base_threads *base_threads_create(int count, struct base_err *err);

@@ -108,7 +108,8 @@ int job_threads(const struct job *job)
         return available;
     for (int i = 0; i < job->transport->count; i++)
         processes += same_host(job->transport, i);
-    long share = sysconf(_SC_NPROCESSORS_ONLN) / processes;
+    const long online = sysconf(_SC_NPROCESSORS_ONLN), quota = base_threads_quota("");
+    const long share = (online < quota ? online : quota) / processes;
     return share < 1 ? 1 : share < available ? (int)share : available;
 }
 

@@ -3,6 +3,10 @@
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stddef.h>
+#include <stdint.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -118,13 +122,46 @@ static void works_in_a_child_of_fork(void **state)
     base_threads_destroy(t);
 }
 
+/* Control groups give time for so many processors, rounded up: the least of a group and those that it is in, of either
+ * version, also where a container does not show where its group is. */
+static void control_groups_limit(void **state)
+{
+    static const struct {
+        const char *make;
+        int expected;
+    } cases[] = {
+        {"echo 0::/a/b >proc/self/cgroup; mkdir -p $g/a/b; echo 250000 100000 >$g/a/b/cpu.max", 3},
+        {"echo 0::/a/b >proc/self/cgroup; mkdir -p $g/a/b; echo max 100000 >$g/a/b/cpu.max; echo 50000 100000 >$g/a/cpu.max",
+         1},
+        {"echo 0::/ >proc/self/cgroup; echo 400000 100000 >$g/cpu.max", 4},
+        {"echo 0::/ >proc/self/cgroup; echo max 100000 >$g/cpu.max", INT_MAX},
+        {"printf '5:cpuset:/\\n4:cpu,cpuacct:/docker/1\\n0::/\\n' >proc/self/cgroup; mkdir -p $g/cpu,cpuacct $g/cpuset; "
+         "echo 150000 >$g/cpu,cpuacct/cpu.cfs_quota_us; echo 100000 >$g/cpu,cpuacct/cpu.cfs_period_us",
+         2},
+        {"echo 1:cpu:/ >proc/self/cgroup; mkdir -p $g/cpu; echo -1 >$g/cpu/cpu.cfs_quota_us; echo 100000 "
+         ">$g/cpu/cpu.cfs_period_us",
+         INT_MAX},
+        {"rm -r proc", INT_MAX},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char root[] = "/tmp/lull-cgroup-XXXXXX", command[600];
+        assert_non_null(mkdtemp(root));
+        snprintf(command, sizeof command, "cd %s && g=sys/fs/cgroup && mkdir -p proc/self $g && { %s; }", root,
+                 cases[i].make);
+        assert_int_equal(system(command), 0);
+        assert_int_equal(base_threads_quota(root), cases[i].expected);
+        snprintf(command, sizeof command, "rm -rf %s", root);
+        assert_int_equal(system(command), 0);
+    }
+    assert_true(base_threads_available() >= 1 && base_threads_available() <= base_threads_quota(""));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_index_once),
-        cmocka_unit_test(all_workers_take_part),
-        cmocka_unit_test(destroys_idle),
-        cmocka_unit_test(works_in_a_child_of_fork),
+        cmocka_unit_test(each_index_once),          cmocka_unit_test(all_workers_take_part), cmocka_unit_test(destroys_idle),
+        cmocka_unit_test(works_in_a_child_of_fork), cmocka_unit_test(control_groups_limit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

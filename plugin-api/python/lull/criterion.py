@@ -98,8 +98,8 @@ def load(spec: str = "observer", *, threads: Optional[int] = None, log: Optional
          **parameters: object) -> Criterion:
     """Makes an instance: load("observer", visible=0.35), load("./mine.so"), load("lib.so:id", first_spp=32).
 
-    threads: workers that it may use, default all processors. log(level, text): its messages, default a Python warning for
-    errors and warnings. Parameters' underscores stand for hyphens. Raises LullError.
+    threads: workers that it may use, default as many as the process has processors. log(level, text): its messages,
+    default a Python warning for errors and warnings. Parameters' underscores stand for hyphens. Raises LullError.
     """
     return Criterion(find(spec), _texts(parameters), threads, log)
 
@@ -121,7 +121,7 @@ class Criterion:
     def __init__(self, info: Info, parameters: Optional[Mapping[str, str]] = None, threads: Optional[int] = None,
                  log: Optional[Callable[[int, str], None]] = None):
         self.info, self.parameters, self.log = info, dict(parameters or {}), log or _warn
-        self.threads = limits.checked("threads", os.cpu_count() or 1 if threads is None else threads)
+        self.threads = limits.checked("threads", len(os.sched_getaffinity(0)) if threads is None else threads)
         log = self.log  # and not self, which would never be let go of
         log_fn = abi.LogFn(lambda _, level, text: log(level, text.decode(errors="replace")))
         services = abi.sized(abi.HostServices, threads=self.threads, name=b"lull for Python 1.0", log=log_fn)
