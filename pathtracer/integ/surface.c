@@ -7,7 +7,7 @@ static pt_vec3 transform_normal(const struct pt_mat34 *t, pt_vec3 n)
     pt_vec3 r0 = v3(m[0], m[1], m[2]), r1 = v3(m[4], m[5], m[6]), r2 = v3(m[8], m[9], m[10]);
     pt_vec3 c0 = v3_cross(r1, r2), c1 = v3_cross(r2, r0), c2 = v3_cross(r0, r1);
     float sign = v3_dot(r0, c0) < 0.0f ? -1.0f : 1.0f;
-    return v3_norm(v3_scale(v3(v3_dot(c0, n), v3_dot(c1, n), v3_dot(c2, n)), sign));
+    return v3_unit(v3_scale(v3(v3_dot(c0, n), v3_dot(c1, n), v3_dot(c2, n)), sign));
 }
 
 void pt_place_instance(const struct pt_scene *scene, int32_t instance, float time, struct pt_place *at)

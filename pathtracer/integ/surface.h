@@ -89,7 +89,7 @@ static inline void pt_place_mesh(pt_effects fx, const struct pt_scene *scene, co
     at->p = pt_corners_mix(a, b, c, hit->u, hit->v);
     at->error =
         v3_scale(v3(pt_max3_abs(a.x, b.x, c.x), pt_max3_abs(a.y, b.y, c.y), pt_max3_abs(a.z, b.z, c.z)), PT_OFFSET_ERROR);
-    pt_vec3 n = v3_norm(hit->geometric);
+    pt_vec3 n = v3_unit(hit->geometric);
     s->n_geometric = s->n_shading = shape->flip_normal ? v3_neg(n) : n;
     if (mesh->has_normals) {
         pt_vec3 ns = v3_norm(pt_corners_mix(k.a->n, k.b->n, k.c->n, hit->u, hit->v));
@@ -112,7 +112,7 @@ static inline void pt_place_quadric(const struct pt_scene *scene, const struct p
     pt_quadric_at(q, hit->geometric, &point);
     at->p = point.p;
     at->error = point.error;
-    pt_vec3 n = v3_norm(point.n);
+    pt_vec3 n = v3_unit(point.n);
     at->s.n_geometric = at->s.n_shading = at->shape->flip_normal ? v3_neg(n) : n;
     pt_quadric_uv(q, hit->geometric, &at->s.u, &at->s.v, &at->s.dpdu, &at->s.dpdv);
 }

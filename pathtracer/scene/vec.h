@@ -5,6 +5,7 @@
 #ifndef PT_SCENE_VEC_H
 #define PT_SCENE_VEC_H
 
+#include <float.h>
 #include <math.h>
 
 #include "base/colour.h"
@@ -40,6 +41,15 @@ static inline pt_vec3 v3_norm(pt_vec3 a)
 {
     float len2 = v3_dot(a, a);
     return len2 > 0.0f ? v3_scale(a, 1.0f / sqrtf(len2)) : a;
+}
+/* The same of vectors as long as an area, whose squared length may leave float's range: normals of triangles. */
+static inline pt_vec3 v3_unit(pt_vec3 a)
+{
+    float len2 = v3_dot(a, a);
+    if (len2 >= FLT_MIN && len2 <= FLT_MAX)
+        return v3_scale(a, 1.0f / sqrtf(len2));
+    float big = fmaxf(fabsf(a.x), fmaxf(fabsf(a.y), fabsf(a.z)));
+    return big > 0.0f && big <= FLT_MAX ? v3_norm(v3(a.x / big, a.y / big, a.z / big)) : a;
 }
 /* Largest component; the plain comparison compiles to one instruction, fmaxf to a call. NaN in z stays, in x and y may
  * not. */

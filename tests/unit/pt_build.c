@@ -121,6 +121,36 @@ static void small_and_far_away(void **state)
     }
 }
 
+/* From atoms to the solar system: a triangle, a ball and a triangle of an object have the normals that they have at size 1. */
+static void normals_at_any_scale(void **state)
+{
+    (void)state;
+    for (int k = -12; k <= 12; k++) {
+        const double s = pow(10.0, k);
+        char text[1000];
+        snprintf(
+            text, sizeof text,
+            "AttributeBegin Scale %g %g %g Shape \"trianglemesh\" \"point3 P\" [ -1 -1 1 1 -1 2 -1 1 3 ] Translate 0 0 9\n"
+            "Shape \"sphere\" AttributeEnd ObjectBegin \"o\" Shape \"trianglemesh\" \"point3 P\" [ -1 -1 1 1 -1 2 -1 1 3 ]\n"
+            "ObjectEnd Scale %g %g %g Translate 0 0 30 ObjectInstance \"o\"",
+            s, s, s, s, s, s);
+        struct pt_scene *scene = world_scene(text);
+        for (int i = 0; i < 3; i++) {
+            static const float from[3] = {0.0f, 7.0f, 25.0f};
+            const pt_vec3 want = i == 1 ? v3(-0.3f, -0.3f, -sqrtf(0.82f)) : v3_norm(v3(-1, -2, 2));
+            struct pt_ray ray = {v3_scale(v3(-0.3f, -0.3f, from[i]), (float)s), {0, 0, 1}, 0, INFINITY, 0};
+            struct pt_hit hit;
+            struct pt_place at;
+            assert_true(pt_accel_intersect(scene, &ray, &hit));
+            pt_place_at_hit(PT_FX_ALL, scene, &ray, &hit, &at);
+            if (!(v3_len(v3_sub(at.s.n_geometric, want)) < 1e-4f))
+                fail_msg("shape %d at scale %g: normal (%g, %g, %g)", i, s, (double)at.s.n_geometric.x,
+                         (double)at.s.n_geometric.y, (double)at.s.n_geometric.z);
+        }
+        pt_scene_destroy(scene);
+    }
+}
+
 static void orientation(void **state)
 {
     (void)state;
@@ -860,6 +890,7 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(film_and_camera),
                                        cmocka_unit_test(far_from_the_origin),
                                        cmocka_unit_test(small_and_far_away),
+                                       cmocka_unit_test(normals_at_any_scale),
                                        cmocka_unit_test(orientation),
                                        cmocka_unit_test(a_ball_as_a_floor),
                                        cmocka_unit_test(lights),
