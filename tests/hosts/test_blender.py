@@ -150,10 +150,14 @@ def test_halves():
 
 
 def test_animated_seed():
-    """a driver or a key of the seed, or of what else a wave needs, leaves the halves apart and is there again afterwards"""
+    """a driver, a key or a script that sets the seed leaves the halves apart and is there again afterwards"""
+    def script(scene, *_):
+        scene.cycles.seed, scene.render.border_max_x = 7, .5
     for animate in (lambda scene: setattr(scene.driver_add("cycles.seed").driver, "expression", "frame"),
                     lambda scene: scene.keyframe_insert("cycles.seed", frame=1),
-                    lambda scene: setattr(scene.driver_add("cycles.sample_offset").driver, "expression", "0")):
+                    lambda scene: setattr(scene.driver_add("cycles.sample_offset").driver, "expression", "0"),
+                    lambda _: bpy.app.handlers.frame_change_pre.append(script),
+                    lambda _: bpy.app.handlers.render_init.append(script)):
         scene = cube(32, 24)
         animate(scene)
         scene.frame_set(1)
@@ -163,6 +167,7 @@ def test_animated_seed():
             assert np.abs(mean - half).max() > 1e-3
             assert np.abs(mean - whole_picture(session.host, 32)).max() < SAME
         assert not any(curve.mute for curve in cycles.curves_of(scene))
+        assert all(hook == script for hook in bpy.app.handlers.frame_change_pre)
 
 
 def test_phases():

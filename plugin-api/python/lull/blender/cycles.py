@@ -75,6 +75,9 @@ def merge(rects: Sequence[Rect]) -> list[Rect]:
     return _joined(_joined(rects, 0), 1)
 
 
+# What runs scripts before a render reads the scene's settings
+_BEFORE = ("render_init", "render_pre", "frame_change_pre", "depsgraph_update_pre")
+
 # Whose scenes are rendered: Cycles', and those of the add-on's own engine, which renders with Cycles
 ENGINES = ("CYCLES", "LULL")
 
@@ -176,6 +179,7 @@ class Cycles:
         self.pattern = self._choose_pattern()
         self._touched: list[tuple[object, str, object]] = []
         self._wave = contextlib.ExitStack()
+        self._asked: list[tuple[object, str, object]] = []  # what the wave in the making needs
         self.render_s = self.samples_s = 0.0  # wall seconds of all renders, and of their samples
 
     def device(self) -> str:
@@ -213,6 +217,9 @@ class Cycles:
             self._set(cycles, sampling_pattern=self.pattern, seed=cycles.seed)
             for layer in self.scene.view_layers:
                 self._set(layer, use=layer == self.layer)
+            for hook in (getattr(bpy.app.handlers, name) for name in _BEFORE):
+                hook.append(self._hold)
+                self._wave.callback(hook.remove, self._hold)
             self._set(self.layer, use_pass_combined=True)
             self._find_passes()
         except BaseException:
@@ -239,6 +246,12 @@ class Cycles:
         except ValueError:  # what it animated is gone
             return False
 
+    def _hold(self, *_: object) -> None:
+        """After the file's own scripts, and other add-ons', which may set the seed of each frame."""
+        for owner, name, value in self._asked:
+            if getattr(owner, name) != value:
+                setattr(owner, name, value)
+
     def _find_passes(self) -> None:
         """Switches on the colours by which Cycles divides light, and asks one sample of one pixel which passes there are."""
         hidden = set()
@@ -252,7 +265,7 @@ class Cycles:
         borrowed = self.denoised and not self.layer.cycles.denoising_store_passes
         if borrowed:
             self._set(self.layer.cycles, denoising_store_passes=True)
-        channels = [name for name in self._render_area(Rect(x, y, x + 1, y + 1), 0, 1)
+        channels = [name for name in self._render_area(Rect(x, y, x + 1, y + 1), 0, 1, False)
                     if not (borrowed and name.startswith("Denoising "))]
         self.passes = Passes(self.layer.name, channels, (self.width, self.height), hidden,
                              self.scene.render.film_transparent)
@@ -275,6 +288,7 @@ class Cycles:
         raise HostError("this Cycles has no pattern whose waves add up to one render: use Blender 3.x, or 4.4 or later")
 
     def __exit__(self, *_: object) -> None:
+        self._asked = []
         for owner, name, value in self._touched:  # in order: what a file format allows depends on the format
             setattr(owner, name, value)
         self._touched.clear()
@@ -286,9 +300,8 @@ class Cycles:
         """The driver's render function: means of samples [first, first + count) of waves of WAVE, float32, per rectangle:
         "color" [h, w, 3], the planes of PLANES likewise, and the passes [h, w]."""
         planes = PLANES if self.denoised else {"color": PLANES["color"]}
-        self.scene.cycles.seed = self.seeds[half]
         own_first = first // (2 * WAVE) * WAVE  # in its half, as every pair of waves is split
-        areas = {area: self._render_area(area, own_first, count) for area in merge(rects)}
+        areas = {area: self._render_area(area, own_first, count, half) for area in merge(rects)}
         for r in rects:
             area, channels = next((a, c) for a, c in areas.items() if a.x0 <= r.x0 < a.x1 and a.y0 <= r.y0 < a.y1)
             at = np.s_[r.y0 - area.y0:r.y1 - area.y0, r.x0 - area.x0:r.x1 - area.x0]
@@ -296,18 +309,18 @@ class Cycles:
             yield {**{plane: np.stack([part[name] for name in names], -1) for plane, names in planes.items()},
                    **self.passes.sample(part, r, first)}
 
-    def _render_area(self, area: Rect, first: int, count: int) -> dict[str, np.ndarray]:
+    def _render_area(self, area: Rect, first: int, count: int, half: bool) -> dict[str, np.ndarray]:
         """The view layer's channels, [h, w] float32."""
-        render, cycles = self.scene.render, self.scene.cycles
+        render, cycles, subset = self.scene.render, self.scene.cycles, hasattr(self.scene.cycles, "use_sample_subset")
         # Blender cuts border · size down to whole pixels, in single precision: aim inside the pixel. Rows are from below.
-        render.border_min_x, render.border_max_x = (area.x0 + 0.25) / self.width, (area.x1 + 0.25) / self.width
-        render.border_min_y = (self.height - area.y1 + 0.25) / self.height
-        render.border_max_y = (self.height - area.y0 + 0.25) / self.height
-        cycles.sample_offset = first
-        if hasattr(cycles, "use_sample_subset"):
-            cycles.samples, cycles.sample_subset_length = self.spp_max, count
-        else:
-            cycles.samples = count
+        asked = [(render, "border_min_x", (area.x0 + 0.25) / self.width), (render, "border_max_x", (area.x1 + 0.25) / self.width),
+                 (render, "border_min_y", (self.height - area.y1 + 0.25) / self.height),
+                 (render, "border_max_y", (self.height - area.y0 + 0.25) / self.height), (cycles, "seed", self.seeds[half]),
+                 (cycles, "sample_offset", first), (cycles, "samples", self.spp_max if subset else count),
+                 *([(cycles, "sample_subset_length", count)] if subset else [])]
+        for owner, name, value in asked:
+            setattr(owner, name, value)
+        self._asked = [(owner, name, getattr(owner, name)) for owner, name, _ in asked]  # in single precision, as it is kept
         begin_s = time.monotonic()
         with _silence():
             status = bpy.ops.render.render(write_still=True, scene=self.scene.name)
