@@ -128,13 +128,20 @@ static pt_vec3 light_colour(struct pt_builder *b, const struct pt_param *param, 
     return rgb;
 }
 
-static int check_colour(struct pt_builder *b, const struct pt_param *param, enum pt_colour_use use, pt_vec3 *rgb)
+static int check_colour(struct pt_builder *b, const struct pt_params *p, const struct pt_param *param,
+                        enum pt_colour_use use, pt_vec3 *rgb)
 {
+    const double *given = values_of(p, param);
+    int is_negative = 0;
+    for (size_t i = 0; i < param->count && (param->type == PT_PARAM_RGB || param->type == PT_PARAM_FLOAT); i++)
+        is_negative |= given[i] < 0;
     if (!v3_is_finite(*rgb))
         return pt_diag_fail(&b->diag, param->loc, "a colour that is not finite");
     if (use == PT_USE_REFLECTANCE && (fminf(rgb->x, fminf(rgb->y, rgb->z)) < -1e-3f || v3_max(*rgb) > 1.001f) &&
         param->type == PT_PARAM_RGB)
         pt_diag_warn(&b->diag, param->loc, "reflectances beyond 0 … 1 are clamped");
+    if (use != PT_USE_REFLECTANCE && is_negative)
+        pt_diag_warn(&b->diag, param->loc, "\"%s\" is negative, which is taken as 0", pt_param_name(p, param));
     if (use == PT_USE_REFLECTANCE)
         *rgb = v3_least(*rgb, v3_splat(1));
     /* Spectral colours may leave Rec.709; negative light does not exist. */
@@ -179,7 +186,7 @@ int pt_build_colour(struct pt_builder *b, struct pt_params *p, const char *name,
         pt_diag_fail(&b->diag, param->loc, "parameter \"%s\" is not a colour (expected rgb, spectrum or blackbody)", name);
         return 0;
     }
-    if (check_colour(b, param, use, &rgb) != 0)
+    if (check_colour(b, p, param, use, &rgb) != 0)
         return 0;
     *out = rgb;
     return 1;

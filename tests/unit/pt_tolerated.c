@@ -62,6 +62,7 @@ static void of_both(void **state)
         {"Shape \"trianglemesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ] \"integer indices\" [ ] Shape \"disk\"",
          "Shape \"disk\"", 1},
         {"Shape \"trianglemesh\" \"point3 P\" [ ] \"integer indices\" [ ] Shape \"disk\"", "Shape \"disk\"", 1},
+        {"LightSource \"point\" \"rgb I\" [ -1 2 3 ]", "LightSource \"point\" \"rgb I\" [ 0 2 3 ]", 1},
         {"Shape \"sphere\" \"float phimax\" 360.00001", "Shape \"sphere\"", 0},
     };
     (void)state;
