@@ -270,8 +270,8 @@ int pt_build_light(struct pt_builder *b, struct pt_params *p)
         if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
             kinds[i].make(&c);
     if (light.kind < 0)
-        return pt_diag_fail(&b->diag, p->loc, "unknown light \"%s\" (expected point, spot, distant, infinite …)",
-                            pt_params_kind(p));
+        return pt_diag_unknown(&b->diag, p->loc, "light", pt_params_kind(p), "point, spot, distant, infinite …",
+                               "it is left out");
     pt_params_ignore(p, "nsamples samples");
     pt_params_check_used(p);
     if (!b->diag.rc && !v3_is_black(light.emission))
@@ -310,8 +310,9 @@ int pt_build_area_light(struct pt_builder *b, struct pt_params *p, struct pt_are
 {
     const char *kind = pt_params_kind(p);
     struct pt_area_light light = {.on = 1, .loc = p->loc};
+    *out = (struct pt_area_light){0}; /* whatever becomes of this one, that of before ends */
     if (strcmp(kind, "diffuse") != 0 && strcmp(kind, "area") != 0)
-        return pt_diag_fail(&b->diag, p->loc, "unknown area light \"%s\" (expected diffuse)", kind);
+        return pt_diag_unknown(&b->diag, p->loc, "area light", kind, "diffuse", "it is left out");
     light.emission = scaled_colour(b, p, "L");
     light.two_sided = pt_params_bool(p, "twosided", 0);
     light.power = pt_params_float(p, "power", -1);

@@ -284,11 +284,11 @@ static int32_t build(struct pt_builder *b, const char *kind, struct pt_params *p
     struct pt_making c = {b, p, kind, &m, &info};
     pt_params_ignore(p, "type");
     if (!build_v4(&c) && !pt_build_material_v3(&c)) {
-        pt_diag_fail(&b->diag, pt_params_loc(p, "type"),
-                     "unknown material \"%s\" (expected diffuse, coateddiffuse, conductor, dielectric, "
-                     "mix …)",
-                     kind);
-        return -1;
+        if (pt_diag_unknown(&b->diag, pt_params_loc(p, "type"), "material", kind,
+                            "diffuse, coateddiffuse, conductor, dielectric, mix …", "matte in its stead") != 0)
+            return -1;
+        c.kind = "matte";
+        pt_build_material_v3(&c);
     }
     if (!m.bump)
         m.bump = pt_build_bump(b, p, "displacement");

@@ -499,8 +499,8 @@ int pt_build_shape(struct pt_builder *b, struct pt_params *p)
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
         if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
             return kinds[i].make(b, p);
-    return pt_diag_fail(&b->diag, p->loc, "unknown shape \"%s\" (expected trianglemesh, plymesh, sphere, disk …)",
-                        pt_params_kind(p));
+    return pt_diag_unknown(&b->diag, p->loc, "shape", pt_params_kind(p), "trianglemesh, plymesh, sphere, disk …",
+                           "it is left out");
 }
 
 /* An object without shapes so far; wanted: the name of one that is made further down. */

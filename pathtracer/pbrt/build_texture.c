@@ -431,10 +431,8 @@ int pt_build_texture(struct pt_builder *b, const char *name, const char *class_n
         if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
             kinds[i].make(&c, &t);
     if (t.kind < 0)
-        return pt_diag_fail(&b->diag, p->loc,
-                            "unknown texture class \"%s\" (expected imagemap, scale, mix, "
-                            "constant, checkerboard …)",
-                            pt_params_kind(p));
+        return pt_diag_unknown(&b->diag, p->loc, "texture class", pt_params_kind(p),
+                               "imagemap, scale, mix, constant, checkerboard …", "it is left out");
     pt_params_check_used(p);
     if (b->diag.rc)
         return b->diag.rc;

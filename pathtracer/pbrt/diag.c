@@ -85,4 +85,13 @@ void pt_diag_warn(struct pt_diag *diag, struct pt_loc loc, const char *format, .
         base_log_note(diag->log, "%s: warning: %s", file, text);
 }
 
+int pt_diag_unknown(struct pt_diag *diag, struct pt_loc loc, const char *what, const char *name, const char *known,
+                    const char *instead)
+{
+    if (!diag->is_v3)
+        return pt_diag_fail(diag, loc, "unknown %s \"%s\" (expected %s)", what, name, known);
+    pt_diag_warn(diag, loc, "unknown %s \"%s\": %s", what, name, instead);
+    return diag->rc;
+}
+
 void pt_diag_release(struct pt_diag *diag) { pt_names_release(&diag->reported); }

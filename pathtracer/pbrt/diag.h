@@ -38,6 +38,9 @@ int pt_diag_fail_code(struct pt_diag *diag, int code, struct pt_loc loc, const c
 int pt_diag_nomem(struct pt_diag *diag, const char *what);
 /* Something is approximated or ignored: `file:line: warning: text`, a note, each text once. A failure when strict. */
 void pt_diag_warn(struct pt_diag *diag, struct pt_loc loc, const char *format, ...) __attribute__((format(printf, 3, 4)));
+/* A name that nobody knows: fails, but warns in v3, as pbrt-v3 does, which takes `instead`. Returns the sticky code. */
+int pt_diag_unknown(struct pt_diag *diag, struct pt_loc loc, const char *what, const char *name, const char *known,
+                    const char *instead);
 void pt_diag_release(struct pt_diag *diag);
 
 #endif
