@@ -29,7 +29,7 @@ static struct pt_loc shutter_loc(const struct pt_params *camera)
     return pt_params_loc(camera, pt_params_find(camera, "shutterclose") ? "shutterclose" : "shutteropen");
 }
 
-/* The camera's, but the film depends on it. What moves stands before the first of the transforms' times and after the last. */
+/* The camera's, but the film depends on it. Before the first and after the second of the transforms' times nothing moves. */
 static void build_shutter(struct pt_builder *b)
 {
     struct pt_params *p = begin(b, PT_HEADER_CAMERA, "perspective");

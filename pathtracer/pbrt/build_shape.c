@@ -96,8 +96,8 @@ static int is_flat(const struct pt_xform *t)
     return !pt_xform_invert(t, &inverse) || fabs(pt_xform_det(t)) < (double)FLT_MIN;
 }
 
-/* Places an object that is kept about `origin`. What grows from nothing does so from a millionth of what it becomes: rays have
- * to find into its space at all times. */
+/* Places an object that is kept about `origin`. What grows from nothing does so from a millionth of what it becomes: rays
+ * have to find into its space at all times. */
 static int add_instance(struct pt_builder *b, int32_t object, const struct pt_xform at[2], const double origin[3],
                         struct pt_loc loc)
 {

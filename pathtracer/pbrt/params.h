@@ -64,8 +64,8 @@ const char *pt_params_kind(const struct pt_params *params);
 int pt_params_read(struct pt_params *params, struct pt_lexer *lexer);
 /* Appends copies of all of `from` as inherited parameters (they give way to those already there). */
 int pt_params_append(struct pt_params *params, const struct pt_params *from);
-/* Fails for the first parameter that nothing asked for: unknown names are errors, names that pbrt knows elsewhere, and all of
- * v3, warn. */
+/* Fails for the first parameter that nothing asked for: unknown names are errors. Names that pbrt knows elsewhere, and all
+ * of v3, warn. */
 void pt_params_check_used(struct pt_params *params);
 
 /* The parameter called `name`, or NULL; does not mark it. */

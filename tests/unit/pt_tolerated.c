@@ -82,7 +82,8 @@ static void of_v4(void **state)
 static void of_v3(void **state)
 {
     static const struct tolerated list[] = {
-        {"AttributeBegin ObjectBegin \"a\" Shape \"sphere\" AttributeEnd ObjectEnd Shape \"disk\"", OBJECT "Shape \"disk\"", 0},
+        {"AttributeBegin ObjectBegin \"a\" Shape \"sphere\" AttributeEnd ObjectEnd Shape \"disk\"", OBJECT "Shape \"disk\"",
+         0},
         {"Shape \"sphere\" AttributeEnd WorldEnd", "Shape \"sphere\"", 1},
         {"AttributeBegin Shape \"sphere\" WorldEnd", "Shape \"sphere\"", 1},
         {"ObjectInstance \"a\" " OBJECT, OBJECT, 1},
@@ -100,7 +101,8 @@ static void of_v3(void **state)
         {"Texture \"t\" \"spectrum\" \"constant\" \"rgb value\" [ .2 .3 .4 ] "
          "Material \"matte\" \"texture Kd\" \"t\" \"rgb Kd\" [ .5 .5 .5 ] Shape \"disk\"",
          "Texture \"t\" \"spectrum\" \"constant\" \"rgb value\" [ .2 .3 .4 ] "
-         "Material \"matte\" \"texture Kd\" \"t\" Shape \"disk\"", 1},
+         "Material \"matte\" \"texture Kd\" \"t\" Shape \"disk\"",
+         1},
     };
     (void)state;
     expect_same("Film \"image\" ", list, sizeof list / sizeof list[0]);
