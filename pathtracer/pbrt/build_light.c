@@ -84,8 +84,8 @@ static void make_spot(struct context *c)
             v3_scale(c->light->emission, (float)(power / (2 * BASE_PI * ((1 - cos_start) + (cos_start - cos_total) / 2))));
     read_position(c);
     read_direction(c);
-    c->light->cos_total = (float)cos_total;
-    c->light->cos_start = (float)cos_start;
+    c->light->cos_total = cos_total;
+    c->light->cos_start = cos_start;
     c->light->is_quartic = c->b->is_v3;
     pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
 }

@@ -160,7 +160,7 @@ struct pt_light {
                           DISTANT: irradiance on a surface facing it. All scales applied */
     pt_vec3 position;  /* POINT, SPOT */
     pt_vec3 direction; /* SPOT: axis; DISTANT: the way the light travels; unit */
-    float cos_total, cos_start;         /* SPOT: full darkness beyond, full light within … */
+    double cos_total, cos_start;        /* SPOT: full darkness beyond, full light within … */
     int32_t is_quartic;                 /* … and between them t⁴ of pbrt-v3 instead of v4's smoothstep */
     struct pt_mat34 from_render;        /* ENV_IMAGE: render → light space, of determinant 1 or -1 … */
     int32_t is_stretched;               /* … not a rotation, perhaps mirrored: to_render counts */

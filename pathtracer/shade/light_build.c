@@ -91,7 +91,7 @@ static double power_of(const struct pt_scene *scene, const struct pt_light *ligh
     case PT_LIGHT_ENV_IMAGE:
     case PT_LIGHT_ENV_CONSTANT: return 4.0 * BASE_PI * disk * (double)pt_light_env_mean(scene, light);
     case PT_LIGHT_DISTANT: return disk * l;
-    case PT_LIGHT_SPOT: return 2.0 * BASE_PI * l * (1.0 - 0.5 * (double)(light->cos_total + light->cos_start));
+    case PT_LIGHT_SPOT: return 2.0 * BASE_PI * l * (1.0 - 0.5 * (light->cos_total + light->cos_start));
     case PT_LIGHT_POINT: return 4.0 * BASE_PI * l;
     default: return 0.0;
     }
@@ -227,11 +227,12 @@ static int bound_emitter(const struct pt_scene *scene, const struct pt_emitter *
     } else if (light->kind == PT_LIGHT_SPOT) {
         out->axis = light->direction;
         /* light goes no further than a right angle off what counts as a normal */
-        out->normals_rad = fmaxf(acosf(light->cos_start), acosf(light->cos_total) - 0.5f * PT_PI);
-        out->emission_rad = acosf(light->cos_total) - out->normals_rad + SPOT_SLACK;
+        const float total_rad = (float)acos(light->cos_total);
+        out->normals_rad = fmaxf((float)acos(light->cos_start), total_rad - 0.5f * PT_PI);
+        out->emission_rad = total_rad - out->normals_rad + SPOT_SLACK;
     }
     /* power over all directions → what is sent one way */
-    double solid = light->kind == PT_LIGHT_SPOT ? 2.0 * pi * (1.0 - 0.5 * (double)(light->cos_total + light->cos_start))
+    double solid = light->kind == PT_LIGHT_SPOT ? 2.0 * pi * (1.0 - 0.5 * (light->cos_total + light->cos_start))
                    : out->normals_rad < PT_PI   ? pi * (light->two_sided ? 2.0 : 1.0)
                                                 : 4.0 * pi;
     out->intensity = power / solid;

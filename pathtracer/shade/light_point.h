@@ -23,10 +23,12 @@ static inline int pt_light_delta_sample(const struct pt_light *light, float pmf,
     out->wi = v3_scale(d, 1.0f / sqrtf(dist2));
     out->radiance = v3_scale(light->emission, 1.0f / dist2);
     if (light->kind == PT_LIGHT_SPOT) {
-        float c = -v3_dot(out->wi, light->direction);
-        float t = fminf(1.0f, fmaxf(0.0f, (c - light->cos_total) / (light->cos_start - light->cos_total)));
-        if (!(c > light->cos_total))
+        /* 1 - cosine by the chord: of a narrow cone all of it would be lost to the rounding of the cosine */
+        pt_vec3 chord = v3_add(out->wi, light->direction);
+        double within = 1.0 - light->cos_total - 0.5 * (double)v3_dot(chord, chord);
+        if (!(within > 0.0))
             return 0;
+        float t = (float)fmin(1.0, within / (light->cos_start - light->cos_total));
         out->radiance = v3_scale(out->radiance, t * t * (light->is_quartic ? t * t : 3.0f - 2.0f * t));
     }
     return 1;

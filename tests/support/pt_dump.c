@@ -226,8 +226,8 @@ static void dump_lights(FILE *out, const struct pt_scene *s)
         vector(out, "emission", l->emission);
         vector(out, "position", l->position);
         vector(out, "direction", l->direction);
-        number(out, "cos", (double)l->cos_total);
-        number(out, "cos-start", (double)l->cos_start);
+        number(out, "cos", l->cos_total);
+        number(out, "cos-start", l->cos_start);
         if (l->has_portal) {
             vector(out, "portal", l->portal);
             vector(out, "u", l->portal_u);

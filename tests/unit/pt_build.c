@@ -208,8 +208,8 @@ static void lights(void **state)
     near(s->lights[1].emission.x, 1, 1e-6); /* Φ / 4π */
     near(s->lights[1].position.y, 2, 1e-6);
     near(s->lights[2].direction.z, -1, 0);
-    near(s->lights[3].cos_total, 0.5, 1e-6);
-    near(s->lights[3].cos_start, 1, 1e-6);
+    near((float)s->lights[3].cos_total, 0.5, 1e-6);
+    near((float)s->lights[3].cos_start, 1, 1e-6);
     near(v3_luminance(s->lights[3].emission), 10, 0.01); /* v4: a black body of any heat has luminance 1 before its scale */
     near(s->lights[4].emission.x, 2, 1e-5);
     near(s->lights[5].emission.x, 10 / (4 * 3.14159265 * 3.14159265), 1e-5); /* Φ / (π area) */

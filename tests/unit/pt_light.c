@@ -525,6 +525,22 @@ static void delta_lights(void **state)
     assert_true(fabsf(s.radiance.x - 0.0625f * 8.0f / (4.0f + r * r)) < 1e-4f);
     assert_int_equal(pt_light_delta_sample(&spot, 1.0f, v3(0, 0, 0), &s), 1);
     assert_true(fabsf(s.radiance.x - 2.0f) < 1e-6f);
+    for (double cone = 1e-5; cone < 1; cone *= 4) { /* radians, from a laser on: lit within, dark outside, half way 1/2 */
+        struct pt_light narrow = spot;
+        narrow.is_quartic = 0;
+        narrow.cos_total = cos(cone);
+        narrow.cos_start = 1;
+        float half = (float)(2 * tan(acos(0.5 + 0.5 * cos(cone)))), dist2 = 4 + half * half;
+        assert_int_equal(pt_light_delta_sample(&narrow, 1.0f, v3(0, 0, 0), &s), 1);
+        assert_true(fabsf(s.radiance.x - 2.0f) < 1e-5f);
+        assert_int_equal(pt_light_delta_sample(&narrow, 1.0f, v3(half, 0, 0), &s), 1);
+        assert_true(fabsf(s.radiance.x - 4.0f / dist2) < 0.02f);
+        narrow.cos_start = narrow.cos_total;
+        float inside = (float)(2 * tan(0.97 * cone));
+        assert_int_equal(pt_light_delta_sample(&narrow, 1.0f, v3(inside, 0, 0), &s), 1);
+        assert_true(fabsf(s.radiance.x * (4 + inside * inside) - 8.0f) < 1e-4f);
+        assert_int_equal(pt_light_delta_sample(&narrow, 1.0f, v3((float)(2 * tan(1.03 * cone)), 0, 0), &s), 0);
+    }
     assert_int_equal(pt_light_delta_sample(&distant, 1.0f, v3(5, 6, 7), &s), 1);
     assert_true(!s.finite && s.wi.z == 1.0f && s.radiance.x == 3.0f);
 }

@@ -142,8 +142,8 @@ static void lights(void **state)
     near3(l[0].position, 0, 0, 0);
     near3(l[1].emission, 1, 1, 1);
     near3(l[1].direction, 0, 0, 1);
-    near((double)l[1].cos_total, cos((double)cone * pi / 180), 1e-6);
-    near((double)l[1].cos_start, cos((double)start * pi / 180), 1e-6);
+    near(l[1].cos_total, cos((double)cone * pi / 180), 1e-6);
+    near(l[1].cos_start, cos((double)start * pi / 180), 1e-6);
     near3(l[2].emission, 1, 1, 1);
     near3(l[2].direction, 0, 0, -1 + 2); /* from the origin to (0, 0, 1) */
     assert_int_equal(l[3].kind, PT_LIGHT_ENV_CONSTANT);
