@@ -74,7 +74,7 @@ static int build_topology(const struct mesh *m, struct topology *t)
 
 /* Neighbours of vertex v in order: ring[0 … count). On a boundary the first and the last are its two boundary neighbours.
  * Returns the count (0 for an unused vertex or a fan that does not close), *boundary says which. */
-enum { RING_MAX = 256 };
+enum { RING_MAX = 4096 }; /* the tip of a finely cut cone */
 static int ring_of(const struct mesh *m, const struct topology *t, size_t v, uint32_t ring[RING_MAX], int *boundary)
 {
     int count = 0;

@@ -6,10 +6,12 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
 
+#include "base/pi.h"
 #include "geom/accel.h"
 #include "integ/surface.h"
 #include "pt_text_scene.h"
@@ -761,6 +763,28 @@ static void tessellated(void **state)
     pt_scene_destroy(s);
 }
 
+/* A tip with many neighbours is rounded as any other vertex: half way to their middle. */
+static void a_tip_of_many_triangles(void **state)
+{
+    (void)state;
+    enum { AROUND = 600, ROOM = 60 * AROUND };
+    char *text = malloc(ROOM);
+    assert_non_null(text);
+    size_t n = (size_t)snprintf(text, ROOM, "Shape \"loopsubdiv\" \"integer levels\" 0 \"point3 P\" [ 0 0 1");
+    for (int i = 0; i < AROUND; i++)
+        n += (size_t)snprintf(text + n, ROOM - n, " %.5f %.5f 0", cos(2 * BASE_PI * i / AROUND),
+                              sin(2 * BASE_PI * i / AROUND));
+    n += (size_t)snprintf(text + n, ROOM - n, " ] \"integer indices\" [");
+    for (int i = 0; i < AROUND; i++)
+        n += (size_t)snprintf(text + n, ROOM - n, " 0 %d %d", 1 + i, 1 + (i + 1) % AROUND);
+    snprintf(text + n, ROOM - n, " ]");
+    struct pt_scene *s = world_scene(text);
+    near(s->meshes[0].vertices[0].p.z, 0.5, 1e-6);
+    near(s->meshes[0].vertices[0].n.z, -1, 1e-4);
+    pt_scene_destroy(s);
+    free(text);
+}
+
 /* Flat or not, two triangles have a patch only where positions, uv and normals run evenly over it. */
 static void patches_of_two_triangles(void **state)
 {
@@ -910,6 +934,7 @@ int main(void)
                                        cmocka_unit_test(mixed_with_nothing),
                                        cmocka_unit_test(warnings_come_once_and_strict_refuses),
                                        cmocka_unit_test(tessellated),
+                                       cmocka_unit_test(a_tip_of_many_triangles),
                                        cmocka_unit_test(patches_of_two_triangles),
                                        cmocka_unit_test(trapezoid),
                                        cmocka_unit_test(tubes),
