@@ -96,6 +96,19 @@ static int is_even(const double *const c[4], size_t size)
     return off <= 1e-5 * extent; /* rectangles of floats count */
 }
 
+/* Across a patch at (u, v), 0 where corners coincide. Bilinear as the patch, so that it is not to be made unit before it is
+ * interpolated. */
+static void patch_normal(const double *const c[4], double u, double v, double n[3])
+{
+    double d[3], e[3];
+    for (size_t k = 0; k < 3; k++) {
+        d[k] = (1 - v) * (c[1][k] - c[0][k]) + v * (c[3][k] - c[2][k]);
+        e[k] = (1 - u) * (c[2][k] - c[0][k]) + u * (c[3][k] - c[1][k]);
+    }
+    for (size_t k = 0; k < 3; k++)
+        n[k] = d[(k + 1) % 3] * e[(k + 2) % 3] - d[(k + 2) % 3] * e[(k + 1) % 3];
+}
+
 int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
 {
     static const double identity[4] = {0, 1, 2, 3}, square[8] = {0, 0, 1, 0, 0, 1, 1, 1};
@@ -103,7 +116,7 @@ int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
     const double *P = pt_params_floats(p, "P", 3, &vertices), *indices = pt_params_ints(p, "indices", &count);
     const double *uv = pt_params_floats(p, "uv", 2, &uv_count), *N = pt_params_floats(p, "N", 3, &n_count);
     struct grower g = {0};
-    int ok = 1;
+    int ok = 1, bent = 0;
     if (b->diag.rc)
         return b->diag.rc;
     if (!P || (!indices && vertices != 4) || (indices && count % 4 != 0) || (uv && uv_count != vertices) ||
@@ -114,12 +127,19 @@ int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
         indices = identity;
         count = 4;
     }
+    for (size_t i = 0; i < count; i++)
+        if (pt_build_check_index(b, p, indices[i], vertices) != 0)
+            return b->diag.rc;
+    for (size_t i = 0; i < count && !N; i += 4) {
+        const double *c[4];
+        for (size_t k = 0; k < 4; k++)
+            c[k] = P + 3 * (size_t)indices[i + k];
+        bent |= !is_even(c, 3);
+    }
     for (size_t i = 0; i < count && ok; i += 4) {
         const double *c[4], *t[4], *n[4] = {NULL, NULL, NULL, NULL};
         for (size_t k = 0; k < 4; k++) {
             double v = indices[i + k];
-            if (pt_build_check_index(b, p, v, vertices) != 0)
-                return finish(&g, 1, b, p);
             c[k] = P + 3 * (size_t)v;
             t[k] = uv ? uv + 2 * (size_t)v : square + 2 * k;
             n[k] = N ? N + 3 * (size_t)v : NULL;
@@ -132,7 +152,9 @@ int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
                     q[k] = lerp2(c[0], c[1], c[2], c[3], u, v, k);
                     m[k] = N ? lerp2(n[0], n[1], n[2], n[3], u, v, k) : 0;
                 }
-                ok = add_vertex(&g, q, N ? m : NULL, lerp2(t[0], t[1], t[2], t[3], u, v, 0),
+                if (bent)
+                    patch_normal(c, u, v, m);
+                ok = add_vertex(&g, q, N || bent ? m : NULL, lerp2(t[0], t[1], t[2], t[3], u, v, 0),
                                 lerp2(t[0], t[1], t[2], t[3], u, v, 1));
             }
         ok = ok && add_grid(&g, first, cuts + 1, cuts + 1);

@@ -826,6 +826,30 @@ static void trapezoid(void **state)
     pt_scene_destroy(s);
 }
 
+/* A twisted patch is smooth without normals of its own: z = 5 + xy, and with the other orientation. */
+static void saddle(void **state)
+{
+    (void)state;
+    for (int reverse = 0; reverse < 2; reverse++) {
+        char text[200];
+        snprintf(text, sizeof text, "%s Shape \"bilinearmesh\" \"point3 P\" [ -1 -1 6 1 -1 4 -1 1 4 1 1 6 ]",
+                 reverse ? "ReverseOrientation" : "");
+        struct pt_scene *s = world_scene(text);
+        for (int i = 0; i < 25; i++) {
+            float x = -0.83f + 0.41f * (float)(i % 5), y = -0.79f + 0.39f * (float)(i / 5);
+            struct pt_ray ray = {{x, y, 0}, {0, 0, 1}, 0.0f, INFINITY, 0.0f};
+            struct pt_hit hit;
+            struct pt_place at;
+            assert_true(pt_accel_intersect(s, &ray, &hit));
+            pt_place_at_hit(PT_FX_ALL, s, &ray, &hit, &at);
+            pt_vec3 n = v3_norm(v3(-y, -x, 1));
+            near(v3_len(v3_sub(at.s.n_shading, reverse ? v3_neg(n) : n)), 0, 1e-5);
+            assert_true(v3_dot(at.s.n_geometric, at.s.n_shading) > 0);
+        }
+        pt_scene_destroy(s);
+    }
+}
+
 /* The vertices of ring k of a tube of six sides. */
 static pt_vec3 middle_of(const struct pt_mesh *tube, uint32_t ring)
 {
@@ -937,6 +961,7 @@ int main(void)
                                        cmocka_unit_test(a_tip_of_many_triangles),
                                        cmocka_unit_test(patches_of_two_triangles),
                                        cmocka_unit_test(trapezoid),
+                                       cmocka_unit_test(saddle),
                                        cmocka_unit_test(tubes),
                                        cmocka_unit_test(presets_of_media),
                                        cmocka_unit_test(grids_of_any_density),
