@@ -96,6 +96,12 @@ static int is_even(const double *const c[4], size_t size)
     return off <= 1e-5 * extent; /* rectangles of floats count */
 }
 
+static void cross(const double d[3], const double e[3], double n[3])
+{
+    for (size_t k = 0; k < 3; k++)
+        n[k] = d[(k + 1) % 3] * e[(k + 2) % 3] - d[(k + 2) % 3] * e[(k + 1) % 3];
+}
+
 /* Across a patch at (u, v), 0 where corners coincide. Bilinear as the patch, so that it is not to be made unit before it is
  * interpolated. */
 static void patch_normal(const double *const c[4], double u, double v, double n[3])
@@ -105,8 +111,7 @@ static void patch_normal(const double *const c[4], double u, double v, double n[
         d[k] = (1 - v) * (c[1][k] - c[0][k]) + v * (c[3][k] - c[2][k]);
         e[k] = (1 - u) * (c[2][k] - c[0][k]) + u * (c[3][k] - c[1][k]);
     }
-    for (size_t k = 0; k < 3; k++)
-        n[k] = d[(k + 1) % 3] * e[(k + 2) % 3] - d[(k + 2) % 3] * e[(k + 1) % 3];
+    cross(d, e, n);
 }
 
 int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
@@ -346,20 +351,31 @@ int pt_build_revolved(struct pt_builder *b, struct pt_params *p)
         pt_diag_warn(&b->diag, p->loc, "shape \"%s\" is rendered as %d triangles", kind, (int)(2 * AROUND * ALONG));
     for (int j = 0; j <= ALONG && ok; j++)
         for (int i = 0; i <= AROUND && ok; i++) {
-            double v = (double)j / ALONG, u = (double)i / AROUND, a = u * phi, q[3];
+            double v = (double)j / ALONG, u = (double)i / AROUND, a = u * phi, c = cos(a), s = sin(a);
+            double at[3] = {0, 0, 0}, along[3] = {0, 0, 0}; /* where phi is 0 */
             if (kind[0] == 'h') {
-                double x = (1 - v) * p1[0] + v * p2[0], y = (1 - v) * p1[1] + v * p2[1];
-                q[0] = x * cos(a) - y * sin(a);
-                q[1] = x * sin(a) + y * cos(a);
-                q[2] = (1 - v) * p1[2] + v * p2[2];
-            } else {
-                double z = kind[0] == 'c' ? v * height : z0 + v * (z1 - z0);
-                double r = kind[0] == 'c' ? radius * (1 - v) : radius * sqrt(fmax(z / z1, 0));
-                q[0] = r * cos(a);
-                q[1] = r * sin(a);
-                q[2] = z;
+                for (int k = 0; k < 3; k++) {
+                    at[k] = (1 - v) * p1[k] + v * p2[k];
+                    along[k] = p2[k] - p1[k];
+                }
+            } else if (kind[0] == 'c') {
+                at[0] = radius * (1 - v);
+                at[2] = v * height;
+                along[0] = -radius;
+                along[2] = height;
+            } else { /* r² grows with z */
+                at[2] = z0 + v * (z1 - z0);
+                at[0] = radius * sqrt(fmax(at[2] / z1, 0));
+                along[0] = radius / (2 * sqrt(fabs(z1)));
+                along[2] = sqrt(fmax(at[2], 0));
             }
-            ok = add_vertex(&g, q, NULL, u, v);
+            const double q[3] = {at[0] * c - at[1] * s, at[0] * s + at[1] * c, at[2]};
+            const double e[3] = {along[0] * c - along[1] * s, along[0] * s + along[1] * c, along[2]};
+            /* around: at the tip as just before it */
+            const double d[3] = {kind[0] == 'h' ? -q[1] : -s, kind[0] == 'h' ? q[0] : c, 0};
+            double n[3];
+            cross(d, e, n);
+            ok = add_vertex(&g, q, n, u, v);
         }
     ok = ok && add_grid(&g, 0, AROUND + 1, ALONG + 1);
     return finish(&g, ok, b, p);

@@ -850,6 +850,34 @@ static void saddle(void **state)
     }
 }
 
+/* Surfaces of revolution are smooth, outwards as their triangles are, at the tip too. */
+static void revolved_normals(void **state)
+{
+    (void)state;
+    static const char *const shapes[] = {"\"cone\" \"float height\" 2", "\"paraboloid\" \"float zmax\" 2 \"float radius\" 2",
+                                         "\"hyperboloid\" \"point3 p1\" [ 1 0 0 ] \"point3 p2\" [ 1 1 1 ]"};
+    for (int i = 0; i < 3; i++) {
+        char text[200];
+        snprintf(text, sizeof text, "Shape %s", shapes[i]);
+        struct pt_scene *s = world_scene(text);
+        const struct pt_mesh *m = &s->meshes[0];
+        for (uint32_t k = 0; k < m->vertex_count; k++) {
+            const struct pt_vertex *v = &m->vertices[k];
+            const float x = v->p.x, y = v->p.y, z = v->p.z, phi = v->u * 2 * PT_PI;
+            /* gradients of their equations: z = 2 - 2r; z = r² / 2; r² - z² = 1 */
+            pt_vec3 want = i == 0 ? v3(2 * cosf(phi), 2 * sinf(phi), 1) : i == 1 ? v3(x, y, -1) : v3(x, y, -z);
+            near(v3_len(v3_sub(v3_norm(v->n), v3_norm(want))), 0, 1e-5);
+        }
+        for (uint32_t t = 0; t < m->triangle_count; t++) {
+            const struct pt_vertex *a = m->vertices + m->indices[3 * t], *b = m->vertices + m->indices[3 * t + 1],
+                                   *c = m->vertices + m->indices[3 * t + 2];
+            pt_vec3 n = v3_cross(v3_sub(b->p, a->p), v3_sub(c->p, a->p));
+            assert_true(v3_dot(n, a->n) > -1e-6f);
+        }
+        pt_scene_destroy(s);
+    }
+}
+
 /* The vertices of ring k of a tube of six sides. */
 static pt_vec3 middle_of(const struct pt_mesh *tube, uint32_t ring)
 {
@@ -962,6 +990,7 @@ int main(void)
                                        cmocka_unit_test(patches_of_two_triangles),
                                        cmocka_unit_test(trapezoid),
                                        cmocka_unit_test(saddle),
+                                       cmocka_unit_test(revolved_normals),
                                        cmocka_unit_test(tubes),
                                        cmocka_unit_test(presets_of_media),
                                        cmocka_unit_test(grids_of_any_density),
