@@ -20,6 +20,8 @@ struct placement {
     struct pt_xform at[2]; /* own → world at shutter open and close */
 };
 
+static double largest(const double v[3]) { return fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2]))); }
+
 /* Bounds in a shape's own space. */
 struct box {
     double low[3], high[3];
@@ -89,11 +91,20 @@ static int leave_out_flattened(struct pt_builder *b, struct pt_loc loc, const ch
     return b->diag.rc;
 }
 
-/* Whether a transform has no inverse that floats hold, as Embree needs it. */
-static int is_flat(const struct pt_xform *t)
+/* Whether rays from about the camera cannot be brought into its space, which Embree does in single precision: coordinates
+ * beyond 1e18 are none to it. */
+static int is_flat(const struct pt_builder *b, const struct pt_xform *at)
 {
+    const struct pt_xform t = pt_builder_to_render(b, at);
     struct pt_xform inverse;
-    return !pt_xform_invert(t, &inverse) || fabs(pt_xform_det(t)) < (double)FLT_MIN;
+    double most = 0, away = 1e4;
+    if (!pt_xform_invert(&t, &inverse) || fabs(pt_xform_det(&t)) < (double)FLT_MIN)
+        return 1;
+    for (int i = 0; i < 3; i++) {
+        away = fmax(away, fabs(t.m[i][3]));
+        most = fmax(most, largest(inverse.m[i]));
+    }
+    return !(most * away < 5e16);
 }
 
 /* Places an object that is kept about `origin`. What grows from nothing does so from a millionth of what it becomes: rays
@@ -103,7 +114,7 @@ static int add_instance(struct pt_builder *b, int32_t object, const struct pt_xf
 {
     struct pt_instance instance = {.object = object, .animated = !pt_xform_equal(&at[0], &at[1])};
     const struct pt_xform shift = pt_xform_translate(origin[0], origin[1], origin[2]);
-    const int flat[2] = {is_flat(&at[0]), is_flat(&at[1])};
+    const int flat[2] = {is_flat(b, &at[0]), is_flat(b, &at[1])};
     int turns = 0;
     if (!(fmax(fabs(pt_xform_det(&at[0])), fabs(pt_xform_det(&at[1]))) < (double)FLT_MAX))
         return pt_diag_fail(&b->diag, loc, "the scale of an instance is too large for floats");
@@ -203,8 +214,6 @@ static int store_positions(const struct pt_soup *soup, const struct pt_xform *t,
     }
     return 1;
 }
-
-static double largest(const double v[3]) { return fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2]))); }
 
 /* Normals keep the lengths that they are given with, which are their weights between the corners, as in pbrt; but not what
  * the transform does to all of them alike, and none may leave float's range when its length is squared. What has no length,

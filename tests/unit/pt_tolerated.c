@@ -58,6 +58,8 @@ static void of_both(void **state)
         {"CoordSysTransform \"moon\" Shape \"sphere\"", "Shape \"sphere\"", 1},
         {"AttributeBegin Scale 0 0 0 Shape \"sphere\" AttributeEnd Shape \"disk\"", "Shape \"disk\"", 1},
         {OBJECT "AttributeBegin Scale 0 0 0 ObjectInstance \"a\" AttributeEnd", OBJECT, 1},
+        {OBJECT "AttributeBegin Scale 1e-13 1 1 ObjectInstance \"a\" AttributeEnd", OBJECT, 1},
+        {OBJECT "AttributeBegin Translate 0 0 1e8 Scale 1e-10 1 1 ObjectInstance \"a\" AttributeEnd", OBJECT, 1},
         {"Scale 1 1 0 Shape \"trianglemesh\" \"point3 P\" [ 0 0 3 1 0 4 0 1 5 ]", MESH, 0},
         {"Shape \"trianglemesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ] \"integer indices\" [ ] Shape \"disk\"",
          "Shape \"disk\"", 1},
