@@ -94,10 +94,12 @@ struct map {
     struct pic_canvas canvas;
 };
 
-/* Small blocks are enlarged until their numbers fit. */
+/* Small blocks are enlarged until their numbers fit, but for a picture that would be too large to look at. */
 static void measure(struct map *m)
 {
+    static const double most_pixels = 1 << 25;
     const struct lull_host_blocks *b = m->blocks;
+    const double pixels = (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0);
     int widest = 1;
     m->low = (double)INFINITY;
     m->digits = 1;
@@ -113,6 +115,8 @@ static void measure(struct map *m)
     while (m->enlarge < MAX_ENLARGE && (b->x1 - b->x0) * m->enlarge < MIN_WIDTH)
         m->enlarge++;
     m->enlarge = m->enlarge > MAX_ENLARGE ? MAX_ENLARGE : m->enlarge;
+    while (m->enlarge > 1 && pixels * m->enlarge * m->enlarge > most_pixels)
+        m->enlarge--;
     m->canvas.width = (b->x1 - b->x0) * m->enlarge;
     m->canvas.height = (b->y1 - b->y0) * m->enlarge + LEGEND_HEIGHT;
 }

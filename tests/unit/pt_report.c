@@ -295,6 +295,16 @@ static void stop_map_picture(void **state)
     assert_in_range(ink, 100, 2000);
     free(map.rgb);
     assert_int_equal(pt_output_stop_map(in_folder("s.png"), run.render, &info, &err), 0);
+    /* small blocks are enlarged, but not beyond what anybody looks at */
+    struct lull_host_block small = {.x1 = 8, .y1 = 8};
+    struct lull_host_blocks many = {.list = &small, .count = 1, .x1 = 400, .y1 = 100};
+    assert_int_equal(lull_host_paint(&many, values, "spp", &map, NULL), 0);
+    assert_int_equal(map.width, 6 * 400);
+    free(map.rgb);
+    many.x1 = 8192, many.y1 = 4096;
+    assert_int_equal(lull_host_paint(&many, values, "spp", &map, NULL), 0);
+    assert_int_equal(map.width, 8192);
+    free(map.rgb);
 }
 
 static void stop_map_table(void **state)
