@@ -15,8 +15,9 @@ static const double SLICE_S = 0.25;
 static const double SLICE_PER_WORKER_S = 0.004, LONGEST_SLICE_S = 5.0;
 
 /* Rows that each thread has to choose from in a slice: few enough that a block is sampled in one go, enough that threads and
- * processes end together. */
-static const double ROWS_PER_THREAD = 128.0;
+ * processes end together. Of rows that are shorter than ROW_PIXELS as many more: all blocks are looked at before each slice,
+ * and tiny ones are many. */
+static const double ROWS_PER_THREAD = 128.0, ROW_PIXELS = 16.0;
 
 /* What a block may get in one slice before others have had as much: its samples again, or this. */
 enum { LEAD_SPP = 8 };
@@ -291,9 +292,10 @@ static size_t list_items(struct pt_render *r, double span_s)
 {
     struct pt_render_work *w = r->work;
     double threads = pt_render_threads(r), rows = 0.0, per_spp_s = 0.0;
+    const double enough = threads * ROWS_PER_THREAD * fmax(1.0, ROW_PIXELS / r->config.block_width);
     uint32_t chosen = 0, n = list_candidates(r);
     int known = 1;
-    while (chosen < n && rows < threads * ROWS_PER_THREAD) {
+    while (chosen < n && rows < enough) {
         const struct candidate *c = &w->candidates[chosen++];
         rows += r->blocks->list[c->block].y1 - r->blocks->list[c->block].y0;
         per_spp_s += c->per_spp_s;

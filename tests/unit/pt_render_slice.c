@@ -325,14 +325,38 @@ static void the_order_of_work_follows_its_seed(void **state)
     assert_true(moved > 100 && apart > 100);
 }
 
+/* Each block is looked at before each slice: of tiny ones a slice takes as many as make rows of 16 pixels. */
+static void tiny_blocks_come_many_at_a_time(void **state)
+{
+    static const struct {
+        int block;
+        long rows;
+    } cases[] = {{16, 128}, {4, 128 * 4}, {1, 128 * 16}};
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        struct pt_render_config config = pt_fake_config();
+        const struct pt_render_hooks hooks = {.slice = enough};
+        struct base_err err = {0};
+        enum pt_render_outcome outcome;
+        struct pt_fake_run r = {.pool = base_threads_create(1, &err)};
+        config.width = config.crop[2] = 64;
+        config.height = config.crop[3] = 48;
+        config.block_width = config.block_height = cases[i].block;
+        config.uniform = 1;
+        config.spp_min = config.spp_max;
+        assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, r.pool, NULL, &r.render, &err), 0);
+        assert_int_equal(pt_render_run(r.render, &hooks, &outcome, &err), BASE_EINVAL);
+        assert_int_equal(r.render->sampled_rows, cases[i].rows);
+        pt_fake_release(&r);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(slices_deal_out_the_time),
-        cmocka_unit_test(rows_are_cut_into_runs),
-        cmocka_unit_test(checks_may_be_too_dear),
-        cmocka_unit_test(interrupted_blocks_are_asked_once_more),
-        cmocka_unit_test(the_order_of_work_follows_its_seed),
+        cmocka_unit_test(slices_deal_out_the_time),        cmocka_unit_test(rows_are_cut_into_runs),
+        cmocka_unit_test(checks_may_be_too_dear),          cmocka_unit_test(interrupted_blocks_are_asked_once_more),
+        cmocka_unit_test(tiny_blocks_come_many_at_a_time), cmocka_unit_test(the_order_of_work_follows_its_seed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
