@@ -265,7 +265,7 @@ class Cycles:
         borrowed = self.denoised and not self.layer.cycles.denoising_store_passes
         if borrowed:
             self._set(self.layer.cycles, denoising_store_passes=True)
-        channels = [name for name in self._render_area(Rect(x, y, x + 1, y + 1), 0, 1, False)
+        channels = [name for name in self._render_area(Rect(x, y, x + 1, y + 1), 0, 1)
                     if not (borrowed and name.startswith("Denoising "))]
         self.passes = Passes(self.layer.name, channels, (self.width, self.height), hidden,
                              self.scene.render.film_transparent)
@@ -309,8 +309,8 @@ class Cycles:
             yield {**{plane: np.stack([part[name] for name in names], -1) for plane, names in planes.items()},
                    **self.passes.sample(part, r, first)}
 
-    def _render_area(self, area: Rect, first: int, count: int, half: bool) -> dict[str, np.ndarray]:
-        """The view layer's channels, [h, w] float32."""
+    def _render_area(self, area: Rect, first: int, count: int, half: bool = True) -> dict[str, np.ndarray]:
+        """The view layer's channels, [h, w] float32; of half A, whose seed is the scene's, or of B."""
         render, cycles, subset = self.scene.render, self.scene.cycles, hasattr(self.scene.cycles, "use_sample_subset")
         # Blender cuts border · size down to whole pixels, in single precision: aim inside the pixel. Rows are from below.
         asked = [(render, "border_min_x", (area.x0 + 0.25) / self.width), (render, "border_max_x", (area.x1 + 0.25) / self.width),
