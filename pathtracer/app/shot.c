@@ -1,8 +1,10 @@
 #include "shot.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "actions.h"
@@ -188,7 +190,12 @@ void pt_shot_release(struct pt_shot *s)
 
 /* --- frame by frame -------------------------------------------------------------------------------------------------- */
 
-static int is_there(const char *path) { return access(path, F_OK) == 0; }
+/* An empty file holds nobody's place: that of another program, or what a full disk left. */
+static int is_there(const char *path)
+{
+    struct stat st;
+    return stat(path, &st) == 0 && st.st_size > 0;
+}
 
 /* Samples by the table instead of a criterion. */
 static int use_table(struct pt_shot_frame *f, const struct pt_shot_table *table, const char *name, struct base_err *err)
@@ -216,7 +223,7 @@ static int render_frame(struct pt_open *o, struct pt_shot_frame *f, const struct
     base_log_note(o->log, "frame %d (%s)", f->number, place);
     f->resume = checkpoint && is_there(checkpoint);
     rc = pt_action_frame(o, f, NULL, status, err);
-    if (!rc && *status == 0 && checkpoint && is_there(checkpoint) && unlink(checkpoint) != 0)
+    if (!rc && *status == 0 && checkpoint && unlink(checkpoint) != 0 && errno != ENOENT)
         base_log_say(o->log, "%s: cannot be removed, though its frame is done", checkpoint);
     return rc;
 }

@@ -23,6 +23,10 @@ head -c 3000 f_003.exr >part.exr && mv part.exr f_003.exr # as a copy that was b
 "$P" s_%04d.pbrt --frames 1-3 $small --spp 4 -o f_%03d.exr
 "$P" s_0003.pbrt --frames 3 $small --spp 4 -o third.exr
 t "  …but not what is empty or cut short" sh -c "exrheader f_001.exr && cmp third.exr f_003.exr"
+rm f_002.exr
+: >k_2
+t "an empty checkpoint is none" "$P" s_%04d.pbrt --frames 2 $small --spp 4 -o f_%03d.exr --checkpoint k_%d
+t "  …and goes when its frame is done" test -s f_002.exr -a ! -e k_2
 
 # --- seeds ---
 "$P" "$scene" --frames 1-2 $small --spp 4 -o fresh_%d.exr
