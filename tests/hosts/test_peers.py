@@ -48,8 +48,9 @@ def test_artists_by_worst_block():
     told = {"phases": {"samples_s": 2.5, "looks_s": .5}, "blocks": [[90, "criterion"], [30, "criterion"]]}
     for e, (seconds, worst) in zip(artists.ERRORS, ((8, 2.0), (2, 4.0), (1, 8.0))):
         ways["error %d" % e].update(s=seconds, errors=[worst, .1], **told)
+    ways["ours"].update(blocks=[[20, "criterion"]])
     table = artists.scenes_table({"one": ways}).splitlines()[-1]
-    assert table == "| one | 60 | 8.0 | 2.00 | 2.00 | 60 | 2.0 | 4.00 | ≥ 2.00 | 60 | 1.0 | 8.00 | ≥ 1.00 |", table
+    assert table == "| one | 60 | 8.0 | 2.00 | 2.00 | 60 | 2.0 | 4.00 | ≥ 2.00 | 60 | 1.0 | 8.00 | ≥ 1.00 | 20 | 4.0 | 2.00 | 1.00 |", table
     assert artists.phases_table({"one": ways}).splitlines()[-1] == "| one | 5.0 | 50 % | 0 % | 0 % | 10 % | 0 % |"
     row = next(line for line in artists.ways_table({"one": ways}).splitlines() if "--error 3" in line)
     assert row == "| `--error 3` | 1 | 5 | 0.25 | 8.00 | 4.05 | 50 % |", row
@@ -97,6 +98,7 @@ def test_artists_on_one_scene():
         assert set(kept) == set(artists.NAMES)
         assert all(w["s"] > 0 and w["wall_s"] > 0 and len(w["errors"]) == 4 for w in kept.values())
         assert all(len(kept["error %d" % e]["blocks"]) == 4 and kept["error %d" % e]["phases"]["looks_s"] > 0 for e in artists.ERRORS)
+        assert len(kept["ours"]["blocks"]) == 4
         assert max(n for n, _ in kept["error 3"]["blocks"]) <= max(n for n, _ in kept["error 1"]["blocks"])
         assert ", worst block " not in run_on_scene(work, "artists", "--size", "24x24")
 
