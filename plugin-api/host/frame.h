@@ -48,7 +48,7 @@ struct lull_host_criterion {
     atomic_int warning_state;
     char warning[LULL_HOST_LINE];
 
-    atomic_int told_change; /* that a call of it changed what is the renderer's */
+    atomic_int warned_of_change; /* that a call of it changed what is the renderer's */
 
     /* What was said in its frame, for the report: the first lines of LULL_LOG_INFO or worse. */
     pthread_mutex_t messages_lock;

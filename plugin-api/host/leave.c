@@ -6,7 +6,7 @@
 static void tell(struct lull_host_criterion *c, const char *call, const char *changed)
 {
     char text[128];
-    if (!changed || atomic_exchange(&c->told_change, 1))
+    if (!changed || atomic_exchange(&c->warned_of_change, 1))
         return;
     snprintf(text, sizeof text, "%s changed %s; restored", call, changed);
     lull_host_say(c, LULL_LOG_WARNING, text);

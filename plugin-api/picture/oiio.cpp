@@ -291,22 +291,22 @@ void find_primaries(const ImageInput &input, const ImageSpec &spec, const pic_ch
             image->has_primaries = 1;
 }
 
-/* What a file's first bytes tell, beside what its reader does. */
-struct told {
+/* What stands in a file's first bytes and its reader does not say. */
+struct header {
     bool without_alpha = false; /* the picture is what stands in front of its alpha, if it has one */
     bool is_ordered = false;    /* channels are not those that the reader says, but these: */
     int order[4] = {0, 1, 2, 3};
 };
 
-int read_pixels(ImageInput &input, const pic_request &q, const told &t, pic_image *out, base_err *err)
+int read_pixels(ImageInput &input, const pic_request &q, const header &h, pic_image *out, base_err *err)
 {
     pic_choice s = {};
     if (int rc = choose(input, q, &s, err))
         return rc;
-    if (t.without_alpha && s.count % 2 == 0)
+    if (h.without_alpha && s.count % 2 == 0)
         s.count--;
-    for (int c = 0; c < s.count && t.is_ordered; c++)
-        s.at[c] = t.order[s.at[c]];
+    for (int c = 0; c < s.count && h.is_ordered; c++)
+        s.at[c] = h.order[s.at[c]];
     const ImageSpec spec = input.spec(s.part, 0);
     canvas c = {};
     if (int rc = check_size(spec, q.name, err))
@@ -420,7 +420,7 @@ std::vector<unsigned char> head_of(const pic_request &q, size_t most)
 
 /* Pixels of 32 bits in a BMP have their colours where its masks say. OpenImageIO takes the bytes for blue, green, red and
  * alpha in any case. */
-int find_bmp_order(const pic_request &q, told *t, base_err *err)
+int find_bmp_order(const pic_request &q, header *out, base_err *err)
 {
     enum { BITS = 28, COMPRESSION = 30, MASKS = 54, END = MASKS + 12 };
     static const int channel_of_byte[4] = {2, 1, 0, 3};
@@ -439,11 +439,11 @@ int find_bmp_order(const pic_request &q, told *t, base_err *err)
             byte++;
         if (byte == 4)
             return base_fail(err, BASE_EINVAL, "%s: a BMP whose colours are no bytes (expected masks of 8 bits)", q.name);
-        t->order[c] = channel_of_byte[byte];
+        out->order[c] = channel_of_byte[byte];
         left -= byte;
     }
-    t->order[3] = channel_of_byte[left >= 0 && left < 4 ? left : 3];
-    t->is_ordered = true;
+    out->order[3] = channel_of_byte[left >= 0 && left < 4 ? left : 3];
+    out->is_ordered = true;
     return 0;
 }
 
@@ -463,7 +463,7 @@ struct opened {
     memory data;
     std::unique_ptr<OIIO::Filesystem::IOMemReader> reader;
     std::unique_ptr<ImageInput> input;
-    told before;
+    header first_bytes;
 };
 
 /* Of a PNG that stores no alpha with its pixels (colour types 4 and 6, at byte 25), but a transparent colour or transparent
@@ -479,7 +479,7 @@ int open_memory(const char *name, const void *data, size_t size, opened *out, ba
     if (base_file_has_ending(name, "png"))
         if (int rc = check_png(name, static_cast<const unsigned char *>(data), size, err))
             return rc;
-    out->before.without_alpha = has_colours_alone(name, data, size);
+    out->first_bytes.without_alpha = has_colours_alone(name, data, size);
     out->reader = std::make_unique<OIIO::Filesystem::IOMemReader>(data, size);
     out->input = ImageInput::create(format_of(name), false);
     if (!out->input || out->input->supports("ioproxy") == 0) {
@@ -519,8 +519,8 @@ int answer(const pic_request *q, pic_image *out, base_err *err)
         opened image;
         int rc = q->data != nullptr ? open_memory(q->name, q->data, q->size, &image, err) : open_file(q->name, &image, err);
         if (rc == 0 && base_file_has_ending(q->name, "bmp"))
-            rc = find_bmp_order(*q, &image.before, err);
-        return rc ? rc : read_pixels(*image.input, *q, image.before, out, err);
+            rc = find_bmp_order(*q, &image.first_bytes, err);
+        return rc ? rc : read_pixels(*image.input, *q, image.first_bytes, out, err);
     } catch (const std::bad_alloc &) {
         return base_fail_nomem(err, q->name);
     } catch (const std::exception &e) {
