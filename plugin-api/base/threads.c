@@ -1,6 +1,7 @@
 #define _GNU_SOURCE /* sched_getaffinity */
 #include "base/threads.h"
 
+#include <fcntl.h>
 #include <limits.h>
 #include <math.h>
 #include <pthread.h>
@@ -48,16 +49,30 @@ enum { LOOKS = 2000 };
 
 static double fewer(double a, double b) { return b > 0 && (a <= 0 || b < a) ? b : a; }
 
+/* A small file's text, "" if there is none. By no stream: that would allocate, and fail without a word. */
+static void read_text(const char *folder, const char *name, char *to, size_t room)
+{
+    char path[PATH_MAX];
+    const int fd =
+        snprintf(path, sizeof path, "%s/%s", folder, name) < (int)sizeof path ? open(path, O_RDONLY | O_CLOEXEC) : -1;
+    const ssize_t n = fd < 0 ? 0 : read(fd, to, room - 1);
+    to[n > 0 ? n : 0] = '\0';
+    if (fd >= 0)
+        close(fd);
+}
+
 /* Reads up to n numbers of a file; returns how many there are. */
 static int read_numbers(const char *folder, const char *name, double *to, int n)
 {
-    char path[PATH_MAX];
+    char text[64], *at = text;
     int found = 0;
-    FILE *file = snprintf(path, sizeof path, "%s/%s", folder, name) < (int)sizeof path ? fopen(path, "re") : NULL;
-    while (file && found < n && fscanf(file, "%lf", &to[found]) == 1)
-        found++;
-    if (file)
-        fclose(file);
+    for (read_text(folder, name, text, sizeof text); found < n; found++) {
+        char *end;
+        to[found] = (double)strtol(at, &end, 10);
+        if (end == at)
+            break;
+        at = end;
+    }
     return found;
 }
 
@@ -88,20 +103,17 @@ static double quota_along(const char *root, const char *controller, char *group)
 /* Lines are ID:CONTROLLERS:PATH (cgroups(7)); version 2 has no controllers there. */
 int base_threads_quota(const char *root)
 {
-    char path[PATH_MAX], line[PATH_MAX];
+    char text[PATH_MAX], *next = text;
     double least = 0;
-    FILE *file = snprintf(path, sizeof path, "%s/proc/self/cgroup", root) < (int)sizeof path ? fopen(path, "re") : NULL;
-    while (file && fgets(line, sizeof line, file)) {
+    read_text(root, "proc/self/cgroup", text, sizeof text);
+    for (char *line; (line = strsep(&next, "\n"));) {
         char *controller = strchr(line, ':'), *group = controller ? strchr(controller + 1, ':') : NULL;
         if (!group)
             continue;
         *group++ = '\0';
-        group[strcspn(group, "\n")] = '\0';
         if (*++controller == '\0' || strcmp(controller, "cpu") == 0 || strcmp(controller, "cpu,cpuacct") == 0)
             least = fewer(least, quota_along(root, controller, group));
     }
-    if (file)
-        fclose(file);
     return least > 0 && least < INT_MAX ? (int)ceil(least) : INT_MAX;
 }
 

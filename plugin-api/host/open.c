@@ -59,7 +59,7 @@ static int32_t make_instance(struct lull_host_criterion *c, const struct lull_pa
     struct lull_error e = {.struct_size = sizeof e};
     struct lull_instance *made = NULL;
     struct lull_process_state before;
-    lull_process_state_read(&before);
+    lull_signal_state_read(&before);
     const int32_t code = c->table->create(&c->host, pairs, count, sizeof *pairs, &made, &e);
     lull_host_leave(c, &before, "create");
     if (code != LULL_OK)

@@ -61,12 +61,17 @@ void lull_thread_state_read(struct lull_process_state *state)
         strcpy(state->locale, name);
 }
 
-void lull_process_state_read(struct lull_process_state *state)
+void lull_signal_state_read(struct lull_process_state *state)
 {
     lull_thread_state_read(state);
-    state->whole = 1;
+    state->has_actions = 1;
     for (int i = 0; i < LULL_STATE_SIGNALS; i++)
         sigaction(watched[i], NULL, &state->actions[i]);
+}
+
+void lull_process_state_read(struct lull_process_state *state)
+{
+    lull_signal_state_read(state);
     DIR *tasks = opendir("/proc/self/task");
     if (!tasks)
         return;
@@ -79,7 +84,7 @@ static const char *restore_actions(const struct lull_process_state *state)
 {
     const char *changed = NULL;
     struct sigaction now;
-    for (int i = 0; i < LULL_STATE_SIGNALS && state->whole; i++) {
+    for (int i = 0; i < LULL_STATE_SIGNALS && state->has_actions; i++) {
         const struct sigaction *before = &state->actions[i];
         if (sigaction(watched[i], NULL, &now) != 0 || now.sa_handler == before->sa_handler)
             continue;

@@ -18,13 +18,16 @@ struct lull_process_state {
     sigset_t blocked;              /* signals, by the thread */
     locale_t thread_locale;
     char locale[LULL_STATE_LOCALE]; /* LC_NUMERIC of the process; "" where its name is longer */
-    int whole;                      /* the fields below were read */
+    int has_actions;                /* those below were read */
     struct sigaction actions[LULL_STATE_SIGNALS];
     long thread_count; /* 0 if the system does not say */
 };
 
+/* All; the count takes memory. */
 void lull_process_state_read(struct lull_process_state *state);
-/* What a call must leave as it is, however short: all above `whole`. */
+/* All but the count. */
+void lull_signal_state_read(struct lull_process_state *state);
+/* What a call must leave as it is, however short: all above `has_actions`. */
 void lull_thread_state_read(struct lull_process_state *state);
 
 /* The calling thread's MXCSR or FPCR, as above. */
