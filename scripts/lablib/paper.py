@@ -1,8 +1,10 @@
 """Holds what ships against the figures of the paper that the networks come from: a page, docs/results/paper.md.
 
 The views of people are replayed (`ggn replay`): lull-3 and the observer's law, each view judged by an observer that was fitted to the
-others, and the number of samples alone. What the published models said of the same views are thresholds, so of these only
-decisions are known. Figures of the paper are Buisine et al., Deep Learning Applications 4, Springer 2022. Two minutes of processor time."""
+others, the number of samples alone, and what else was trained. What the published models said of the same views are
+thresholds, so of these only decisions are known. Figures of the paper are Buisine et al., Deep Learning Applications 4, Springer 2022. Two
+minutes of processor time, more with other networks."""
+import argparse
 import itertools
 import json
 import math
@@ -24,7 +26,17 @@ def options(parser):
     parser.add_argument("--human", type=tool.path, default=os.path.join(tool.SHARED, "human"), metavar="DIR",
                         help="human-thresholds.csv, what published models predict, and views/ (../shared/human)")
     parser.add_argument("--work", type=tool.path, default=os.path.join(tool.BUILD, "paper"), metavar="DIR", help="labelled copies (build/paper)")
+    for option, program in (("--network", "train"), ("--baseline", "baseline")):
+        parser.add_argument(option, type=named, action="append", default=[], metavar="NAME=FILE",
+                            help="a row for what ggn %s wrote, which learned from none of these views; may be repeated" % program)
     tool.writes(parser)
+
+
+def named(text):
+    name, equals, file = text.partition("=")
+    if not equals or not os.access(file, os.R_OK):
+        raise argparse.ArgumentTypeError("%s: expected NAME=FILE, of a file that is there" % text)
+    return name, tool.path(file)
 
 
 class Windows:
@@ -89,11 +101,12 @@ def wanted_above(replay, view, spp):
     return statistics.mean(b["threshold"] > spp for b in replay["blocks"] if b["view"] != view)
 
 
-def judged(replay, published):
-    """{name: figures of its windows} and their number."""
-    views, model = replay["views"], replay["methods"][0]
+def judged(replay, published, also=()):
+    """{name: figures of its windows} and their number; the replay's methods are lull-3 and those of also."""
+    views = replay["views"]
+    models = list(zip(["lull-3", *also], replay["methods"], strict=True))
     spread = tool.load(tool.ROOT, "ggn", "observer", "observer.json")["spread"]
-    windows = {name: Windows() for name in NAMES}
+    windows = {name: Windows() for name in ["lull-3", *also, *list(NAMES)[1:]]}
     for i, block in enumerate(replay["blocks"]):
         view = views[block["view"]]["name"]
         levels = block["spp"]
@@ -101,7 +114,9 @@ def judged(replay, published):
             if noisy is None or k + 1 == len(levels):
                 continue  # beyond where the study ended
             add = lambda name, score: windows[name].add(view, score, noisy, levels[k + 1] - spp)
-            add("lull-3", model["scores"][i][k])
+            for name, model in models:
+                score = model["scores"][i][k]
+                add(name, 1.0 if score is None else score)  # who does not answer yet does not stop
             add("law", statistics.NormalDist().cdf(math.log2(max(error, 1e-6)) / spread))
             add("-spp", wanted_above(replay, block["view"], spp))
             for name, of in published.items():
@@ -118,7 +133,7 @@ def judged(replay, published):
 def page(results):
     number = lambda v, form="%.3f": tables.figure(v, form)
     way = lambda key, title: tables.table([title, "AUC", *("at %g" % c for c in CUTS), "best"], [
-        [NAMES[name], number(r[key]["auc"]), *([number(a) for a in r[key]["accuracy"]] if r[key]["accuracy"] else ["–"] * len(CUTS)),
+        [NAMES.get(name, name), number(r[key]["auc"]), *([number(a) for a in r[key]["accuracy"]] if r[key]["accuracy"] else ["–"] * len(CUTS)),
          number(r[key]["best"])] for name, r in results["windows_of"].items()])
     first = "%s\n%s" % (way("pooled", "%d windows, all" % results["windows"]), way("views", "mean of %d views" % results["views"]))
     second = tables.table(["", "blocks", "r, thresholds below 10,000", "early", "samples"],
@@ -142,16 +157,20 @@ def main(o):
     if not os.access(human, os.R_OK):
         raise tool.Refused("%s: no thresholds of people there (see --human)" % human)
     views = people_views(o.human, os.path.join(o.human, "views"), os.path.join(o.work, "people"))
+    also = o.network + o.baseline  # ggn replay has the networks first, too
     asked = ["-d", o.work, "-O", os.path.join(tool.ROOT, "ggn/observer/observer.json"), "-m", os.path.join(tool.ROOT, "ggn/models/lull-3.ggn"),
+             *[word for _, file in o.network for word in ("-m", file)], *[word for _, file in o.baseline for word in ("--baseline", file)],
              "-t", tool.THREADS]
-    found, windows = judged(json.loads(ggn("replay", *asked, "--no-quality")),
-                            {name: thresholds(os.path.join(o.human, name + "-thresholds.csv")) for name in PUBLISHED})
+    replay = json.loads(ggn("replay", *asked, "--no-quality"))
+    found, windows = judged(replay, {name: thresholds(os.path.join(o.human, name + "-thresholds.csv")) for name in PUBLISHED},
+                            [name for name, _ in also])
     files = [word for name in PUBLISHED for word in ("--thresholds", os.path.join(o.human, name + "-thresholds.csv"))]
     rows = json.loads(ggn("evaluate", *asked, "--no-quality", "--json", *files))["splits"]["people"]
     results = {"measured": tool.measured(), "views": len(views), "windows": windows, "windows_of": found, "blocks_of": {
         **{NAMES[name] + ", all 40 views": compared(o, name) for name in PUBLISHED},
         **{NAMES[name] + ", these views": evaluated(rows, name + "-thresholds.csv") for name in PUBLISHED},
-        NAMES["lull-3"]: evaluated(rows, "lull-3.ggn"), NAMES["law"]: evaluated(rows, "observer"),
+        NAMES["lull-3"]: evaluated(rows, "lull-3.ggn"), **{name: evaluated(rows, m["title"]) for (name, _), m in zip(also, replay["methods"][1:])},
+        NAMES["law"]: evaluated(rows, "observer"),
         NAMES["-spp"]: evaluated(rows, "-spp")}}
     print(page(results))
     if o.write:
