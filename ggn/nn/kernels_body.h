@@ -76,25 +76,7 @@ INLINE void conv_tile(const struct ggn_conv *a, const real *w, int oc, int i0, i
         conv_tile(a, w, oc, i0, i1, p, OT, NV, TAPS); \
     }
 #define CONV_TILES(OT) CONV_TILE(OT, 3, 9) CONV_TILE(OT, 1, 9) CONV_TILE(OT, 3, 1) CONV_TILE(OT, 1, 1)
-CONV_TILES(1)
-CONV_TILES(2)
-CONV_TILES(3)
-CONV_TILES(4)
-#if TILE_OC == 8
-CONV_TILES(5)
-CONV_TILES(6)
-CONV_TILES(7)
-CONV_TILES(8)
-#define EACH_TILE(NAME, END) \
-    { \
-        NAME##1##END, NAME##2##END, NAME##3##END, NAME##4##END, NAME##5##END, NAME##6##END, NAME##7##END, NAME##8##END \
-    }
-#else
-#define EACH_TILE(NAME, END) \
-    { \
-        NAME##1##END, NAME##2##END, NAME##3##END, NAME##4##END \
-    }
-#endif
+EACH_OT(CONV_TILES)
 
 typedef void conv_tile_fn(const struct ggn_conv *a, const real *w, int oc, int i0, int i1, long p);
 
@@ -114,8 +96,8 @@ static void restore_padding(const struct ggn_conv *a, int oc0, int oc1, long p, 
 
 static void conv(const struct ggn_conv *a, long p0, long p1, int oc0, int oc1)
 {
-    static conv_tile_fn *const tiles[2][2][TILE_OC] = {{EACH_TILE(conv_tile_, _3_9), EACH_TILE(conv_tile_, _1_9)},
-                                                       {EACH_TILE(conv_tile_, _3_1), EACH_TILE(conv_tile_, _1_1)}};
+#define CONV_OF(OT) {{conv_tile_##OT##_3_9, conv_tile_##OT##_1_9}, {conv_tile_##OT##_3_1, conv_tile_##OT##_1_1}},
+    static conv_tile_fn *const tiles[TILE_OC][2][2] = {EACH_OT(CONV_OF)};
     const int chunk = a->taps == 9 ? 32 : 256; /* input channels whose rows and weights stay in the first-level cache */
     const long end = (long)a->h * a->row;
 
@@ -129,7 +111,7 @@ static void conv(const struct ggn_conv *a, long p0, long p1, int oc0, int oc1)
             for (int oc = oc0, ot; oc < oc1; oc += ot) {
                 ot = oc1 - oc < TILE_OC ? oc1 - oc : TILE_OC;
                 const real *w = a->w + ((long)oc * a->n_in + (long)i0 * ot) * a->taps;
-                tiles[a->taps != 9][!wide][ot - 1](a, w, oc, i0, i1, p);
+                tiles[ot - 1][a->taps != 9][!wide](a, w, oc, i0, i1, p);
             }
             if (i1 == a->n_in)
                 restore_padding(a, oc0, oc1, p, n);
@@ -167,23 +149,15 @@ INLINE void grad_tile(real *acc, const real *x, const real *const *dy, long p0, 
         grad_tile(acc, x, dy, p0, p1, OT, NT); \
     }
 #define GRAD_TILES(OT) GRAD_TILE(OT, 3) GRAD_TILE(OT, 1)
-GRAD_TILES(1)
-GRAD_TILES(2)
-GRAD_TILES(3)
-GRAD_TILES(4)
-#if TILE_OC == 8
-GRAD_TILES(5)
-GRAD_TILES(6)
-GRAD_TILES(7)
-GRAD_TILES(8)
-#endif
+EACH_OT(GRAD_TILES)
 
 static void conv_grad(real *acc, const real *const *x, int n_in, const real *const *dy, int ot, int taps, int row, long p0,
                       long p1)
 {
     typedef void grad_tile_fn(real *, const real *, const real *const *, long, long);
-    static grad_tile_fn *const tiles[2][TILE_OC] = {EACH_TILE(grad_tile_, _3), EACH_TILE(grad_tile_, _1)};
-    grad_tile_fn *const fn = tiles[taps == 1][ot - 1];
+#define GRAD_OF(OT) {grad_tile_##OT##_3, grad_tile_##OT##_1},
+    static grad_tile_fn *const tiles[TILE_OC][2] = {EACH_OT(GRAD_OF)};
+    grad_tile_fn *const fn = tiles[ot - 1][taps == 1];
 
     for (int i = 0; i < n_in; i++)
         for (int ky = 0; ky < (taps == 9 ? 3 : 1); ky++, acc += (taps == 9 ? 3 : 1) * ot * VW)

@@ -50,6 +50,13 @@ enum { VW = VECTOR_BYTES / (int)sizeof(real) /* lanes */ };
 /* a in the lanes where m is −1, b where it is 0. */
 INLINE vf vector_select(vi m, vf a, vf b) { return (vf)(((vi)a & m) | ((vi)b & ~m)); }
 
+/* X(channels) for each number of output channels that a register tile may have. */
+#if TILE_OC == 8
+#define EACH_OT(X) X(1) X(2) X(3) X(4) X(5) X(6) X(7) X(8)
+#else
+#define EACH_OT(X) X(1) X(2) X(3) X(4)
+#endif
+
 #ifndef VMAX
 #define VMAX(a, b) vector_select((a) > (b), a, b)
 #endif

@@ -148,38 +148,15 @@ INLINE void multiply_tile(float *m, const float *u, const float *v, int n_in, in
         multiply_tile(m, u, v, n_in, lanes, OT, NV); \
     }
 #define TILES(OT) TILE(OT, 1) TILE(OT, 2) TILE(OT, 3)
-TILES(1)
-TILES(2)
-TILES(3)
-TILES(4)
-#if TILE_OC == 8
-TILES(5)
-TILES(6)
-TILES(7)
-TILES(8)
-#endif
+EACH_OT(TILES)
 
 /* All 36 products for output channels [oc0, oc1). */
 static void multiply(float *m, const float *u, const float *v, const struct ggn_conv *a, const struct block *b, int oc0,
                      int oc1)
 {
     typedef void tile_fn(float *, const float *, const float *, int, int);
-#define ROW(OT) \
-    { \
-        multiply_##OT##_1, multiply_##OT##_2, multiply_##OT##_3 \
-    }
-    static tile_fn *const tiles[TILE_OC][3] = {
-        ROW(1),
-        ROW(2),
-        ROW(3),
-        ROW(4),
-#if TILE_OC == 8
-        ROW(5),
-        ROW(6),
-        ROW(7),
-        ROW(8),
-#endif
-    };
+#define MULTIPLY_OF(OT) {multiply_##OT##_1, multiply_##OT##_2, multiply_##OT##_3},
+    static tile_fn *const tiles[TILE_OC][3] = {EACH_OT(MULTIPLY_OF)};
     const int vectors = b->lanes / L;
 
     for (int xi = 0; xi < XI; xi++)
