@@ -53,7 +53,8 @@ struct ggn_kernels {
 
     /* Elements [p0, p1) of the flat planes, output channels [oc0, oc1); p0 is a multiple of tile_px, oc0 of tile_oc. */
     void (*conv)(const struct ggn_conv *conv, long p0, long p1, int oc0, int oc1);
-    /* A faster form of a 3×3 convolution, NULL where there is none; see nn/winograd.h. */
+    /* A faster form of a 3×3 convolution, NULL where there is none; see nn/winograd.h. Of conv, whose w is not read, at most
+     * GGN_WINO_TILES tiles [t0, t1); the gradient of the weights by the adjoint, with GGN_WINO_GRAD_SCRATCH elements. */
     void (*wino)(const struct ggn_conv *conv, const real *u, int t0, int t1, int oc0, int oc1, real *scratch);
     void (*wino_grad)(const struct ggn_conv_grad *grad, real *scratch);
     void (*wino_pack)(real *u, const real *packed, int n_in, int n_out, int tile_oc);

@@ -1,7 +1,7 @@
 /*
  * The kernels, once per precision and instruction set. Without anything defined they are those of any processor; a file for
- * an instruction set includes its vectors (nn/vector_*.h) and defines ISA, TABLE (the name of its table) and, where there
- * are any, FASTER_FORMS.
+ * an instruction set defines its vectors (nn/vector.h), ISA, TABLE (the name of its table) and, where there are any,
+ * FASTER_FORMS.
  */
 #include <math.h>
 #include <stdint.h>

@@ -1,6 +1,6 @@
 /*
  * Vectors of `real` for the bodies of kernels, through the compiler's vector extension. Left alone they have 16 bytes, which
- * any processor has. nn/vector_avx2.h and nn/vector_avx512.h define before they include it: VECTOR_BYTES, TILE_OC (8 or 4
+ * any processor has. nn/kernels_avx2.c and nn/kernels_avx512.c define before they include it: VECTOR_BYTES, TILE_OC (8 or 4
  * output channels in a register tile), SET1, FMA, VMAX (b where either is not a number), VSUM (sum of the lanes) and KEEP.
  * KEEP(v) makes the compiler hold v in a register: left alone it folds a load that feeds three multiply-adds into each of
  * them, and loads become the bottleneck. UNROLL before a short loop over an array of vectors lets it live in registers from

@@ -30,12 +30,4 @@ size_t ggn_wino_scratch(int n_in);
 /* u[36][tiles of n_out as in ggn_conv][n_in][tile] from a packed 3×3 convolution (ggn_conv.w). */
 void ggn_wino_pack(float *u, const float *packed, int n_in, int n_out, int tile_oc);
 
-/* Tiles [t0, t1) of the convolution `a` (a->w is not read), at most GGN_WINO_TILES. */
-void ggn_wino_conv_avx2(const struct ggn_conv *a, const float *u, int t0, int t1, int oc0, int oc1, float *scratch);
-void ggn_wino_conv_avx512(const struct ggn_conv *a, const float *u, int t0, int t1, int oc0, int oc1, float *scratch);
-
-/* The gradient of the weights, by the adjoint of that algorithm. scratch: GGN_WINO_GRAD_SCRATCH floats. */
-void ggn_wino_grad_avx2(const struct ggn_conv_grad *grad, float *scratch);
-void ggn_wino_grad_avx512(const struct ggn_conv_grad *grad, float *scratch);
-
 #endif

@@ -1,7 +1,7 @@
 /*
- * 3×3 convolution by Winograd's F(4×4, 3×3): 36 products per 16 outputs instead of 144. Once per instruction set: a file for
- * one includes its vectors (nn/vector_*.h) and defines WINO(name), the names of its two functions, and what moves values
- * between lanes: deinterleave4, interleave4, shift_in, transpose, load_part and store_part.
+ * 3×3 convolution by Winograd's F(4×4, 3×3): 36 products per 16 outputs instead of 144. Once per instruction set: its file
+ * (nn/kernels_*.c) defines before what moves values between lanes: deinterleave4, interleave4, shift_in, transpose, load_part
+ * and store_part.
  *
  * Lavin & Gray, "Fast Algorithms for Convolutional Neural Networks", CVPR 2016: Y = Aᵀ[(G g Gᵀ) ⊙ (Bᵀ d B)]A. Tiles of 4×4
  * outputs are numbered row by row; a task takes up to 64 of them. The lanes of a vector are consecutive tiles:
@@ -11,7 +11,7 @@
  *   inverse:  Aᵀ m A, bias, activation, batch norm                          o[16][lanes], then back to rows of pixels
  * No value depends on how many lanes there are: every instruction set with FMA computes the same bytes.
  */
-#ifdef WINO
+#ifdef VECTOR_BYTES
 #include <string.h>
 
 #include "nn/kernels.h"
@@ -231,7 +231,7 @@ static void scatter(float *y, const float *o, const struct ggn_conv *a, const st
     }
 }
 
-void WINO(conv)(const struct ggn_conv *a, const float *u, int t0, int t1, int first, int end, float *scratch)
+static void wino_conv(const struct ggn_conv *a, const float *u, int t0, int t1, int first, int end, float *scratch)
 {
     struct block b = {.t0 = t0, .n = t1 - t0, .lanes = (t1 - t0 + L - 1) / L * L, .tiles_x = (a->w_px + 3) / 4};
     float *d = scratch, *o = d + XI * ROOM, *m = o + 16 * ROOM, *v = m + GGN_WINO_OC * XI * GGN_WINO_TILES;
@@ -438,7 +438,7 @@ static void write_weights(const struct ggn_conv_grad *g, const float *u, int o, 
         store_part(to + (long)c * g->i_step, TAPS < L ? TAPS : L, m[c]);
 }
 
-void WINO(grad)(const struct ggn_conv_grad *g, float *scratch)
+static void wino_grad(const struct ggn_conv_grad *g, float *scratch)
 {
     const int tiles_x = (g->w_px + 3) / 4, tiles_y = (g->h + 3) / 4;
     const int parts = (tiles_x + GRAD_TILES - 1) / GRAD_TILES;
