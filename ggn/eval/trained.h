@@ -3,7 +3,6 @@
 #define GGN_EVAL_TRAINED_H
 
 #include "eval/method.h"
-#include "model/exact.h"
 #include "model/inference.h"
 #include "model/policy.h"
 #include "observer/observer.h"

@@ -4,28 +4,23 @@
 
 void ggn_viewer_release(struct ggn_viewer *v)
 {
-    ggn_inference_destroy(v->inference);
-    ggn_exact_destroy(v->exact);
+    (v->precision == GGN_PRECISION_F64 ? ggn_inference_destroy_f64 : ggn_inference_destroy)(v->inference);
     free(v->denoised[0]);
     *v = (struct ggn_viewer){0};
 }
 
-static int make_networks(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision,
-                         struct base_err *err)
+static int make_networks(struct ggn_viewer *v, const struct ggn_model *model, struct base_err *err)
 {
     const float *learned[GGN_NETS];
 
-    if (precision != GGN_PRECISION_F64) {
-        v->inference = ggn_inference_create(model, NULL, err);
-        return v->inference ? 0 : err->code;
-    }
-    if (v->set->width != model->hyper.width || v->set->height != model->hyper.height)
+    if (v->precision == GGN_PRECISION_F64 && (v->set->width != model->hyper.width || v->set->height != model->hyper.height))
         return base_fail(err, BASE_EINVAL, "in double precision only blocks of the network's size, %dx%d, are judged",
                          model->hyper.width, model->hyper.height);
     for (int net = 0; net < GGN_NETS; net++)
         learned[net] = model->weights[net]->params;
-    v->exact = ggn_exact_create(&model->hyper, model->graph, learned, err);
-    return v->exact ? 0 : err->code;
+    v->inference = v->precision == GGN_PRECISION_F64 ? ggn_inference_create_f64(&model->hyper, model->graph, learned, err)
+                                                     : ggn_inference_create(model, NULL, err);
+    return v->inference ? 0 : err->code;
 }
 
 int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum ggn_precision precision,
@@ -34,9 +29,10 @@ int ggn_viewer_init(struct ggn_viewer *v, const struct ggn_model *model, enum gg
     size_t values = ggn_series_set_values(set);
 
     *v = (struct ggn_viewer){.set = set,
+                             .precision = precision,
                              .window = model->hyper.window,
                              .noise_maps = set->noise_maps && model->hyper.noise_map && model->hyper.reach > 0};
-    if (make_networks(v, model, precision, err))
+    if (make_networks(v, model, err))
         return err->code;
     v->denoised[0] = malloc((size_t)v->window * values * sizeof *v->denoised[0]);
     if (!v->denoised[0]) {
@@ -75,10 +71,8 @@ static uint16_t *denoised(struct ggn_viewer *v, int level, const int *needed, in
         if (!is_in(v->holds[i], needed, n))
             spare = i;
     }
-    if (v->exact)
-        ggn_exact_denoise(v->exact, noisy, v->denoised[spare]);
-    else
-        ggn_inference_denoise(v->inference, noisy, v->denoised[spare], v->set->width, v->set->height);
+    (v->precision == GGN_PRECISION_F64 ? ggn_inference_denoise_f64 : ggn_inference_denoise)(
+        v->inference, noisy, v->denoised[spare], v->set->width, v->set->height);
     v->holds[spare] = level;
     return v->denoised[spare];
 }
@@ -113,7 +107,6 @@ double ggn_viewer_logit(void *viewer, const int *levels)
     float scalars[GGN_SCALARS] = {0};
     if (v->law)
         fill_scalars(v, levels, scalars);
-    if (v->exact)
-        return ggn_exact_logit(v->exact, noisy, clean, noise_map, scalars);
-    return ggn_inference_logit(v->inference, noisy, clean, noise_map, scalars, v->set->width, v->set->height);
+    return (v->precision == GGN_PRECISION_F64 ? ggn_inference_logit_f64 : ggn_inference_logit)(
+        v->inference, noisy, clean, noise_map, scalars, v->set->width, v->set->height);
 }

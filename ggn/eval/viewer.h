@@ -3,13 +3,12 @@
 #define GGN_EVAL_VIEWER_H
 
 #include "data/series.h"
-#include "model/exact.h"
 #include "model/inference.h"
 #include "model/stopper.h"
 
 struct ggn_viewer {
-    struct ggn_inference *inference;       /* owns; NULL: exact networks instead */
-    struct ggn_exact *exact;               /* owns; of GGN_PRECISION_F64 */
+    struct ggn_inference *inference;       /* owns */
+    enum ggn_precision precision;          /* of it */
     const struct ggn_series_set *set;      /* borrows */
     const struct ggn_level_series *series; /* borrows; the block */
     const double *law;                     /* borrows; [levels] of a residual model: log2 of the law's error */

@@ -14,6 +14,9 @@
 #include "base/threads.h"
 #include "model/model.h"
 
+/* Of the networks' arithmetic. */
+enum ggn_precision { GGN_PRECISION_F32, GGN_PRECISION_F64 };
+
 struct ggn_inference;
 
 size_t ggn_inference_bytes(const struct ggn_model *model, int threads);
@@ -30,5 +33,15 @@ void ggn_inference_denoise(struct ggn_inference *inference, const uint8_t *noisy
  * overflow on this window. */
 double ggn_inference_logit(struct ggn_inference *inference, const uint8_t *const *noisy, const uint16_t *const *denoised,
                            const uint8_t *noise_map, const float *scalars, int width, int height);
+
+/* The same in double, without its rounding: for measurements; slow. graph, learned: [GGN_NETS]; graphs are borrowed until
+ * destroy, learned are parameters and running statistics as struct ggn_weights of floats holds them (params, [n_learned]). */
+struct ggn_inference *ggn_inference_create_f64(const struct ggn_hyper *hyper, const struct ggn_graph *graph,
+                                               const float *const *learned, struct base_err *err);
+void ggn_inference_destroy_f64(struct ggn_inference *inference);
+void ggn_inference_denoise_f64(struct ggn_inference *inference, const uint8_t *noisy, uint16_t *denoised, int width,
+                               int height);
+double ggn_inference_logit_f64(struct ggn_inference *inference, const uint8_t *const *noisy, const uint16_t *const *denoised,
+                               const uint8_t *noise_map, const float *scalars, int width, int height);
 
 #endif

@@ -158,8 +158,9 @@ void ggn_weights_pack(struct ggn_weights *w, struct base_threads *threads)
     base_threads_for(threads, w->graph->n_layers, pack_layer, w);
 }
 
-void ggn_weights_copy(struct ggn_weights *w, const real *learned)
+void ggn_weights_copy(struct ggn_weights *w, const float *learned)
 {
-    memcpy(w->params, learned, w->graph->n_learned * sizeof *w->params);
+    for (size_t i = 0; i < w->graph->n_learned; i++)
+        w->params[i] = (real)learned[i];
     ggn_weights_pack(w, NULL);
 }

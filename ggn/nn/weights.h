@@ -44,7 +44,7 @@ void ggn_weights_destroy(struct ggn_weights *weights);
 void ggn_weights_init(struct ggn_weights *weights, enum ggn_init init, uint32_t seed);
 
 /* Takes over parameters and running statistics, [n_learned] as in params, and packs. */
-void ggn_weights_copy(struct ggn_weights *weights, const real *learned);
+void ggn_weights_copy(struct ggn_weights *weights, const float *learned);
 
 /* Brings the packed form up to date, on a pool of threads (NULL: the calling one): call after params, mean or var have
  * changed, before the next forward pass. */

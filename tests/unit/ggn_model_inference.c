@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/exact.h"
 #include "model/inference.h"
 #include "model/preprocess.h"
 #include "model/window.h"
@@ -192,27 +191,27 @@ static void test_exact(void **state)
     for (int net = 0; net < GGN_NETS; net++)
         learned[net] = m->weights[net]->params;
     struct ggn_inference *j = ggn_inference_create(m, NULL, NULL);
-    struct ggn_exact *e = ggn_exact_create(&m->hyper, m->graph, learned, NULL);
+    struct ggn_inference *e = ggn_inference_create_f64(&m->hyper, m->graph, learned, NULL);
     assert_true(j && e);
     int differ = 0;
     for (uint32_t i = 0; i < 3; i++) {
         image(noisy[i], 1 + i);
         ggn_inference_denoise(j, noisy[i], narrow[i], 33, 24);
-        ggn_exact_denoise(e, noisy[i], wide[i]);
+        ggn_inference_denoise_f64(e, noisy[i], wide[i], 33, 24);
         for (int k = 0; k < BYTES; k++)
             assert_in_range((int)wide[i][k] - (int)narrow[i][k] + 2, 0, 4);
     }
     for (int k = 0; k < AREA; k++)
         picture[k] = (uint8_t)(k % 7);
     for (int with = 0; with < 2; with++) {
-        double exact = ggn_exact_logit(e, n, w, with ? picture : NULL, NULL),
+        double exact = ggn_inference_logit_f64(e, n, w, with ? picture : NULL, NULL, 33, 24),
                judged = ggn_inference_logit(j, n, w, with ? picture : NULL, NULL, 33, 24);
         if (!(fabs(exact - judged) < 1e-4 * fmax(1, fabs(judged))))
             fail_msg("picture %d: double %.12g, judge %.12g", with, exact, judged);
         differ += exact != judged;
     }
     assert_true(differ > 0);
-    ggn_exact_destroy(e);
+    ggn_inference_destroy_f64(e);
     ggn_inference_destroy(j);
     ggn_model_destroy(m);
     hyper.noise_map = before;
@@ -341,22 +340,22 @@ static void test_exact_without_numbers(void **state)
         learned[net] = m->weights[net]->params;
     m->weights[GGN_NET_R]->params[m->graph[GGN_NET_R].n_params - 1] = 1e30f; /* the last bias: blue is 1 */
     m->weights[GGN_NET_R]->params[m->graph[GGN_NET_R].n_params - 2] = -1e30f;
-    struct ggn_exact *e = ggn_exact_create(&m->hyper, m->graph, learned, NULL);
+    struct ggn_inference *e = ggn_inference_create_f64(&m->hyper, m->graph, learned, NULL);
     assert_non_null(e);
     for (int i = 0; i < 3; i++)
-        ggn_exact_denoise(e, noisy[i], denoised[i]);
+        ggn_inference_denoise_f64(e, noisy[i], denoised[i], 33, 24);
     assert_int_equal(denoised[0][2 * AREA + 5], 65534);
     assert_int_equal(denoised[0][AREA + 5], 0);
-    assert_true(isfinite(ggn_exact_logit(e, n, d, NULL, NULL)));
+    assert_true(isfinite(ggn_inference_logit_f64(e, n, d, NULL, NULL, 33, 24)));
     denoised[2][7] = GGN_FIXED_NAN;
-    assert_true(isnan(ggn_exact_logit(e, n, d, NULL, NULL)));
-    ggn_exact_destroy(e);
+    assert_true(isnan(ggn_inference_logit_f64(e, n, d, NULL, NULL, 33, 24)));
+    ggn_inference_destroy_f64(e);
     m->weights[GGN_NET_R]->params[m->graph[GGN_NET_R].n_params - 1] = NAN;
-    e = ggn_exact_create(&m->hyper, m->graph, learned, NULL);
+    e = ggn_inference_create_f64(&m->hyper, m->graph, learned, NULL);
     assert_non_null(e);
-    ggn_exact_denoise(e, noisy[0], denoised[0]);
+    ggn_inference_denoise_f64(e, noisy[0], denoised[0], 33, 24);
     assert_int_equal(denoised[0][2 * AREA + 5], GGN_FIXED_NAN);
-    ggn_exact_destroy(e);
+    ggn_inference_destroy_f64(e);
     ggn_model_destroy(m);
     (void)state;
 }
