@@ -189,7 +189,9 @@ static int load_block(struct ggn_series_set *set, int view, uint32_t index, cons
     if (!set->width) {
         set->width = (int)b.width;
         set->height = (int)b.height;
-        rc = o->measures ? ggn_meter_init(&set->meter, (size_t)b.width * b.height, err) : 0;
+        struct ggn_meter_room room = {0};
+        ggn_meter_make_room(&room, set->width, set->height);
+        rc = o->measures ? ggn_meter_init(&set->meter, &room, err) : 0;
     }
     if (!rc && ((int)b.width != set->width || (int)b.height != set->height))
         rc = base_fail(err, BASE_EINVAL, "%s/%s: a block of %ux%u pixels among blocks of %dx%d", v->dir,

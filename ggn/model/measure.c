@@ -14,15 +14,23 @@ void ggn_meter_release(struct ggn_meter *m)
     *m = (struct ggn_meter){0};
 }
 
-int ggn_meter_init(struct ggn_meter *m, size_t pixels, struct base_err *err)
+void ggn_meter_make_room(struct ggn_meter_room *room, int width, int height)
 {
-    /* a patch has at most 100x100 pixels, the narrowest block one column */
-    const size_t patches = pixels / 100 + 4, rows = ggn_visibility_scratch((int)pixels);
-    double *memory = pixels < INT32_MAX / 64 ? malloc((patches + rows) * sizeof *memory + 9 * pixels * sizeof(float)) : NULL;
+    const size_t pixels = (size_t)width * (size_t)height, patches = ggn_visible_patches(width, height);
+
+    room->pixels = pixels > room->pixels ? pixels : room->pixels;
+    room->patches = patches > room->patches ? patches : room->patches;
+    room->width = width > room->width ? width : room->width;
+}
+
+int ggn_meter_init(struct ggn_meter *m, const struct ggn_meter_room *room, struct base_err *err)
+{
+    const size_t pixels = room->pixels, patches = room->patches, doubles = patches + ggn_visibility_scratch(room->width);
+    double *memory = pixels < PTRDIFF_MAX / 256 ? malloc(doubles * sizeof *memory + 9 * pixels * sizeof(float)) : NULL;
 
     if (!memory)
         return base_fail_nomem(err, "the noise of a block");
-    float *at = (float *)(memory + patches + rows);
+    float *at = (float *)(memory + doubles);
     *m = (struct ggn_meter){.rgb = {at, at + 3 * pixels},
                             .lightness = {at + 6 * pixels, at + 7 * pixels},
                             .blurred = at + 8 * pixels,

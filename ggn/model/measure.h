@@ -2,7 +2,7 @@
  * What is measured of a block's image beside its pixels: the law of visible noise (model/visibility.h), and what tells when
  * that law may err. Residual networks are anchored to the first and given the rest.
  *
- * A meter owns the scratch memory for blocks of any shape up to its number of pixels; one call at a time per meter.
+ * A meter owns the scratch memory for blocks that its room was made for; one call at a time per meter.
  */
 #ifndef GGN_MODEL_MEASURE_H
 #define GGN_MODEL_MEASURE_H
@@ -28,11 +28,18 @@ struct ggn_meter {
     float *rgb[2];       /* the caller's pictures: linear light, [3][P] */
     float *lightness[2]; /* [P] */
     float *blurred;      /* [P] */
-    double *texture, *scratch;
-    void *memory; /* owns all of it */
+    double *texture;     /* [patches] */
+    double *scratch;     /* of model/visibility.h */
+    void *memory;        /* owns all of it */
 };
 
-int ggn_meter_init(struct ggn_meter *meter, size_t pixels, struct base_err *err);
+/* The most that any of some blocks has; starts at zero. */
+struct ggn_meter_room {
+    size_t pixels, patches;
+    int width;
+};
+void ggn_meter_make_room(struct ggn_meter_room *room, int width, int height);
+int ggn_meter_init(struct ggn_meter *meter, const struct ggn_meter_room *room, struct base_err *err);
 void ggn_meter_release(struct ggn_meter *meter);
 
 /* Of the two pictures in meter->rgb, which differ by noise: `split` takes the difference of their L* to noise of the mean's

@@ -44,13 +44,13 @@ static void worker_destroy(void *data)
     free(w);
 }
 
-static void *worker_create(const struct lull_instance *in, size_t pixels, struct base_err *err)
+static void *worker_create(const struct lull_instance *in, const struct ggn_meter_room *room, struct base_err *err)
 {
     struct worker *w = calloc(1, sizeof *w);
 
     if (!w)
         return NULL;
-    w->codes = malloc(3 * pixels);
+    w->codes = malloc(3 * room->pixels);
     w->reader = w->codes ? ggn_baseline_reader_create(in->model, err) : NULL;
     if (w->reader)
         return w;

@@ -10,6 +10,7 @@
 #include "model/measure.h"
 #include "observer/observer.h"
 #include "plugin/pair.h"
+#include "plugin/rect.h"
 #include "plugin/translate.h"
 #include "plugin/windowed.h"
 #include "sequence/simulate.h"
@@ -61,14 +62,14 @@ static void worker_destroy(void *data)
     free(w);
 }
 
-static void *worker_create(const struct lull_instance *in, size_t pixels, struct base_err *err)
+static void *worker_create(const struct lull_instance *in, const struct ggn_meter_room *room, struct base_err *err)
 {
     struct worker *w = calloc(1, sizeof *w);
 
     if (!w)
         return NULL;
-    w->noise_map = malloc(pixels);
-    if (w->noise_map && (in->rule.reach <= 0 || !ggn_meter_init(&w->meter, pixels, err)))
+    w->noise_map = malloc(room->pixels);
+    if (w->noise_map && (in->rule.reach <= 0 || !ggn_meter_init(&w->meter, room, err)))
         w->inference = ggn_inference_create(in->model, NULL, err);
     if (w->inference)
         return w;

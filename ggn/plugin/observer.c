@@ -18,12 +18,14 @@
  * one frame of many, with `ppd` that of a display with so many pixels per degree. No model.
  */
 #include "observer/observer.h"
+#include "model/measure.h"
 #include "model/visibility.h"
 #include "plugin/criteria.h"
 #include "plugin/limit.h"
 #include "plugin/means.h"
 #include "plugin/viewing.h"
 #include "plugin/pair.h"
+#include "plugin/rect.h"
 #include "plugin/translate.h"
 #include "plugin/undersampled.h"
 #include "sequence/simulate.h"
@@ -33,7 +35,6 @@ enum {
     COLOR = LULL_PLANE_BIT(LULL_PLANE_COLOR),
     PLANES = COLOR | LULL_PLANE_BIT(LULL_PLANE_HALF) | LULL_PLANE_BIT(LULL_PLANE_MOMENT2) | LULL_PLANE_BIT(LULL_PLANE_SPP)
 };
-enum { FLOATS = 9 };              /* a pixel, of struct worker */
 enum { WINDOW = 200 };            /* pixels, the side of a block that is evidence enough by itself */
 enum { BORDER = 2 };              /* pixels, the reach of the eye's blur (model/visibility.h) */
 static const double AROUND = 3.0; /* a smaller one stops only where its surroundings show at most so many times the limit */
@@ -48,16 +49,6 @@ static const struct lull_param params[P_COUNT] = {
     [P_PPD] = GP_PARAM_PPD,
 };
 
-struct worker { /* [3][P] linear light of each half, its L*; [P]; [patches] */
-    float *rgb[2], *lightness[2], *deviation;
-    double *texture, *scratch;
-};
-
-struct largest { /* of the blocks of a frame and what is read around them */
-    size_t pixels, patches;
-    int32_t width;
-};
-
 struct lull_instance {
     struct lull_kit kit;
     struct ggn_observer observer;
@@ -68,24 +59,18 @@ struct lull_instance {
     struct gp_means means;  /* of a frame without HALF */
     uint32_t workers;       /* of the open frame */
     struct lull_rect frame; /* around all blocks */
-    struct largest largest;
-    struct worker *worker;
-    float *pixels;   /* owns what the workers point into */
-    double *scratch; /* likewise */
+    struct ggn_meter_room room;
+    struct ggn_meter *worker; /* owns */
 };
 
 /* --- one block --------------------------------------------------------------------------------------------------------- */
-
-static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
-
-static int32_t least(int32_t a, int32_t b) { return a < b ? a : b; }
 
 /* A side of what surrounds a small block: WINDOW pixels about it, as far as the frame reaches. */
 static void widen(int32_t *from, int32_t *to, int32_t first, int32_t last)
 {
     const int32_t more = WINDOW - (*to - *from);
-    *from = most(first, *from - more / 2);
-    *to = least(last, *to + more - more / 2);
+    *from = gp_most(first, *from - more / 2);
+    *to = gp_least(last, *to + more - more / 2);
 }
 
 static struct lull_rect window_of(const struct lull_rect *frame, struct lull_rect r)
@@ -110,7 +95,7 @@ static struct lull_rect border_of(const struct lull_rect *frame, struct lull_rec
         within((int64_t)r.x1 + BORDER, frame->x0, frame->x1), within((int64_t)r.y1 + BORDER, frame->y0, frame->y1)};
 }
 
-static void see_both(struct worker *w, size_t pixels)
+static void see_both(struct ggn_meter *w, size_t pixels)
 {
     for (int k = 0; k < 2; k++)
         ggn_visible_lightness(w->rgb[k], pixels, w->lightness[k]);
@@ -118,7 +103,7 @@ static void see_both(struct worker *w, size_t pixels)
 
 /* Visible noise of the two pictures of w, whose difference is made as strong as the noise of the mean by `split`; the
  * texture they share stays in w. *gain: of the noise, where it is that of one frame of many. */
-static double noise_of_difference(const struct lull_instance *in, int width, int height, double split, struct worker *w,
+static double noise_of_difference(const struct lull_instance *in, int width, int height, double split, struct ggn_meter *w,
                                   double *gain)
 {
     const size_t pixels = (size_t)width * (size_t)height;
@@ -137,7 +122,7 @@ static double noise_of_difference(const struct lull_instance *in, int width, int
 /* Visible noise that second moments let expect before w's texture; 0: they tell of none. One standard deviation to either
  * side of a mean; two, halved, where one lies beyond white, as after two lucky hits of a lamp smaller than the pixel. */
 static double noise_of_moments(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                               struct lull_rect area, struct worker *w)
+                               struct lull_rect area, struct ggn_meter *w)
 {
     const int width = area.x1 - area.x0, height = area.y1 - area.y0;
     const size_t pixels = (size_t)width * (size_t)height;
@@ -146,20 +131,20 @@ static double noise_of_moments(const struct lull_instance *in, const struct lull
         return 0;
     see_both(w, pixels);
     for (size_t i = 0; i < pixels; i++)
-        w->deviation[i] = 0.5f * (w->lightness[0][i] - w->lightness[1][i]);
+        w->blurred[i] = 0.5f * (w->lightness[0][i] - w->lightness[1][i]);
     gp_pair_of_moments(&in->kit, view, b, area, 2, w->rgb);
     see_both(w, pixels);
     for (size_t i = 0; i < pixels; i++) {
-        const float d = fmaxf(w->deviation[i], 0.25f * (w->lightness[0][i] - w->lightness[1][i]));
-        w->deviation[i] = d * d;
+        const float d = fmaxf(w->blurred[i], 0.25f * (w->lightness[0][i] - w->lightness[1][i]));
+        w->blurred[i] = d * d;
     }
-    return ggn_visible_expected(w->deviation, width, height, w->texture, w->scratch);
+    return ggn_visible_expected(w->blurred, width, height, w->texture, w->scratch);
 }
 
 /* The error of an area, whose two pictures are in w; differ: anywhere. Where only second moments tell of noise, as when both
  * halves have hit a small lamp equally often, they decide alone. NaN: neither tells of any. */
 static double error_of(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                       struct lull_rect area, int differ, double split, struct worker *w)
+                       struct lull_rect area, int differ, double split, struct ggn_meter *w)
 {
     const int width = area.x1 - area.x0, height = area.y1 - area.y0;
     const int moments = lull_kit_plane(view, LULL_PLANE_MOMENT2) && b->spp >= 2;
@@ -179,7 +164,7 @@ static double error_of(struct lull_instance *in, const struct lull_view *view, c
 
 /* Its error, or that of a block in which nothing tells of noise; `same` is the warning if something should. */
 static double verdict_on(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, int differ,
-                         double split, const char *same, struct worker *w, struct lull_kit_tally *tally)
+                         double split, const char *same, struct ggn_meter *w, struct lull_kit_tally *tally)
 {
     const int structure = !differ && gp_pair_has_structure(w->rgb[0], (size_t)lull_kit_pixels(b));
     const double error = error_of(in, view, b, gp_rect_of(b), differ, split, w);
@@ -189,7 +174,7 @@ static double verdict_on(struct lull_instance *in, const struct lull_view *view,
 static double split_of(const struct lull_block *b) { return 0.5 * seq_half_scale((double)b->spp, (double)b->half_spp); }
 
 static double error_of_halves(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                              struct worker *w, struct lull_kit_tally *tally)
+                              struct ggn_meter *w, struct lull_kit_tally *tally)
 {
     if (!gp_has_halves(b)) {
         gp_say_once(
@@ -210,18 +195,18 @@ static double error_of_halves(struct lull_instance *in, const struct lull_view *
 static int has_room(const struct lull_instance *in, struct lull_rect area)
 {
     const int32_t width = area.x1 - area.x0, height = area.y1 - area.y0;
-    return width > 0 && height > 0 && width <= in->largest.width && (size_t)width * (size_t)height <= in->largest.pixels &&
-           ggn_visible_patches(width, height) <= in->largest.patches;
+    return width > 0 && height > 0 && width <= in->room.width && (size_t)width * (size_t)height <= in->room.pixels &&
+           ggn_visible_patches(width, height) <= in->room.patches;
 }
 
 /* The error of an area around a block; 0 where it is the block, or tells of no noise. */
 static double error_of_area(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                            struct lull_rect area, struct worker *w)
+                            struct lull_rect area, struct ggn_meter *w)
 {
     const struct lull_rect own = gp_rect_of(b);
     struct lull_kit_tally ignored = {0};
 
-    if (memcmp(&own, &area, sizeof own) == 0 || !has_room(in, area))
+    if (gp_rect_same(own, area) || !has_room(in, area))
         return 0;
     const int differ = gp_pair_of_halves(&in->kit, view, b, area, w->rgb, &ignored);
     const double error = error_of(in, view, b, area, differ, split_of(b), w);
@@ -231,7 +216,7 @@ static double error_of_area(struct lull_instance *in, const struct lull_view *vi
 /* What the surroundings of a block let expect of it: whether a few samples of a few pixels have met rare light is luck, and
  * those beside it had other luck. 0 where there are none. */
 static double error_around(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                           struct worker *w)
+                           struct ggn_meter *w)
 {
     const struct lull_rect own = gp_rect_of(b);
     return view->all ? error_of_area(in, view, b, window_of(&in->frame, own), w) / AROUND : 0;
@@ -239,7 +224,7 @@ static double error_around(struct lull_instance *in, const struct lull_view *vie
 
 /* What a block shows together with the pixels at its edges, where light of those may reach over them unmet; 0 elsewhere. */
 static double error_at_edges(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                             struct worker *w)
+                             struct ggn_meter *w)
 {
     const struct lull_rect own = gp_rect_of(b), area = border_of(&in->frame, own);
     if (!has_room(in, area) || !view->all || !lull_kit_plane(view, LULL_PLANE_MOMENT2) || b->spp < 2)
@@ -249,7 +234,7 @@ static double error_at_edges(struct lull_instance *in, const struct lull_view *v
 }
 
 static double error_of_means(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                             struct worker *w, struct lull_kit_tally *tally)
+                             struct ggn_meter *w, struct lull_kit_tally *tally)
 {
     uint64_t spp_base;
     float *keep;
@@ -269,7 +254,7 @@ static double error_of_means(struct lull_instance *in, const struct lull_view *v
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                   struct lull_decision *d, uint32_t worker)
 {
-    struct worker *w = &in->worker[worker < in->workers ? worker : 0];
+    struct ggn_meter *w = &in->worker[worker < in->workers ? worker : 0];
     struct lull_kit_tally tally = {0};
     double error = (double)NAN;
 
@@ -312,46 +297,31 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
 
 /* --- instance ---------------------------------------------------------------------------------------------------------- */
 
-static void workers_release(struct lull_instance *in)
+static void workers_release(struct ggn_meter *worker, uint32_t count)
 {
-    free(in->worker);
-    free(in->pixels);
-    free(in->scratch);
-    gp_means_release(&in->means);
-    in->worker = NULL;
-    in->pixels = NULL;
-    in->scratch = NULL;
-    in->workers = 0;
+    for (uint32_t i = 0; worker && i < count; i++)
+        ggn_meter_release(&worker[i]);
+    free(worker);
 }
 
-/* Scratch memory for blocks of up to this size; replaces that of an open frame. */
-static int32_t workers_create(struct lull_instance *in, const struct largest *largest, struct lull_error *err)
+/* NULL without memory. */
+static struct ggn_meter *workers_create(uint32_t count, const struct ggn_meter_room *room)
 {
-    const size_t count = lull_kit_workers(&in->kit), pixels = largest->pixels;
-    const size_t doubles = largest->patches + ggn_visibility_scratch(largest->width);
-    const int fits = pixels <= PTRDIFF_MAX / (FLOATS * sizeof(float)) / count;
-    struct worker *worker = fits ? calloc(count, sizeof *worker) : NULL;
-    float *planes = worker ? malloc(count * FLOATS * pixels * sizeof *planes) : NULL;
-    double *scratch = planes ? malloc(count * doubles * sizeof *scratch) : NULL;
+    struct ggn_meter *worker = calloc(count, sizeof *worker);
+    for (uint32_t i = 0; worker && i < count; i++)
+        if (ggn_meter_init(&worker[i], room, NULL)) {
+            workers_release(worker, count);
+            return NULL;
+        }
+    return worker;
+}
 
-    if (!scratch) {
-        free(worker);
-        free(planes);
-        return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: out of memory");
-    }
-    for (size_t i = 0; i < count; i++) {
-        float *at = planes + i * FLOATS * pixels;
-        double *texture = scratch + i * doubles;
-        worker[i] = (struct worker){
-            {at, at + 3 * pixels}, {at + 6 * pixels, at + 7 * pixels}, at + 8 * pixels, texture, texture + largest->patches};
-    }
-    workers_release(in);
-    in->worker = worker;
-    in->pixels = planes;
-    in->scratch = scratch;
-    in->workers = (uint32_t)count;
-    in->largest = *largest;
-    return LULL_OK;
+static void frame_release(struct lull_instance *in)
+{
+    workers_release(in->worker, in->workers);
+    gp_means_release(&in->means);
+    in->worker = NULL;
+    in->workers = 0;
 }
 
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
@@ -383,48 +353,34 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     return LULL_OK;
 }
 
-static struct lull_rect frame_of(const struct lull_frame *frame)
-{
-    struct lull_rect all = *lull_kit_rect(frame, 0);
-    for (uint32_t i = 1; i < frame->block_count; i++) {
-        const struct lull_rect *r = lull_kit_rect(frame, i);
-        all = (struct lull_rect){least(all.x0, r->x0), least(all.y0, r->y0), most(all.x1, r->x1), most(all.y1, r->y1)};
-    }
-    return all;
-}
-
-static void make_room(struct largest *largest, struct lull_rect r)
-{
-    const int32_t width = r.x1 - r.x0, height = r.y1 - r.y0;
-    const size_t pixels = (size_t)width * (size_t)height, patches = ggn_visible_patches(width, height);
-    largest->pixels = pixels > largest->pixels ? pixels : largest->pixels;
-    largest->patches = patches > largest->patches ? patches : largest->patches;
-    largest->width = most(width, largest->width);
-}
-
 static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
 {
     int32_t status = lull_kit_frame_check(in, frame, err);
-    struct largest largest = {.pixels = 1, .patches = 1, .width = 1};
-    struct lull_rect all;
+    struct ggn_meter_room room = {0};
+    struct ggn_meter *worker = NULL;
+    struct gp_means means = {0};
 
     if (status)
         return status;
-    all = frame_of(frame);
+    const struct lull_rect all = gp_rect_of_frame(frame);
+    const uint32_t workers = lull_kit_workers(&in->kit);
     for (uint32_t i = 0; i < frame->block_count; i++) {
-        const struct lull_rect own = *lull_kit_rect(frame, i);
-        make_room(&largest, window_of(&all, own));
-        make_room(&largest, border_of(&all, own));
+        const struct lull_rect own = *lull_kit_rect(frame, i), around[] = {window_of(&all, own), border_of(&all, own)};
+        for (int k = 0; k < 2; k++)
+            ggn_meter_make_room(&room, around[k].x1 - around[k].x0, around[k].y1 - around[k].y0);
     }
-    struct gp_means means = {0};
     if (!(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)))
         status = gp_means_create(&means, frame, err);
-    if (!status)
-        status = workers_create(in, &largest, err);
+    if (!status && !(worker = workers_create(workers, &room)))
+        status = lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: out of memory");
     if (status) {
         gp_means_release(&means);
         return status;
     }
+    frame_release(in);
+    in->room = room;
+    in->worker = worker;
+    in->workers = workers;
     in->means = means;
     in->frame = all;
     atomic_flag_clear(&in->warned);
@@ -439,7 +395,7 @@ static void end_frame(struct lull_instance *in)
 {
     if (!in)
         return;
-    workers_release(in);
+    frame_release(in);
     lull_kit_end_frame(in);
 }
 

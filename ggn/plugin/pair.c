@@ -1,5 +1,6 @@
 #include "plugin/pair.h"
 
+#include "plugin/rect.h"
 #include "plugin/translate.h"
 #include "sequence/simulate.h"
 
@@ -86,10 +87,6 @@ static int read_part(const struct source *from, const struct lull_block *b, stru
     return differ;
 }
 
-static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
-
-static int32_t least(int32_t a, int32_t b) { return a < b ? a : b; }
-
 /* All pixels of the area that belong to a block with samples; the rest is black in both pictures. */
 static int read_around(const struct source *from, const struct lull_block *b, const struct target *to,
                        struct lull_kit_tally *tally)
@@ -104,22 +101,19 @@ static int read_around(const struct source *from, const struct lull_block *b, co
     for (uint32_t i = 0; i < (view->all ? view->all_count : 1); i++) {
         const struct lull_block *o = view->all ? lull_kit_at(view->all, view->all_stride, i) : b;
         o = o->id == b->id ? b : o;
-        const struct lull_rect r = {most(o->x0, area.x0), most(o->y0, area.y0), least(o->x1, area.x1),
-                                    least(o->y1, area.y1)};
+        const struct lull_rect r = gp_rect_common(gp_rect_of(o), area);
         if (o->spp > 0 && (!(from->planes & HALF) || gp_has_halves(o)) && r.x0 < r.x1 && r.y0 < r.y1)
             differ |= read_part(from, o, r, to, tally);
     }
     return differ;
 }
 
-struct lull_rect gp_rect_of(const struct lull_block *b) { return (struct lull_rect){b->x0, b->y0, b->x1, b->y1}; }
-
 static int read_pair(const struct source *from, const struct lull_block *b, struct lull_rect area, float *const rgb[2],
                      struct lull_kit_tally *tally)
 {
     const struct target to = {area, rgb};
     const struct lull_rect own = gp_rect_of(b);
-    if (memcmp(&area, &own, sizeof area) == 0)
+    if (gp_rect_same(area, own))
         return read_part(from, b, own, &to, tally);
     return read_around(from, b, &to, tally);
 }

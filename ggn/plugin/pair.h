@@ -13,8 +13,6 @@
 /* rgb: two of [3][P]. A pixel that is no number takes the place of the one before it: neither noise nor texture; the tally
  * counts it. All return whether the pictures differ anywhere. */
 
-struct lull_rect gp_rect_of(const struct lull_block *block);
-
 /* The means of the two halves of the samples, in `area`, of P pixels: the block's own rectangle, or more of the view. There
  * the pixels of other blocks count as far as the view knows them; the rest is black in both. The view has COLOR and HALF. */
 int gp_pair_of_halves(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *block,

@@ -80,20 +80,8 @@ static void workers_release(const struct gp_block_view_ops *ops, void **worker, 
     free(worker);
 }
 
-static size_t largest_block(const struct lull_frame *frame)
-{
-    size_t most = 0;
-
-    for (uint32_t i = 0; i < frame->block_count; i++) {
-        const struct lull_rect *r = lull_kit_rect(frame, i);
-        size_t pixels = (size_t)((int64_t)r->x1 - r->x0) * (size_t)((int64_t)r->y1 - r->y0);
-        most = pixels > most ? pixels : most;
-    }
-    return most;
-}
-
 /* Scratch for as many workers as can be busy. */
-static int32_t workers_create(const struct lull_instance *in, uint32_t count, size_t pixels, void ***out,
+static int32_t workers_create(const struct lull_instance *in, uint32_t count, const struct ggn_meter_room *room, void ***out,
                               struct lull_error *err)
 {
     struct base_err error = {.code = BASE_ENOMEM, .text = "out of memory"};
@@ -101,7 +89,7 @@ static int32_t workers_create(const struct lull_instance *in, uint32_t count, si
     int good = worker != NULL;
 
     for (uint32_t i = 0; i < count && good; i++)
-        good = (worker[i] = in->ops->worker_create(in, pixels, &error)) != NULL;
+        good = (worker[i] = in->ops->worker_create(in, room, &error)) != NULL;
     *out = worker;
     if (good)
         return LULL_OK;
@@ -145,10 +133,15 @@ int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_fram
     if (status)
         return status;
     const uint32_t count = lull_kit_workers(&in->kit);
-    const size_t pixels = largest_block(frame), bytes_per_pixel = 1024; /* more than history and scratch need of either */
-    if (pixels > PTRDIFF_MAX / bytes_per_pixel)
+    const size_t bytes_per_pixel = 1024; /* more than history and scratch need of either */
+    struct ggn_meter_room room = {0};
+    for (uint32_t i = 0; i < frame->block_count; i++) {
+        const struct lull_rect *r = lull_kit_rect(frame, i);
+        ggn_meter_make_room(&room, r->x1 - r->x0, r->y1 - r->y0);
+    }
+    if (room.pixels > PTRDIFF_MAX / bytes_per_pixel)
         return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: a block is too large for memory");
-    status = workers_create(in, count, pixels, &worker, err);
+    status = workers_create(in, count, &room, &worker, err);
     if (status)
         return status;
     status = gp_history_create(&history, in->rule.window, frame, in->ops->slot, in, err);

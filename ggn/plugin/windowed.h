@@ -15,6 +15,7 @@
 #include <stdatomic.h>
 
 #include "base/err.h"
+#include "model/measure.h"
 #include "model/preprocess.h"
 
 /* One block at one check. */
@@ -34,8 +35,8 @@ struct gp_block_view_ops {
     int32_t (*load)(struct lull_instance *in, int kind, const char *path, struct lull_error *err);
     /* What its slots hold; of: the instance. */
     struct gp_slot (*slot)(const void *of, int32_t width, int32_t height);
-    /* Scratch of one worker for blocks of up to `pixels`. NULL on failure. */
-    void *(*worker_create)(const struct lull_instance *in, size_t pixels, struct base_err *err);
+    /* Scratch of one worker for blocks that `room` has been made for. NULL on failure. */
+    void *(*worker_create)(const struct lull_instance *in, const struct ggn_meter_room *room, struct base_err *err);
     void (*worker_destroy)(void *worker); /* NULL is allowed */
     void (*model_destroy)(void *model);   /* NULL is allowed */
     /* Measures the block as it is now, before it is read or judged. NULL: nothing is measured. */

@@ -332,11 +332,13 @@ static void a_measure_is_the_law_and_what_surrounds_it(void **state)
     static uint8_t map[P];
     static float lightness[2][P];
     struct ggn_meter m;
+    struct ggn_meter_room room = {0};
     struct ggn_measure got;
     double texture[4], *scratch = malloc(ggn_visibility_scratch(W) * sizeof *scratch), sum = 0;
 
     (void)state;
-    assert_int_equal(ggn_meter_init(&m, P, NULL), 0);
+    ggn_meter_make_room(&room, W, H);
+    assert_int_equal(ggn_meter_init(&m, &room, NULL), 0);
     for (uint32_t p = 0; p < P; p++) {
         double clean = 0.2 + 0.1 * ((p % W / 8 + p / W / 8) & 1), noise[2];
         for (uint32_t k = 0; k < 2; k++) {

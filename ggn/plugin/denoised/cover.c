@@ -1,20 +1,17 @@
 #include "plugin/denoised/cover.h"
 
 #include "denoise/oidn.h"
+#include "plugin/rect.h"
 
 enum { LOOK_BACK = 8 }; /* groups that one is held against */
-
-static int32_t most_of(int32_t a, int32_t b) { return a > b ? a : b; }
-
-static int32_t least_of(int32_t a, int32_t b) { return a < b ? a : b; }
 
 /* One side: pixels [*from, *to) become those of the box. */
 static void widen(int32_t *from, int32_t *to, int32_t area0, int32_t area1)
 {
     const int32_t origin = area0 - LULL_OIDN_MARGIN;
     const int32_t first = (*from - origin) / LULL_OIDN_GRID, end = (*to - 1 - origin) / LULL_OIDN_GRID + 1;
-    *from = most_of(origin, origin + first * LULL_OIDN_GRID - LULL_OIDN_HALO);
-    *to = least_of(area1 + LULL_OIDN_MARGIN, origin + end * LULL_OIDN_GRID + LULL_OIDN_HALO);
+    *from = gp_most(origin, origin + first * LULL_OIDN_GRID - LULL_OIDN_HALO);
+    *to = gp_least(area1 + LULL_OIDN_MARGIN, origin + end * LULL_OIDN_GRID + LULL_OIDN_HALO);
 }
 
 struct lull_rect gd_box_around(const struct lull_rect *core, const struct lull_rect *area)
@@ -27,18 +24,13 @@ struct lull_rect gd_box_around(const struct lull_rect *core, const struct lull_r
 
 int64_t gd_area_of(const struct lull_rect *rect) { return ((int64_t)rect->x1 - rect->x0) * ((int64_t)rect->y1 - rect->y0); }
 
-static struct lull_rect around_both(const struct lull_rect *a, const struct lull_rect *b)
-{
-    return (struct lull_rect){least_of(a->x0, b->x0), least_of(a->y0, b->y0), most_of(a->x1, b->x1), most_of(a->y1, b->y1)};
-}
-
 /* Of the last groups the one with which `one` saves most pixels; `count`: none saves any. */
 static uint32_t best_of(const struct gd_group *groups, uint32_t count, const struct gd_group *one, int64_t most)
 {
     uint32_t best = count;
     int64_t saved = 0;
     for (uint32_t i = count > LOOK_BACK ? count - LOOK_BACK : 0; i < count; i++) {
-        const struct lull_rect both = around_both(&groups[i].box, &one->box);
+        const struct lull_rect both = gp_rect_around(groups[i].box, one->box);
         const int64_t joined = gd_area_of(&both), saves = gd_area_of(&groups[i].box) + gd_area_of(&one->box) - joined;
         if (joined <= most && saves > saved) {
             saved = saves;
@@ -59,7 +51,7 @@ static uint32_t join(struct gd_group *groups, uint32_t count, uint32_t *next, in
             groups[kept++] = one;
             continue;
         }
-        groups[to].box = around_both(&groups[to].box, &one.box);
+        groups[to].box = gp_rect_around(groups[to].box, one.box);
         next[groups[to].last] = one.first;
         groups[to].last = one.last;
     }

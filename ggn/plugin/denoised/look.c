@@ -1,13 +1,10 @@
 #include "plugin/denoised/look.h"
 
 #include "plugin/denoised/cover.h"
+#include "plugin/rect.h"
 
 /* Pixels of a rectangle that more than one block share, at most: the denoiser takes 600 bytes a pixel while it works. */
 static const int64_t MOST_SHARED = 1 << 20;
-
-static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
-
-static int32_t least(int32_t a, int32_t b) { return a < b ? a : b; }
 
 /* --- form -------------------------------------------------------------------------------------------------------------- */
 
@@ -20,13 +17,11 @@ static int64_t widened(int32_t side, int32_t area)
 
 struct gd_form gd_form_of(const struct lull_frame *frame, enum lull_oidn_quality quality, uint32_t threads)
 {
-    struct gd_form form = {.area = *lull_kit_rect(frame, 0), .blocks = frame->block_count};
+    struct gd_form form = {.area = gp_rect_of_frame(frame), .blocks = frame->block_count};
     for (uint32_t i = 0; i < frame->block_count; i++) {
         const struct lull_rect *r = lull_kit_rect(frame, i);
-        form.area = (struct lull_rect){least(form.area.x0, r->x0), least(form.area.y0, r->y0), most(form.area.x1, r->x1),
-                                       most(form.area.y1, r->y1)};
-        form.width = most(form.width, r->x1 - r->x0);
-        form.height = most(form.height, r->y1 - r->y0);
+        form.width = gp_most(form.width, r->x1 - r->x0);
+        form.height = gp_most(form.height, r->y1 - r->y0);
     }
     const int32_t area_width = form.area.x1 - form.area.x0, area_height = form.area.y1 - form.area.y0;
     const int64_t width = widened(area_width, area_width), height = widened(area_height, area_height);
@@ -92,13 +87,6 @@ enum gd_halves gd_halves_of(const struct lull_view *view, const struct lull_bloc
 
 /* --- reading ----------------------------------------------------------------------------------------------------------- */
 
-static struct lull_rect rect_of(const struct lull_block *b) { return (struct lull_rect){b->x0, b->y0, b->x1, b->y1}; }
-
-static struct lull_rect common(struct lull_rect a, struct lull_rect b)
-{
-    return (struct lull_rect){most(a.x0, b.x0), most(a.y0, b.y0), least(a.x1, b.x1), least(a.y1, b.y1)};
-}
-
 static struct lull_denoised_rect in_box(const struct gd_look *look, struct lull_rect r)
 {
     return (struct lull_denoised_rect){r.x0 - look->box.x0, r.y0 - look->box.y0, r.x1 - look->box.x0, r.y1 - look->box.y0};
@@ -151,21 +139,22 @@ void gd_look_begin(struct gd_look *look, const struct gd_form *form, const struc
 {
     struct lull_kit_tally around = {0};
     look->box = *box;
-    look->known =
-        view->all ? common(common(*box, form->area), (struct lull_rect){view->x0, view->y0, view->x1, view->y1}) : *core;
+    look->known = view->all ? gp_rect_common(gp_rect_common(*box, form->area),
+                                             (struct lull_rect){view->x0, view->y0, view->x1, view->y1})
+                            : *core;
     lull_denoised_begin(&look->pair, box->x1 - box->x0, box->y1 - box->y0);
     for (uint32_t i = 0; view->all && i < view->all_count; i++) {
         const struct lull_block *other = lull_kit_at(view->all, view->all_stride, i);
         const int read = other->id < form->blocks && !asked[other->id] && other->spp > 0;
         if (read)
-            read_part(look, common(rect_of(other), look->known), view, other, &around);
+            read_part(look, gp_rect_common(gp_rect_of(other), look->known), view, other, &around);
     }
 }
 
 void gd_look_put(struct gd_look *look, const struct lull_view *view, const struct lull_block *block,
                  struct lull_kit_tally *tally)
 {
-    read_part(look, rect_of(block), view, block, tally);
+    read_part(look, gp_rect_of(block), view, block, tally);
 }
 
 /* --- denoising --------------------------------------------------------------------------------------------------------- */
@@ -184,5 +173,5 @@ int gd_look_run(struct gd_look *look, const struct lull_host *host, struct base_
 
 struct lull_denoised_rect gd_look_place(const struct gd_look *look, const struct lull_block *block)
 {
-    return in_box(look, rect_of(block));
+    return in_box(look, gp_rect_of(block));
 }
