@@ -105,11 +105,9 @@ static int read_pair(const struct gp_block_view *seen, int *differ, double *spli
 
     *split = 0.5;
     if (in->means.count) {
-        uint64_t spp_base;
-        float *keep;
-        const float *base = gp_means_begin(&in->means, b->id, b->spp, &keep, &spp_base);
-        *differ = gp_pair_of_means(&in->kit, seen->view, b, base, spp_base, keep, rgb, &tally);
-        return base != NULL;
+        int known;
+        *differ = gp_pair_of_means(&in->kit, seen->view, b, &in->means, rgb, &tally, &known);
+        return known;
     }
     if (!gp_has_halves(b)) {
         gp_say_once(&in->kit, LULL_LOG_WARNING, &in->warned,

@@ -17,16 +17,14 @@
  * block stops when that is at most `visible`, or `error` at most the parameter of that name. With `fps` the noise is that of
  * one frame of many, with `ppd` that of a display with so many pixels per degree. No model.
  */
-#include "observer/observer.h"
 #include "model/measure.h"
 #include "model/visibility.h"
 #include "plugin/criteria.h"
-#include "plugin/limit.h"
 #include "plugin/means.h"
-#include "plugin/viewing.h"
 #include "plugin/pair.h"
 #include "plugin/rect.h"
 #include "plugin/translate.h"
+#include "plugin/viewer.h"
 #include "plugin/undersampled.h"
 #include "sequence/simulate.h"
 
@@ -51,9 +49,7 @@ static const struct lull_param params[P_COUNT] = {
 
 struct lull_instance {
     struct lull_kit kit;
-    struct ggn_observer observer;
-    struct ggn_viewing viewing;
-    double stop_error;
+    struct gp_viewer viewer;
     atomic_flag warned;     /* of planes that say nothing about noise: once per frame */
     atomic_flag held;       /* likewise, of blocks that wait for light alone */
     struct gp_means means;  /* of a frame without HALF */
@@ -107,15 +103,15 @@ static double noise_of_difference(const struct lull_instance *in, int width, int
                                   double *gain)
 {
     const size_t pixels = (size_t)width * (size_t)height;
-    const int viewed = gp_is_viewed(&in->kit, P_FPS, P_PPD);
+    const struct ggn_viewing *viewing = in->viewer.viewing;
 
     see_both(w, pixels);
     ggn_visible_texture(w->lightness[0], w->lightness[1], width, height, w->scratch, w->texture);
     for (size_t i = 0; i < pixels; i++)
         w->lightness[0][i] = (float)split * (w->lightness[0][i] - w->lightness[1][i]);
     double noise =
-        ggn_visible_noise(w->lightness[0], width, height, w->texture, w->scratch, viewed ? w->lightness[1] : NULL);
-    *gain = viewed ? ggn_viewing_gain(&in->viewing, w->lightness[1], width, height, NULL) : 1;
+        ggn_visible_noise(w->lightness[0], width, height, w->texture, w->scratch, viewing ? w->lightness[1] : NULL);
+    *gain = viewing ? ggn_viewing_gain(viewing, w->lightness[1], width, height, NULL) : 1;
     return noise;
 }
 
@@ -159,7 +155,7 @@ static double error_of(struct lull_instance *in, const struct lull_view *view, c
         return (double)NAN;
     if (moments)
         noise = differ ? ggn_visible_together(noise, expected) : expected;
-    return ggn_observer_error(&in->observer, gain * noise, (size_t)width * (size_t)height);
+    return ggn_observer_error(&ggn_observer_default, gain * noise, (size_t)width * (size_t)height);
 }
 
 /* Its error, or that of a block in which nothing tells of noise; `same` is the warning if something should. */
@@ -236,12 +232,9 @@ static double error_at_edges(struct lull_instance *in, const struct lull_view *v
 static double error_of_means(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                              struct ggn_meter *w, struct lull_kit_tally *tally)
 {
-    uint64_t spp_base;
-    float *keep;
-    const float *base = gp_means_begin(&in->means, b->id, b->spp, &keep, &spp_base);
-    int differ = gp_pair_of_means(&in->kit, view, b, base, spp_base, keep, w->rgb, tally);
+    int known, differ = gp_pair_of_means(&in->kit, view, b, &in->means, w->rgb, tally, &known);
 
-    if (!base) {
+    if (!known) {
         tally->early = 1;
         return (double)NAN;
     }
@@ -264,20 +257,20 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
         error = (in->means.count ? error_of_means : error_of_halves)(in, view, b, w, &tally);
     /* What surrounds a block, and what it may not have met, is read where it matters: before a stop, and where the answer is
      * all that is wanted. */
-    if (!in->means.count && (error <= in->stop_error || (b->flags & LULL_BLOCK_FINAL && !isnan(error)))) {
+    if (!in->means.count && (error <= in->viewer.stop_error || (b->flags & LULL_BLOCK_FINAL && !isnan(error)))) {
         const double around = fmax(error_around(in, view, b, w), error_at_edges(in, view, b, w));
         const double seen = fmax(error, around), unmet = gp_undersampled_error(&in->kit, view, b);
-        if (seen <= in->stop_error && unmet > in->stop_error)
+        if (seen <= in->viewer.stop_error && unmet > in->viewer.stop_error)
             gp_say_once(&in->kit, LULL_LOG_INFO, &in->held,
                         "blocks below 100x100 pixels go on though no noise is seen: a few samples like their "
                         "brightest would be");
         error = fmax(seen, unmet);
     }
-    lull_kit_verdict(&in->kit, b, &tally, error, in->stop_error, 0, in->kit.value[P_GROWTH], d);
+    lull_kit_verdict(&in->kit, b, &tally, error, in->viewer.stop_error, 0, in->kit.value[P_GROWTH], d);
     if (d->action == LULL_CONTINUE && !isnan(d->predicted_spp)) /* the last steps are short: checks cost little here */
         lull_kit_continue(&in->kit, b, ggn_observer_next((double)b->spp, d->predicted_spp, in->kit.value[P_GROWTH]), d);
     if (!isnan(d->error))
-        d->p_noisy = ggn_observer_p_noisy(&in->observer, d->error);
+        d->p_noisy = ggn_observer_p_noisy(&ggn_observer_default, d->error);
 }
 
 /* As lull_kit_evaluate; a call that failed leaves no trace in the means. */
@@ -345,9 +338,7 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     if (status)
         return status;
     atomic_flag_clear(&in->warned);
-    in->observer = ggn_observer_default;
-    in->stop_error = gp_stop_error(&in->kit, &in->observer, P_VISIBLE, P_ERROR);
-    gp_viewing_init(&in->viewing, &in->kit, P_FPS, P_PPD);
+    gp_viewer_init(&in->viewer, in->kit.value, P_VISIBLE, P_ERROR, P_FPS, P_PPD);
     in->kit.need.halo = WINDOW / 2;
     *instance = in;
     return LULL_OK;

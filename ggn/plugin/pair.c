@@ -133,15 +133,19 @@ int gp_pair_of_moments(const struct lull_kit *kit, const struct lull_view *view,
     return read_pair(&from, b, area, rgb, &ignored);
 }
 
-int gp_pair_of_means(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b, const float *base,
-                     uint64_t spp_base, float *keep, float *const rgb[2], struct lull_kit_tally *tally)
+int gp_pair_of_means(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
+                     struct gp_means *means, float *const rgb[2], struct lull_kit_tally *tally, int *known)
 {
+    uint64_t spp_base;
+    float *keep;
+    const float *base = gp_means_begin(means, b->id, b->spp, &keep, &spp_base);
     const double scale = base ? seq_means_scale((double)spp_base, (double)b->spp) : 0;
     const size_t plane = (size_t)lull_kit_pixels(b);
     struct lull_kit_span s;
     size_t at = 0;
     int differ = 0;
 
+    *known = base != NULL;
     for (lull_kit_span_begin(&s, view, b, COLOR); lull_kit_span_next(&s);)
         for (int32_t i = 0; i < s.count; i++, at++) {
             const double *m = s.value[LULL_PLANE_COLOR][i];

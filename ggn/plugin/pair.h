@@ -10,6 +10,8 @@
 
 #include <lull/criterion_kit.h>
 
+#include "plugin/means.h"
+
 /* rgb: two of [3][P]. A pixel that is no number takes the place of the one before it: neither noise nor texture; the tally
  * counts it. All return whether the pictures differ anywhere. */
 
@@ -21,10 +23,10 @@ int gp_pair_of_halves(const struct lull_kit *kit, const struct lull_view *view, 
  * on. The view has COLOR and MOMENT2. Samples are taken as independent: of stratified ones it says too much. */
 int gp_pair_of_moments(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *block,
                        struct lull_rect area, double deviations, float *const rgb[2]);
-/* The mean plus and minus its noise, as the earlier mean `base` tells, of spp_base samples (plugin/means.h); NULL: nothing
- * tells it. Keeps the mean where `keep` is not NULL. */
+/* The mean plus and minus its noise, as an earlier mean of the block tells, which is begun to be looked at. *known: whether
+ * there is one. */
 int gp_pair_of_means(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *block,
-                     const float *base, uint64_t spp_base, float *keep, float *const rgb[2], struct lull_kit_tally *tally);
+                     struct gp_means *means, float *const rgb[2], struct lull_kit_tally *tally, int *known);
 
 /* Whether one picture, [3][pixels], is of more than one colour. */
 int gp_pair_has_structure(const float *rgb, size_t pixels);

@@ -9,13 +9,11 @@
  * The history of a block is its last check, with the trend: asked again at the same samples it answers the same, though its
  * neighbours, which the denoiser reads too, may have changed.
  */
-#include "observer/observer.h"
 #include "plugin/criteria.h"
 #include "plugin/denoised/block_view.h"
 #include "plugin/denoised/cover.h"
-#include "plugin/limit.h"
-#include "plugin/viewing.h"
 #include "plugin/translate.h"
+#include "plugin/viewer.h"
 
 static const double STEP = 1.25;              /* of samples from check to check, at least */
 static const double CLEAR = 0.8, APART = 0.4; /* of the limit, below it: so low a first error needs no other */
@@ -59,23 +57,25 @@ struct sight { /* of a block that is asked about */
     struct lull_kit_tally tally;
 };
 
-struct lull_instance {
-    struct lull_kit kit;
-    struct ggn_observer observer;
-    struct ggn_viewing viewing;
-    double stop_error;
-    char *library;       /* owns; NULL: the usual places */
-    atomic_flag warned;  /* of halves that are none: once per frame */
-    struct gd_form form; /* of the open frame, as all below */
+struct frame { /* what an open one needs; owns what it points to */
+    struct gd_form form;
     uint32_t workers;
     struct gd_look look;
-    struct gd_block_view *seen;  /* owns, [workers] */
-    struct lull_rect *rect;      /* owns, [blocks] */
-    struct past *past, *pending; /* own, [blocks] */
-    struct sight *sight;         /* owns, [blocks] */
-    uint8_t *asked;              /* owns, [blocks]: in the rectangle that is looked at; 0 between looks */
-    struct gd_group *groups;     /* owns, [blocks]: of one question, as these: */
-    uint32_t *next, *members;    /* own, [blocks]: links of groups, the blocks of one */
+    struct gd_block_view *seen;  /* [workers] */
+    struct lull_rect *rect;      /* [blocks] */
+    struct past *past, *pending; /* [blocks] */
+    struct sight *sight;         /* [blocks] */
+    uint8_t *asked;              /* [blocks]: in the rectangle that is looked at; 0 between looks */
+    struct gd_group *groups;     /* [blocks]: of one question, as these: */
+    uint32_t *next, *members;    /* [blocks]: links of groups, the blocks of one */
+};
+
+struct lull_instance {
+    struct lull_kit kit;
+    struct gp_viewer viewer;
+    char *library;      /* owns; NULL: the usual places */
+    atomic_flag warned; /* of halves that are none: once per frame */
+    struct frame frame;
 };
 
 /* --- one block --------------------------------------------------------------------------------------------------------- */
@@ -85,7 +85,7 @@ static double error_of(struct lull_instance *in, struct gd_block_view *seen, con
                        struct lull_kit_tally *tally, struct past *now)
 {
     const size_t pixels = (size_t)lull_kit_pixels(b);
-    const struct sight *sight = &in->sight[b->id];
+    const struct sight *sight = &in->frame.sight[b->id];
     *tally = sight->tally;
     if (sight->halves != GD_HALVES_DIFFER)
         return now->halves = now->crossed =
@@ -93,10 +93,10 @@ static double error_of(struct lull_instance *in, struct gd_block_view *seen, con
                                     "denoised: COLOR and HALF are the same in a block that is not of one colour: HALF must "
                                     "hold a fixed half of the samples",
                                     tally);
-    const struct ggn_kept_errors e = gd_block_view_errors(seen, &in->look, &in->kit, b, in->kit.value[P_PICTURE] == 0,
-                                                          gp_is_viewed(&in->kit, P_FPS, P_PPD) ? &in->viewing : NULL);
-    now->halves = ggn_observer_error(&in->observer, e.halves, pixels);
-    now->crossed = ggn_observer_error(&in->observer, e.crossed, pixels);
+    const struct ggn_kept_errors e =
+        gd_block_view_errors(seen, &in->frame.look, &in->kit, b, in->kit.value[P_PICTURE] == 0, in->viewer.viewing);
+    now->halves = ggn_observer_error(&ggn_observer_default, e.halves, pixels);
+    now->crossed = ggn_observer_error(&ggn_observer_default, e.crossed, pixels);
     return fmax(now->halves, now->crossed);
 }
 
@@ -107,25 +107,25 @@ static void decide(const struct lull_instance *in, const struct lull_block *b, c
 {
     const double spp = (double)b->spp, growth = in->kit.value[P_GROWTH];
     const int before = now->spp > 0 && !isnan(now->error);
-    lull_kit_verdict(&in->kit, b, tally, error, in->stop_error, 0, growth, d);
+    lull_kit_verdict(&in->kit, b, tally, error, in->viewer.stop_error, 0, growth, d);
     now->trend = before ? 0.5 * (d->error + now->trend * pow((double)now->spp / spp, FALL)) : d->error;
-    const int confirmed = before ? fmin(now->error, now->trend) <= in->stop_error
-                                 : d->error <= fmin(CLEAR * in->stop_error, in->stop_error - APART);
+    const int confirmed = before ? fmin(now->error, now->trend) <= in->viewer.stop_error
+                                 : d->error <= fmin(CLEAR * in->viewer.stop_error, in->viewer.stop_error - APART);
     if (d->action == LULL_STOP && !isnan(d->error) && !confirmed) {
         lull_kit_continue(&in->kit, b, STEP * spp, d);
         d->predicted_spp = (double)d->next_spp;
     } else if (d->action == LULL_CONTINUE && !isnan(d->predicted_spp)) {
-        d->predicted_spp = spp * pow(d->error / in->stop_error, 1.0 / FALL);
+        d->predicted_spp = spp * pow(d->error / in->viewer.stop_error, 1.0 / FALL);
         lull_kit_continue(&in->kit, b, fmin(fmax(d->predicted_spp, STEP * spp), growth * spp), d);
     }
     if (!isnan(d->error))
-        d->p_noisy = ggn_observer_p_noisy(&in->observer, d->error);
+        d->p_noisy = ggn_observer_p_noisy(&ggn_observer_default, d->error);
 }
 
 /* Whether this block's samples are to be judged, which they have not been before. */
 static int is_new(const struct lull_instance *in, const struct lull_block *b)
 {
-    return in->past[b->id].spp != b->spp || b->spp == 0;
+    return in->frame.past[b->id].spp != b->spp || b->spp == 0;
 }
 
 static int can_be_judged(const struct lull_instance *in, const struct lull_block *b)
@@ -136,13 +136,13 @@ static int can_be_judged(const struct lull_instance *in, const struct lull_block
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                   struct lull_decision *d, uint32_t worker)
 {
-    struct gd_block_view *seen = &in->seen[worker < in->workers ? worker : 0];
-    struct past *now = &in->pending[b->id];
+    struct gd_block_view *seen = &in->frame.seen[worker < in->frame.workers ? worker : 0];
+    struct past *now = &in->frame.pending[b->id];
     struct lull_kit_tally tally = {0};
     double error = (double)NAN;
 
     (void)view;
-    *now = in->past[b->id];
+    *now = in->frame.past[b->id];
     if (is_new(in, b)) {
         now->halves = now->crossed = (double)NAN;
         if (can_be_judged(in, b))
@@ -171,7 +171,7 @@ static void log_response(const struct lull_instance *in, const struct lull_block
     if (isnan(now->error))
         return;
     snprintf(line, sizeof line, "denoised: block %u at %llu spp: error %.2f by its halves, %.2f crossed; stops at %.2f",
-             b->id, (unsigned long long)b->spp, now->halves, now->crossed, in->stop_error);
+             b->id, (unsigned long long)b->spp, now->halves, now->crossed, in->viewer.stop_error);
     gp_log(&in->kit, LULL_LOG_DEBUG, line);
 }
 
@@ -211,24 +211,24 @@ static int32_t judge_all(const struct lull_kit_batch *batch, const uint32_t *mem
 static int32_t look_at(struct lull_instance *in, const struct lull_kit_batch *batch, const struct gd_group *group,
                        struct lull_error *err)
 {
-    const struct lull_rect *core = &in->rect[block_at(batch, group->first)->id];
+    const struct lull_rect *core = &in->frame.rect[block_at(batch, group->first)->id];
     struct base_err why = {0};
     uint32_t count = 0;
-    for (uint32_t i = group->first;; i = in->next[i]) {
-        in->members[count++] = i;
-        in->asked[block_at(batch, i)->id] = 1;
+    for (uint32_t i = group->first;; i = in->frame.next[i]) {
+        in->frame.members[count++] = i;
+        in->frame.asked[block_at(batch, i)->id] = 1;
         if (i == group->last)
             break;
     }
-    gd_look_begin(&in->look, &in->form, batch->view, &group->box, core, in->asked);
+    gd_look_begin(&in->frame.look, &in->frame.form, batch->view, &group->box, core, in->frame.asked);
     for (uint32_t k = 0; k < count; k++) {
-        const struct lull_block *b = block_at(batch, in->members[k]);
-        gd_look_put(&in->look, batch->view, b, &in->sight[b->id].tally);
-        in->asked[b->id] = 0;
+        const struct lull_block *b = block_at(batch, in->frame.members[k]);
+        gd_look_put(&in->frame.look, batch->view, b, &in->frame.sight[b->id].tally);
+        in->frame.asked[b->id] = 0;
     }
-    if (gd_look_run(&in->look, in->kit.host, &why))
+    if (gd_look_run(&in->frame.look, in->kit.host, &why))
         return gp_fail_from(err, LULL_E_INTERNAL, "evaluate", &why);
-    return judge_all(batch, in->members, count, err);
+    return judge_all(batch, in->frame.members, count, err);
 }
 
 /* Finds the blocks that must be denoised, each a group of its own, and in members[] the others. Returns how many of each. */
@@ -238,15 +238,16 @@ static uint32_t sort_out(struct lull_instance *in, const struct lull_kit_batch *
     *others = 0;
     for (uint32_t i = 0; i < batch->count; i++) {
         const struct lull_block *b = block_at(batch, i);
-        struct sight *sight = &in->sight[b->id];
+        struct sight *sight = &in->frame.sight[b->id];
         *sight = (struct sight){0};
         const int look = is_new(in, b) && can_be_judged(in, b);
         if (look)
             sight->halves = gd_halves_of(batch->view, b, &sight->tally);
         if (look && sight->halves == GD_HALVES_DIFFER)
-            in->groups[groups++] = (struct gd_group){gd_box_around(&in->rect[b->id], &in->form.area), i, i};
+            in->frame.groups[groups++] =
+                (struct gd_group){gd_box_around(&in->frame.rect[b->id], &in->frame.form.area), i, i};
         else
-            in->members[(*others)++] = i;
+            in->frame.members[(*others)++] = i;
     }
     return groups;
 }
@@ -265,107 +266,86 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
     if (count > in->kit.block_count)
         return lull_kit_fail(err, LULL_E_INVALID, "evaluate: more blocks than the frame has");
     uint32_t groups = sort_out(in, &batch, &others);
-    status = judge_all(&batch, in->members, others, err);
+    status = judge_all(&batch, in->frame.members, others, err);
     if (view->all)
-        groups = gd_cover(in->groups, groups, in->next, in->form.most);
+        groups = gd_cover(in->frame.groups, groups, in->frame.next, in->frame.form.most);
     for (uint32_t g = 0; g < groups && !status; g++)
-        status = look_at(in, &batch, &in->groups[g], err);
+        status = look_at(in, &batch, &in->frame.groups[g], err);
     for (uint32_t i = 0; i < count && !status; i++) {
         const struct lull_block *b = block_at(&batch, i);
-        const int again = in->past[b->id].spp == b->spp;
-        in->past[b->id] = in->pending[b->id];
+        const int again = in->frame.past[b->id].spp == b->spp;
+        in->frame.past[b->id] = in->frame.pending[b->id];
         if (!again)
-            log_response(in, b, &in->past[b->id]);
+            log_response(in, b, &in->frame.past[b->id]);
     }
     return status;
 }
 
 /* --- instance ---------------------------------------------------------------------------------------------------------- */
 
-static void frame_release(struct lull_instance *in)
+static void frame_release(struct frame *f)
 {
-    for (uint32_t i = 0; in->seen && i < in->workers; i++)
-        gd_block_view_release(&in->seen[i]);
-    gd_look_close(&in->look);
-    free(in->seen);
-    free(in->rect);
-    free(in->past);
-    free(in->sight);
-    free(in->asked);
-    free(in->groups);
-    free(in->next);
-    in->seen = NULL;
-    in->rect = NULL;
-    in->past = in->pending = NULL;
-    in->sight = NULL;
-    in->asked = NULL;
-    in->groups = NULL;
-    in->next = in->members = NULL;
-    in->workers = 0;
+    for (uint32_t i = 0; i < f->workers; i++)
+        gd_block_view_release(&f->seen[i]);
+    gd_look_close(&f->look);
+    free(f->seen);
+    free(f->rect);
+    free(f->past);
+    free(f->sight);
+    free(f->asked);
+    free(f->groups);
+    free(f->next);
+    *f = (struct frame){0};
 }
 
-static void blocks_create(struct lull_instance *fresh, const struct lull_frame *frame, struct base_err *why)
+static int blocks_create(struct frame *f, const struct lull_frame *frame, uint32_t workers, struct base_err *why)
 {
     const size_t n = frame->block_count;
-    fresh->rect = malloc(n * sizeof *fresh->rect);
-    fresh->past = calloc(2 * n, sizeof *fresh->past);
-    fresh->sight = calloc(n, sizeof *fresh->sight);
-    fresh->asked = calloc(n, sizeof *fresh->asked);
-    fresh->groups = malloc(n * sizeof *fresh->groups);
-    fresh->next = malloc(2 * n * sizeof *fresh->next);
-    if (!fresh->rect || !fresh->past || !fresh->sight || !fresh->asked || !fresh->groups || !fresh->next) {
-        base_fail_nomem(why, "the blocks");
-        return;
-    }
-    fresh->pending = fresh->past + n;
-    fresh->members = fresh->next + n;
+    f->seen = calloc(workers, sizeof *f->seen);
+    f->rect = malloc(n * sizeof *f->rect);
+    f->past = calloc(2 * n, sizeof *f->past);
+    f->sight = calloc(n, sizeof *f->sight);
+    f->asked = calloc(n, sizeof *f->asked);
+    f->groups = malloc(n * sizeof *f->groups);
+    f->next = malloc(2 * n * sizeof *f->next);
+    if (!f->seen || !f->rect || !f->past || !f->sight || !f->asked || !f->groups || !f->next)
+        return base_fail_nomem(why, "the blocks");
+    f->pending = f->past + n;
+    f->members = f->next + n;
     for (uint32_t i = 0; i < n; i++)
-        fresh->rect[i] = *lull_kit_rect(frame, i);
+        f->rect[i] = *lull_kit_rect(frame, i);
+    return 0;
 }
 
-/* Fills *fresh with what a frame needs. */
-static int32_t frame_create(const struct lull_instance *in, const struct lull_frame *frame, struct lull_instance *fresh,
+static int32_t frame_create(const struct lull_instance *in, const struct lull_frame *frame, struct frame *f,
                             struct lull_error *err)
 {
     const uint32_t workers = lull_kit_workers(&in->kit);
     struct base_err why = {0};
-    fresh->form = gd_form_of(frame, (enum lull_oidn_quality)(LULL_OIDN_FAST + (int)in->kit.value[P_QUALITY]), workers);
-    blocks_create(fresh, frame, &why);
-    fresh->seen = why.code ? NULL : calloc(workers, sizeof *fresh->seen);
-    if (!why.code && !fresh->seen)
-        base_fail_nomem(&why, "the blocks");
-    if (!why.code)
-        gd_look_open(&fresh->look, &fresh->form, in->library, &why);
-    for (uint32_t i = 0; !why.code && i < workers; i++)
-        if (!gd_block_view_create(&fresh->seen[i], &fresh->form, &why))
-            fresh->workers = i + 1;
-    if (!why.code)
+    *f = (struct frame){
+        .form = gd_form_of(frame, (enum lull_oidn_quality)(LULL_OIDN_FAST + (int)in->kit.value[P_QUALITY]), workers)};
+    int rc = blocks_create(f, frame, workers, &why);
+    if (!rc)
+        rc = gd_look_open(&f->look, &f->form, in->library, &why);
+    while (!rc && f->workers < workers)
+        if (!(rc = gd_block_view_create(&f->seen[f->workers], &f->form, &why)))
+            f->workers++;
+    if (!rc)
         return LULL_OK;
-    frame_release(fresh);
+    frame_release(f);
     return gp_fail_from(err, LULL_E_INTERNAL, "begin_frame", &why);
 }
 
 static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
 {
-    struct lull_instance fresh = {0};
+    struct frame fresh;
     int32_t status = lull_kit_frame_check(in, frame, err);
     if (!status)
         status = frame_create(in, frame, &fresh, err);
     if (status)
         return status;
-    frame_release(in);
-    in->form = fresh.form;
-    in->workers = fresh.workers;
-    in->look = fresh.look;
-    in->seen = fresh.seen;
-    in->rect = fresh.rect;
-    in->past = fresh.past;
-    in->pending = fresh.pending;
-    in->sight = fresh.sight;
-    in->asked = fresh.asked;
-    in->groups = fresh.groups;
-    in->next = fresh.next;
-    in->members = fresh.members;
+    frame_release(&in->frame);
+    in->frame = fresh;
     atomic_flag_clear(&in->warned);
     lull_kit_frame_open(in, frame);
     if ((frame->planes & AUXILIARY) != AUXILIARY)
@@ -383,7 +363,7 @@ static void end_frame(struct lull_instance *in)
 {
     if (!in)
         return;
-    frame_release(in);
+    frame_release(&in->frame);
     lull_kit_end_frame(in);
 }
 
@@ -397,7 +377,7 @@ static void destroy(struct lull_instance *in)
 
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
 {
-    return gp_check_block(b, &in->rect[b->id], in->past[b->id].spp, err);
+    return gp_check_block(b, &in->frame.rect[b->id], in->frame.past[b->id].spp, err);
 }
 
 static const struct lull_kit_rule rule = {
@@ -408,7 +388,7 @@ static const struct lull_kit_rule rule = {
 static uint64_t first_spp(const struct lull_instance *in)
 {
     const double given = in->kit.value[P_FIRST_SPP];
-    return (uint64_t)(isnan(given) ? fmin(fmax(128 / in->stop_error, 16), 64) : given);
+    return (uint64_t)(isnan(given) ? fmin(fmax(128 / in->viewer.stop_error, 16), 64) : given);
 }
 
 static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
@@ -433,9 +413,7 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
         return status;
     }
     atomic_flag_clear(&in->warned);
-    in->observer = ggn_observer_default;
-    in->stop_error = gp_stop_error(&in->kit, &in->observer, P_VISIBLE, P_ERROR);
-    gp_viewing_init(&in->viewing, &in->kit, P_FPS, P_PPD);
+    gp_viewer_init(&in->viewer, in->kit.value, P_VISIBLE, P_ERROR, P_FPS, P_PPD);
     in->kit.need.first_spp = first_spp(in);
     in->kit.need.halo = GD_REACH;
     in->kit.need.checks_hint = 5;
@@ -465,7 +443,7 @@ static int32_t state_save(const struct lull_instance *in, const struct lull_writ
     const struct state_header header = header_of(in);
     status = writer->write(writer, &header, sizeof header);
     if (!status)
-        status = writer->write(writer, in->past, in->kit.block_count * sizeof *in->past);
+        status = writer->write(writer, in->frame.past, in->kit.block_count * sizeof *in->frame.past);
     return status ? lull_kit_fail(err, status, "save: the host could not write it") : LULL_OK;
 }
 
@@ -489,12 +467,12 @@ static int32_t state_load(struct lull_instance *in, const struct lull_reader *re
     wanted = header_of(in);
     if (reader->read(reader, &header, sizeof header) != LULL_OK || memcmp(&header, &wanted, sizeof header) != 0)
         return lull_kit_fail(err, LULL_E_IO, "load: the state is that of another criterion or frame");
-    if (reader->read(reader, in->pending, in->kit.block_count * sizeof *in->pending) != LULL_OK)
+    if (reader->read(reader, in->frame.pending, in->kit.block_count * sizeof *in->frame.pending) != LULL_OK)
         return lull_kit_fail(err, LULL_E_IO, "load: the state ends early");
     for (uint32_t i = 0; i < in->kit.block_count; i++)
-        if (!plausible(&in->pending[i]))
+        if (!plausible(&in->frame.pending[i]))
             return lull_kit_fail(err, LULL_E_IO, "load: the state of block %u is none", i);
-    memcpy(in->past, in->pending, in->kit.block_count * sizeof *in->past);
+    memcpy(in->frame.past, in->frame.pending, in->kit.block_count * sizeof *in->frame.past);
     return LULL_OK;
 }
 
