@@ -217,27 +217,23 @@ static void set_input(const struct ggn_exec *e, int i, const real *const *planes
         ggn_exec_load(e, i, c, planes[c], e->graph->value[0].w);
 }
 
-/* 1 − SSIM of the denoised images to the references, its gradient into R's output. */
-static double denoiser_loss(struct ggn_trainer *t, const real *const *reference, int count)
+/* SSIM of R's answer to image i and its reference, of three planes; back: `share` of its gradient into R's output. */
+static double denoised_ssim(struct ggn_trainer *t, int i, const real *const *reference, int back, double share)
 {
     const int out = t->graph[GGN_NET_R].n_values - 1;
     const struct ggn_value *v = &t->graph[GGN_NET_R].value[out], *in = &t->graph[GGN_NET_R].value[0];
-    double total = 0;
+    const real *x[3], *y[3];
+    real *dx[3];
 
-    for (int i = 0; i < count; i++) {
-        const real *x[3], *y[3];
-        real *dx[3];
-        for (int c = 0; c < 3; c++) {
-            /* the input's gradient is not needed: its planes hold the reference in the layout of the output */
-            real *copy = ggn_exec_grad(t->r, 0, i, c);
-            ggn_plane_copy(in, copy, reference[3 * i + c], v->w);
-            x[c] = ggn_exec_plane(t->r, out, i, c);
-            dx[c] = ggn_exec_grad(t->r, out, i, c);
-            y[c] = copy;
-        }
-        total += ggn_ssim_mean(t->ssim, x, y, dx, 3, v->row, -1.0 / count);
+    for (int c = 0; c < 3; c++) {
+        /* the input's gradient is not needed: its planes hold the reference in the layout of the output */
+        real *copy = ggn_exec_grad(t->r, 0, i, c);
+        ggn_plane_copy(in, copy, reference[c], v->w);
+        x[c] = ggn_exec_plane(t->r, out, i, c);
+        dx[c] = ggn_exec_grad(t->r, out, i, c);
+        y[c] = copy;
     }
-    return 1 - total / count;
+    return ggn_ssim_mean(t->ssim, x, y, back ? dx : NULL, 3, v->row, share);
 }
 
 /* R on `count` images; *loss = mean of 1 − SSIM, whose gradient is left behind R's output. */
@@ -247,7 +243,10 @@ static int denoiser_forward(struct ggn_trainer *t, const real *const *x, int x_s
     for (int i = 0; i < count; i++)
         set_input(t->r, i, x + (size_t)i * (size_t)x_stride, 3);
     ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_TRAIN);
-    *loss = denoiser_loss(t, reference, count);
+    double total = 0;
+    for (int i = 0; i < count; i++)
+        total += denoised_ssim(t, i, reference + 3 * i, 1, -1.0 / count);
+    *loss = 1 - total / count;
     return check(t, GGN_NET_R, *loss, "loss", err);
 }
 
@@ -283,6 +282,16 @@ int ggn_trainer_denoiser_step(struct ggn_trainer *t, const real *const *x, const
     return rc;
 }
 
+void ggn_trainer_denoiser_losses(struct ggn_trainer *t, const real *const *x, const real *const *reference, int count,
+                                 double *loss)
+{
+    for (int i = 0; i < count; i++)
+        set_input(t->r, i, x + 3 * i, 3);
+    ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_EVAL);
+    for (int i = 0; i < count; i++)
+        loss[i] = 1 - denoised_ssim(t, i, reference + 3 * i, 0, 0);
+}
+
 /* Where a sample's map comes from: image step · sample + first of an executor. */
 struct maps {
     const struct ggn_exec *m;
@@ -305,32 +314,47 @@ static void exchange_maps(struct ggn_trainer *t, const struct maps of[2], int co
     }
 }
 
-/* The noise maps behind the maps in D's input, each with a plane that says whether there is one. */
-void ggn_trainer_set_noise_maps(struct ggn_trainer *t, const real *const *noise_maps, int count)
+/* What D is given beside the maps: noise maps, each with a plane that says whether there is one, and scalars. */
+static void set_measured(struct ggn_trainer *t, const struct ggn_batch *b)
 {
     const struct ggn_value *v = &t->graph[GGN_NET_D].value[0];
 
-    for (int i = 0; i < count && t->hyper.noise_map; i++) {
+    for (int i = 0; i < b->count && t->hyper.noise_map; i++) {
         real *noise_map = ggn_exec_plane(t->d, 0, i, 2), *flag = ggn_exec_plane(t->d, 0, i, 3);
         for (int y = 0; y < v->h; y++)
             for (int x = 0; x < v->w; x++) {
-                noise_map[y * v->row + x] = noise_maps[i] ? noise_maps[i][y * v->w + x] : 0;
-                flag[y * v->row + x] = noise_maps[i] ? 1 : 0;
+                noise_map[y * v->row + x] = b->noise_map[i] ? b->noise_map[i][y * v->w + x] : 0;
+                flag[y * v->row + x] = b->noise_map[i] ? 1 : 0;
             }
     }
+    for (int i = 0; i < b->count && t->hyper.scalars; i++)
+        memcpy(ggn_exec_plane(t->d, GGN_D_SCALARS, i, 0), b->scalars[i], (size_t)t->hyper.scalars * sizeof *b->scalars[i]);
 }
 
-void ggn_trainer_set_scalars(struct ggn_trainer *t, const real *const *scalars, int count)
-{
-    for (int i = 0; i < count && t->hyper.scalars; i++)
-        memcpy(ggn_exec_plane(t->d, GGN_D_SCALARS, i, 0), scalars[i], (size_t)t->hyper.scalars * sizeof *scalars[i]);
-}
-
-double ggn_trainer_answer(const struct ggn_trainer *t, int i, double law)
+/* D's answer to image i of its last forward pass: its logit, or with hyper.reach octaves: law + the correction. */
+static double answer(const struct ggn_trainer *t, int i, double law)
 {
     double z = (double)*ggn_exec_output(t->d, i, 0);
 
     return t->hyper.reach > 0 ? law + ggn_residual_correction(z, t->hyper.reach) : z;
+}
+
+void ggn_trainer_answers(struct ggn_trainer *t, const struct ggn_batch *b, double *answers)
+{
+    const int planes = 3 * t->hyper.window;
+
+    for (int channel = 0; channel < 2; channel++) { /* one window after the other: preset paper has no room for both */
+        const real *const *windows = channel ? b->noisy : b->denoised;
+        for (int i = 0; i < b->count; i++)
+            set_input(t->m, i, windows + (size_t)i * (size_t)planes, planes);
+        ggn_exec_forward(t->m, t->weights[GGN_NET_M], b->count, GGN_EVAL);
+        for (int i = 0; i < b->count; i++)
+            ggn_exec_load(t->d, i, channel, ggn_exec_output(t->m, i, 0), ggn_graph_output(t->m->graph)->row);
+    }
+    set_measured(t, b);
+    ggn_exec_forward(t->d, t->weights[GGN_NET_D], b->count, GGN_EVAL);
+    for (int i = 0; i < b->count; i++)
+        answers[i] = answer(t, i, t->hyper.reach > 0 ? b->law[i] : 0);
 }
 
 /* d logit / d network: 1, or of scale · (law + reach · tanh(z/reach)) scale · (1 − tanh²(z/reach)). */
@@ -338,7 +362,7 @@ static double slope_of(const struct ggn_trainer *t, int i)
 {
     if (t->hyper.reach <= 0)
         return 1;
-    double tame = ggn_trainer_answer(t, i, 0) / t->hyper.reach;
+    double tame = answer(t, i, 0) / t->hyper.reach;
     return t->options.scale * (1 - tame * tame);
 }
 
@@ -353,7 +377,7 @@ static double classify(struct ggn_trainer *t, const struct ggn_batch *b, double 
     t->d->dropout_seed = ggn_hash((uint32_t)t->steps, ggn_hash((uint32_t)t->adam_t[GGN_NET_D], t->options.seed));
     ggn_exec_forward(t->d, t->weights[GGN_NET_D], b->count, GGN_TRAIN);
     for (int i = 0; i < b->count; i++) {
-        z[i] = t->hyper.reach > 0 ? t->options.scale * ggn_trainer_answer(t, i, b->law[i]) : ggn_trainer_answer(t, i, 0);
+        z[i] = t->hyper.reach > 0 ? t->options.scale * answer(t, i, b->law[i]) : answer(t, i, 0);
         total += share * ggn_bce(z[i], b->label[i]);
         *ggn_exec_grad(t->d, out, i, 0) = (real)(share * slope_of(t, i) * ggn_bce_grad(z[i], b->label[i]));
     }
@@ -380,8 +404,7 @@ int ggn_trainer_classifier_step(struct ggn_trainer *t, const struct ggn_batch *b
     zero_grad(t, GGN_NET_D);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], 2 * b->count, GGN_TRAIN);
     exchange_maps(t, maps, b->count, 0);
-    ggn_trainer_set_noise_maps(t, b->noise_map, b->count);
-    ggn_trainer_set_scalars(t, b->scalars, b->count);
+    set_measured(t, b);
     *bce = classify(t, b, logits);
     rc = check(t, GGN_NET_D, *bce, "loss", err);
     if (rc)

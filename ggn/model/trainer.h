@@ -80,17 +80,18 @@ real *ggn_trainer_state(struct ggn_trainer *trainer, int net, int i, size_t *cou
 int ggn_trainer_denoiser_step(struct ggn_trainer *trainer, const real *const *x, const real *const *reference, int count,
                               double *loss, struct base_err *err);
 
+/* loss[count]: 1 − SSIM of what R makes of the images in evaluation mode. Pack the weights before. */
+void ggn_trainer_denoiser_losses(struct ggn_trainer *trainer, const real *const *x, const real *const *reference, int count,
+                                 double *loss);
+
 /* One Adam step of M and D on given denoised windows, mended form: both windows pass M in one batch (shared statistics), one
  * backward pass, all of M is trained. *bce = mean before it; logits (may be NULL) [count]. */
 int ggn_trainer_classifier_step(struct ggn_trainer *trainer, const struct ggn_batch *batch, double *bce, double *logits,
                                 struct base_err *err);
 
-/* D's answer to image i of the last forward pass of D: its logit, or with hyper.reach octaves: law + the correction. */
-double ggn_trainer_answer(const struct ggn_trainer *trainer, int i, double law);
-/* Puts scalars[count] into D's input, for who runs D without a step; nothing without hyper.scalars. */
-void ggn_trainer_set_scalars(struct ggn_trainer *trainer, const real *const *scalars, int count);
-/* Puts noise map[count] into D's input, for who runs D without a step; nothing without hyper.noise_map. */
-void ggn_trainer_set_noise_maps(struct ggn_trainer *trainer, const real *const *noise_map, int count);
+/* D's answers [count] to the batch in evaluation mode: logits, or with hyper.reach octaves, law + the correction. Pack the
+ * weights before. */
+void ggn_trainer_answers(struct ggn_trainer *trainer, const struct ggn_batch *batch, double *answers);
 
 /* One published iteration: six steps of R, one of D, one of M on the sum of two gradients without its last convolution. */
 struct ggn_paper_record {

@@ -52,9 +52,8 @@ typedef double real;
 #define ggn_trainer_state GGN_TYPED(ggn_trainer_state)
 #define ggn_trainer_denoiser_step GGN_TYPED(ggn_trainer_denoiser_step)
 #define ggn_trainer_classifier_step GGN_TYPED(ggn_trainer_classifier_step)
-#define ggn_trainer_set_noise_maps GGN_TYPED(ggn_trainer_set_noise_maps)
-#define ggn_trainer_set_scalars GGN_TYPED(ggn_trainer_set_scalars)
-#define ggn_trainer_answer GGN_TYPED(ggn_trainer_answer)
+#define ggn_trainer_denoiser_losses GGN_TYPED(ggn_trainer_denoiser_losses)
+#define ggn_trainer_answers GGN_TYPED(ggn_trainer_answers)
 #define ggn_trainer_paper_step GGN_TYPED(ggn_trainer_paper_step)
 
 #define ggn_tile_count GGN_TYPED(ggn_tile_count)

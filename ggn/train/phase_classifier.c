@@ -34,11 +34,12 @@ struct fill {
     const int *index; /* of the windows */
     uint64_t step;
     int augment, denoised;
+    double label[GGN_BATCH_MAX], law[GGN_BATCH_MAX]; /* of the samples, see ggn_batch */
 };
 
 static void fill_window(void *data, long i, int worker)
 {
-    const struct fill *f = data;
+    struct fill *f = data;
     const struct ggn_session *s = f->s;
     const struct ggn_window *w = &f->windows->list[f->index[i]];
     const struct ggn_level_series *c = &s->set.series[w->series];
@@ -47,6 +48,9 @@ static void fill_window(void *data, long i, int worker)
     struct ggn_augment augment =
         f->augment ? ggn_augment_draw(f->step, (int)i, ggn_session_seed(s) ^ 2, &how) : ggn_augment_none();
     float *at = s->buffer + (size_t)i * sample_values(s), *noise_map = at + 2 * window_values(s);
+
+    f->label[i] = w->label;
+    f->law[i] = s->hyper.reach > 0 ? ggn_session_law(s, c, w->last) : 0;
 
     ggn_window_planes(c, w->last, s->hyper.window, s->set.width, s->set.height, 0, &augment, difference(s), at);
     at += window_values(s);
@@ -63,20 +67,21 @@ static void fill_window(void *data, long i, int worker)
     if (s->hyper.scalars) {
         const int first = w->last - s->hyper.window + 1;
         float *scalars = noise_map + ggn_series_set_values(&s->set) - GGN_SCALARS;
-        ggn_measure_scalars(c->measure + first, c->spp + first, s->hyper.window, ggn_session_law(s, c, w->last), scalars);
+        ggn_measure_scalars(c->measure + first, c->spp + first, s->hyper.window, f->law[i], scalars);
         s->planes[(6 * (size_t)s->hyper.window + 1) * (size_t)s->plan->batch + (size_t)i] = scalars;
     }
     (void)worker;
 }
 
 /* Fills the buffer and the plane pointers: noisy windows first, then denoised ones (or references), then noise maps. */
-static struct ggn_batch fill_batch(struct ggn_session *s, const struct fill *f, int count)
+static struct ggn_batch fill_batch(struct fill *f, int count)
 {
+    const struct ggn_session *s = f->s;
     const size_t plane = (size_t)s->set.width * (size_t)s->set.height;
     const size_t planes = 3 * (size_t)s->hyper.window;
     const float **noisy = s->planes, **second = s->planes + planes * (size_t)s->plan->batch;
 
-    base_threads_for(s->threads, count, fill_window, (void *)(size_t)f);
+    base_threads_for(s->threads, count, fill_window, f);
     for (size_t i = 0; i < (size_t)count; i++)
         for (size_t k = 0; k < planes; k++) {
             noisy[i * planes + k] = s->buffer + i * sample_values(s) + k * plane;
@@ -90,52 +95,24 @@ static struct ggn_batch fill_batch(struct ggn_session *s, const struct fill *f, 
                               .denoised = f->denoised ? second : NULL,
                               .reference = f->denoised ? NULL : second,
                               .noise_map = second + planes * (size_t)s->plan->batch,
-                              .scalars = second + (planes + 1) * (size_t)s->plan->batch};
+                              .scalars = second + (planes + 1) * (size_t)s->plan->batch,
+                              .law = f->law,
+                              .label = f->label};
 }
 
 /* --- evaluation mode -------------------------------------------------------------------------------------------------- */
 
-/* NFM of `count` windows whose planes are given, into channel `channel` of D's input. */
-static void generate(struct ggn_session *s, const float *const *planes, int count, int channel)
-{
-    struct ggn_trainer *t = s->trainer;
-    const int n = 3 * s->hyper.window;
-
-    for (int i = 0; i < count; i++)
-        for (int k = 0; k < n; k++)
-            ggn_exec_load(t->m, i, k, planes[i * n + k], s->set.width);
-    ggn_exec_forward(t->m, t->weights[GGN_NET_M], count, GGN_EVAL);
-    for (int i = 0; i < count; i++)
-        ggn_exec_load(t->d, i, channel, ggn_exec_output(t->m, i, 0), ggn_graph_output(t->m->graph)->row);
-}
-
-/* With a residual, log2 of the law's error at the end of a window; else 0. */
-static double law_of(const struct ggn_session *s, const struct ggn_windows *windows, int index)
-{
-    const struct ggn_window *w = &windows->list[index];
-
-    return s->hyper.reach > 0 ? ggn_session_law(s, &s->set.series[w->series], w->last) : 0;
-}
-
 /* Raw logits of windows list[index[i]], i < n, with the weights as they are. */
 static void logits(struct ggn_session *s, const struct ggn_windows *windows, const int *index, int n, double *logit)
 {
-    struct ggn_trainer *t = s->trainer;
     const int most = s->plan->batch;
 
-    ggn_weights_pack(t->weights[GGN_NET_M], NULL);
-    ggn_weights_pack(t->weights[GGN_NET_D], NULL);
+    ggn_weights_pack(s->trainer->weights[GGN_NET_M], NULL);
+    ggn_weights_pack(s->trainer->weights[GGN_NET_D], NULL);
     for (int first = 0; first < n; first += most) {
-        int count = n - first < most ? n - first : most;
         struct fill f = {.s = s, .windows = windows, .index = index + first, .denoised = 1};
-        struct ggn_batch b = fill_batch(s, &f, count);
-        generate(s, b.denoised, count, 0);
-        generate(s, b.noisy, count, 1);
-        ggn_trainer_set_noise_maps(t, b.noise_map, count);
-        ggn_trainer_set_scalars(t, b.scalars, count);
-        ggn_exec_forward(t->d, t->weights[GGN_NET_D], count, GGN_EVAL);
-        for (int i = 0; i < count; i++)
-            logit[first + i] = ggn_trainer_answer(t, i, law_of(s, windows, index[first + i]));
+        struct ggn_batch b = fill_batch(&f, n - first < most ? n - first : most);
+        ggn_trainer_answers(s->trainer, &b, logit + first);
     }
 }
 
@@ -221,18 +198,13 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
 {
     const int paper = s->hyper.preset == GGN_PRESET_PAPER, n = s->plan->batch;
     int index[GGN_BATCH_MAX];
-    double label[GGN_BATCH_MAX], logit[GGN_BATCH_MAX], law[GGN_BATCH_MAX];
+    double logit[GGN_BATCH_MAX];
     struct ggn_paper_record record;
 
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < n; i++)
         index[i] = paper ? paper_window(s, step, i) : ggn_windows_draw(&s->train, step, i, ggn_session_seed(s));
-        label[i] = s->train.list[index[i]].label;
-        law[i] = law_of(s, &s->train, index[i]);
-    }
     struct fill f = {.s = s, .windows = &s->train, .index = index, .step = step, .augment = !paper, .denoised = !paper};
-    struct ggn_batch b = fill_batch(s, &f, n);
-    b.label = label;
-    b.law = law;
+    struct ggn_batch b = fill_batch(&f, n);
     double scale = paper ? 1 : ggn_session_lr(s, 1, step, steps);
     s->trainer->options.lr[GGN_NET_M] = s->trainer->options.lr[GGN_NET_D] = s->plan->lr * scale;
     s->trainer->options.lr[GGN_NET_R] = s->plan->lr_r * scale;

@@ -14,7 +14,7 @@ int ggn_phase_classifier(struct ggn_session *session, const char *checkpoint, st
 /* Windows of a list as the networks see them. */
 struct ggn_classified {
     int n;
-    double *logit, *label; /* [n] ggn_trainer_answer; label of the window; own */
+    double *logit, *label; /* [n] ggn_trainer_answers; label of the window; own */
     unsigned char *noisy;  /* [n] own */
     double auc;            /* NaN without both classes */
 };

@@ -68,53 +68,28 @@ static void fill_sample(void *data, long i, int worker)
     (void)worker;
 }
 
+/* Into the buffer, each crop and its reference; pointers to their planes: of all crops, then of the references. */
 static void fill_batch(struct ggn_session *s, enum ggn_split split, uint64_t step, uint32_t seed, int first, int count)
 {
     struct fill f = {s, split, step, seed, first};
+    const size_t plane = (size_t)s->crop * (size_t)s->crop;
 
     base_threads_for(s->threads, count, fill_sample, &f);
+    for (int i = 0; i < 3 * count; i++) {
+        s->planes[i] = s->buffer + ((size_t)(i / 3) * 6 + (size_t)(i % 3)) * plane;
+        s->planes[3 * s->plan->batch_r + i] = s->planes[i] + 3 * plane;
+    }
 }
 
 static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, double *loss, double *right,
                       struct base_err *err)
 {
     const int n = s->plan->batch_r;
-    const size_t plane = (size_t)s->crop * (size_t)s->crop;
-    const float **x = s->planes, **y = s->planes + 3 * (size_t)n;
 
     fill_batch(s, GGN_SPLIT_TRAIN, step, ggn_session_seed(s), 0, n);
-    for (int i = 0; i < 3 * n; i++) {
-        x[i] = s->buffer + ((size_t)(i / 3) * 6 + (size_t)(i % 3)) * plane;
-        y[i] = x[i] + 3 * plane;
-    }
     *right = (double)NAN;
     s->trainer->options.lr[GGN_NET_R] = ggn_session_lr(s, s->plan->lr_r, step, steps);
-    return ggn_trainer_denoiser_step(s->trainer, x, y, n, loss, err);
-}
-
-/* loss[count]: 1 − SSIM of the crops in the buffer. */
-static void evaluate(struct ggn_session *s, int count, double *loss)
-{
-    struct ggn_trainer *t = s->trainer;
-    const struct ggn_value *in = &t->r->graph->value[0];
-    const size_t plane = (size_t)s->crop * (size_t)s->crop;
-
-    for (int i = 0; i < count; i++)
-        for (int c = 0; c < 3; c++) {
-            const float *x = s->buffer + ((size_t)i * 6 + (size_t)c) * plane;
-            ggn_exec_load(t->r, i, c, x, in->w);
-            /* the input's gradient is not used here: its planes hold the reference in the output's layout */
-            ggn_plane_copy(in, ggn_exec_grad(t->r, 0, i, c), x + 3 * plane, in->w);
-        }
-    ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_EVAL);
-    for (int i = 0; i < count; i++) {
-        const float *x[3], *y[3];
-        for (int c = 0; c < 3; c++) {
-            x[c] = ggn_exec_output(t->r, i, c);
-            y[c] = ggn_exec_grad(t->r, 0, i, c);
-        }
-        loss[i] = 1 - ggn_ssim_mean(t->ssim, x, y, NULL, 3, in->row, 0);
-    }
+    return ggn_trainer_denoiser_step(s->trainer, s->planes, s->planes + 3 * n, n, loss, err);
 }
 
 /* Mean of 1 − SSIM over fixed crops of the validation scenes; NaN without any. */
@@ -127,7 +102,7 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_
     for (int first = 0; any && first < VALIDATION_CROPS; first += n) {
         int count = VALIDATION_CROPS - first < n ? VALIDATION_CROPS - first : n;
         fill_batch(s, GGN_SPLIT_VALIDATION, 0, VALIDATION_SEED, first, count);
-        evaluate(s, count, loss + first);
+        ggn_trainer_denoiser_losses(s->trainer, s->planes, s->planes + 3 * n, count, loss + first);
     }
     for (int i = 0; i < VALIDATION_CROPS; i++)
         total += loss[i];
