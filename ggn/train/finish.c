@@ -1,5 +1,4 @@
-#include "train/finish.h"
-
+/* The end of a training: calibration and stopping policy on the validation scenes, the model file and its card. */
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <string.h>
@@ -8,7 +7,7 @@
 #include "model/policy.h"
 #include "observer/observer.h"
 #include "train/fit_policy.h"
-#include "train/phase_classifier.h"
+#include "train/phase.h"
 #include "train/start.h"
 
 /* What a run is made of. The same data, options and seed give the same bytes, so nothing of time or place is in it. */
@@ -123,7 +122,7 @@ static int export(struct ggn_session *s, const struct ggn_policy *policy, const 
     for (int net = 0; net < GGN_NETS; net++)
         ggn_weights_copy(model->weights[net], net == GGN_NET_R ? s->r->params : s->trainer->weights[net]->params);
     if (s->hyper.preset == GGN_PRESET_LULL)
-        ggn_train_fold(&model->graph[GGN_NET_M], model->weights[GGN_NET_M]->params, s->hyper.window, s->plan->difference);
+        ggn_train_fold(&model->graph[GGN_NET_M], model->weights[GGN_NET_M]->params, s->hyper.window, s->plan->difference, 0);
     int failed = 0;
     base_json_item(model->provenance, "training", describe_run(s, &failed), &failed);
     base_json_item(model->provenance, "data", describe_data(s, &failed), &failed);

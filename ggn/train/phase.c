@@ -32,11 +32,11 @@ static int write_files(struct ggn_session *s, struct base_err *err)
 {
     char path[4096];
 
-    ggn_session_path(s, ".csv", path, sizeof path);
+    snprintf(path, sizeof path, "%s.csv", s->plan->out);
     int rc = ggn_log_write_csv(&s->log, path, err);
     if (rc)
         return rc;
-    ggn_session_path(s, ".ckpt", path, sizeof path);
+    snprintf(path, sizeof path, "%s.ckpt", s->plan->out);
     return ggn_resume_save(s, path, err);
 }
 

@@ -1,5 +1,4 @@
-#include "train/phase_classifier.h"
-
+/* Generator and discriminator, or all three networks of preset paper. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -346,7 +345,7 @@ static int begin(struct ggn_session *s, struct base_err *err)
             continue;
         ggn_weights_copy(w, s->init->weights[net]->params);
         if (net == GGN_NET_M && !paper)
-            ggn_train_unfold(w->graph, w->params, s->hyper.window, s->plan->difference);
+            ggn_train_fold(w->graph, w->params, s->hyper.window, s->plan->difference, 1);
         ggn_weights_pack(w, NULL);
     }
     if (!rc)

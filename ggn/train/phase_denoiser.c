@@ -1,5 +1,4 @@
-#include "train/phase_denoiser.h"
-
+/* The denoiser of preset lull. */
 #include <math.h>
 #include <string.h>
 

@@ -9,7 +9,8 @@
 
 enum { N_ROW = 10 };
 
-int ggn_resume_identity(const struct ggn_session *s, struct base_identity *to, struct base_err *err)
+/* The plan's options and the data: a checkpoint of another run is refused. */
+static int identify(const struct ggn_session *s, struct base_identity *to, struct base_err *err)
 {
     base_identity_append(to, &s->plan->identity);
     base_identity_add(to, "crop", "%d", s->crop);
@@ -38,6 +39,23 @@ static float *state_array(struct ggn_session *s, int i, size_t *count)
         return NULL;
     *count = s->trainer->graph[net_of[i]].n_learned;
     return s->best[net_of[i]];
+}
+
+/* Adds all arrays to a container, or reads them from one. */
+static int visit_arrays(struct ggn_session *s, struct ggn_container *c, int read, struct base_err *err)
+{
+    size_t count;
+    float *array;
+    int rc = 0;
+
+    for (int i = 0; !rc && (array = state_array(s, i, &count)); i++) {
+        char name[16];
+        int dim = (int)count;
+        snprintf(name, sizeof name, "%d", i);
+        rc = read ? ggn_container_get(c, name, 1, &dim, array, err)
+                  : ggn_container_add(c, name, GGN_F32, 1, &dim, array, err);
+    }
+    return rc;
 }
 
 /* --- JSON ------------------------------------------------------------------------------------------------------------- */
@@ -132,18 +150,12 @@ int ggn_resume_save(struct ggn_session *s, const char *path, struct base_err *er
 {
     struct ggn_container c = {0};
     struct base_identity identity = {0};
-    size_t count;
-    float *array;
-    int rc = ggn_resume_identity(s, &identity, err);
+    int rc = identify(s, &identity, err);
 
     if (!rc && !(c.json = describe(s, &identity)))
         rc = base_fail_nomem(err, "checkpoint");
-    for (int i = 0; !rc && (array = state_array(s, i, &count)); i++) {
-        char name[16];
-        int dim = (int)count;
-        snprintf(name, sizeof name, "%d", i);
-        rc = ggn_container_add(&c, name, GGN_F32, 1, &dim, array, err);
-    }
+    if (!rc)
+        rc = visit_arrays(s, &c, 0, err);
     if (!rc)
         rc = ggn_container_write(&c, path, err);
     base_identity_release(&identity);
@@ -191,7 +203,7 @@ static int compare(const struct ggn_session *s, const cJSON *root, const char *p
 
     if (!cJSON_IsString(saved))
         return base_fail(err, BASE_EINVAL, "%s: made by an earlier version of Lull: train anew, without --resume", path);
-    int rc = ggn_resume_identity(s, &identity, err);
+    int rc = identify(s, &identity, err);
     if (!rc)
         rc = base_identity_compare(&identity, saved->valuestring, strlen(saved->valuestring), path, &words, NULL, err);
     base_identity_release(&identity);
@@ -202,19 +214,13 @@ int ggn_resume_load(struct ggn_session *s, const char *path, struct base_err *er
 {
     struct ggn_container c = {0};
     cJSON *root = NULL;
-    size_t count;
-    float *array;
     int rc = read_file(path, &c, &root, err);
 
     if (rc)
         return rc;
     rc = compare(s, root, path, err);
-    for (int i = 0; !rc && (array = state_array(s, i, &count)); i++) {
-        char name[16];
-        int dim = (int)count;
-        snprintf(name, sizeof name, "%d", i);
-        rc = ggn_container_get(&c, name, 1, &dim, array, err);
-    }
+    if (!rc)
+        rc = visit_arrays(s, &c, 1, err);
     if (!rc)
         rc = restore(s, root, path, err);
     for (int net = 0; net < GGN_NETS && !rc; net++)

@@ -11,7 +11,5 @@ int ggn_resume_save(struct ggn_session *session, const char *path, struct base_e
 /* The phase first, so that the session can make the trainer of that phase; then the numbers. */
 int ggn_resume_phase(const char *path, int *phase, struct base_err *err);
 int ggn_resume_load(struct ggn_session *session, const char *path, struct base_err *err);
-/* The plan's options and the data: a checkpoint of another run is refused. */
-int ggn_resume_identity(const struct ggn_session *session, struct base_identity *to, struct base_err *err);
 
 #endif

@@ -21,11 +21,6 @@ uint32_t ggn_session_seed(const struct ggn_session *s)
     return ggn_hash(s->plan->seed, 1000 + (uint32_t)(10 * s->progress.divergences + s->progress.phase));
 }
 
-void ggn_session_path(const struct ggn_session *s, const char *suffix, char *path, size_t room)
-{
-    snprintf(path, room, "%s%s", s->plan->out, suffix);
-}
-
 double ggn_session_law(const struct ggn_session *s, const struct ggn_level_series *c, int k)
 {
     const size_t pixels = (size_t)s->set.width * (size_t)s->set.height;

@@ -8,7 +8,7 @@
 #include "model/model.h"
 #include "model/trainer.h"
 #include "train/log.h"
-#include "train/train_plan.h"
+#include "train/train.h"
 
 enum { GGN_PHASE_DENOISER, GGN_PHASE_CLASSIFIER };
 
@@ -62,7 +62,7 @@ double ggn_session_lr(const struct ggn_session *session, double lr, uint64_t ste
 double ggn_session_law(const struct ggn_session *session, const struct ggn_level_series *series, int k);
 /* Seed of the draws. */
 uint32_t ggn_session_seed(const struct ggn_session *session);
-/* plan->out + suffix. */
-void ggn_session_path(const struct ggn_session *session, const char *suffix, char *path, size_t room);
+/* With the weights of the best epoch: calibration and stopping policy on the validation scenes, model file and card. */
+int ggn_session_finish(struct ggn_session *session, struct base_err *err);
 
 #endif

@@ -10,12 +10,12 @@ static const struct ggn_tensor *tensor(const struct ggn_graph *g, const char *na
     return NULL;
 }
 
-static void change_basis(const struct ggn_graph *m, float *params, int window, double g, int fold)
+void ggn_train_fold(const struct ggn_graph *m, float *params, int window, double g, int back)
 {
     const struct ggn_tensor *t = &m->tensor[0]; /* [K, 3S, 3, 3] */
     const size_t taps = (size_t)t->dim[2] * (size_t)t->dim[3], in = (size_t)t->dim[1];
 
-    for (size_t o = 0; o < (size_t)t->dim[0]; o++)
+    for (size_t o = 0; g > 0 && o < (size_t)t->dim[0]; o++)
         for (size_t c = 0; c < 3; c++)
             for (size_t k = 0; k < taps; k++) {
                 float *w = params + t->offset + o * in * taps + k;
@@ -23,24 +23,12 @@ static void change_basis(const struct ggn_graph *m, float *params, int window, d
                 double sum = 0;
                 for (size_t s = 0; s + 1 < (size_t)window; s++) {
                     float *image = w + (3 * s + c) * taps;
-                    double plain = fold ? g * (double)*image : (double)*image;
+                    double plain = back ? (double)*image : g * (double)*image;
                     sum += plain;
-                    *image = (float)(fold ? plain : plain / g);
+                    *image = (float)(back ? plain / g : plain);
                 }
-                *newest = (float)((double)*newest + (fold ? -sum : sum));
+                *newest = (float)((double)*newest + (back ? sum : -sum));
             }
-}
-
-void ggn_train_fold(const struct ggn_graph *generator, float *params, int window, double g)
-{
-    if (g > 0)
-        change_basis(generator, params, window, g, 1);
-}
-
-void ggn_train_unfold(const struct ggn_graph *generator, float *params, int window, double g)
-{
-    if (g > 0)
-        change_basis(generator, params, window, g, 0);
 }
 
 /* Output channel o of a 3×3 convolution copies input channel i. */

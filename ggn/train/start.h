@@ -10,10 +10,9 @@
  * hundredth of the picture's contrast, and a network that has to learn the subtraction first learns little else. The map is
  * linear and invertible, so it can be folded into M's first convolution: with W' learned on the differences,
  *     W_k = g·W'_k (k < S),   W_S = W'_S − g·Σ_k W'_k
- * gives the same network on plain images. `unfold` is the inverse.
+ * gives the same network on plain images. `back`: the inverse. g 0: nothing to be done.
  */
-void ggn_train_fold(const struct ggn_graph *generator, float *params, int window, double g);
-void ggn_train_unfold(const struct ggn_graph *generator, float *params, int window, double g);
+void ggn_train_fold(const struct ggn_graph *generator, float *params, int window, double g, int back);
 
 /*
  * Makes R hand its input on: three channels of the first two convolutions, of skip 0 and of the last stage carry the picture

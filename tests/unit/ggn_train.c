@@ -31,7 +31,7 @@ static void folding_keeps_the_function(void **state)
     before[0] = w->params[10];
     for (int fold = 0; fold < 2; fold++) {
         if (fold)
-            ggn_train_fold(g, w->params, 3, 8);
+            ggn_train_fold(g, w->params, 3, 8, 0);
         ggn_weights_pack(w, NULL);
         for (int k = 0; k < 9; k++)
             for (int y = 0; y < 32; y++)
@@ -47,7 +47,7 @@ static void folding_keeps_the_function(void **state)
     }
     for (int i = 0; i < 32 * 32; i++)
         assert_float_equal(out[0][i], out[1][i], 1e-4);
-    ggn_train_unfold(g, w->params, 3, 8);
+    ggn_train_fold(g, w->params, 3, 8, 1);
     assert_float_equal(w->params[10], before[0], 1e-5);
     ggn_exec_destroy(e);
     ggn_weights_destroy(w);
