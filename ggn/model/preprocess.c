@@ -2,31 +2,18 @@
 
 #include <float.h>
 #include <math.h>
-#include <string.h>
 
 #include "base/colour.h"
 
-/* The cleaned value; counts what was cleaned. */
-static double clean(double value, struct ggn_pixel_counts *counts)
+/* The cleaned value. */
+static double clean(double value, long *bad)
 {
-    uint64_t bits;
-
     if (value >= (double)FLT_MIN && value <= (double)GGN_PIXEL_HUGE)
         return value; /* almost always */
-    memcpy(&bits, &value, sizeof bits);
-    if (bits << 1 == 0)
-        return 0;
-    if (isnan(value))
-        counts->nan++;
-    else if (isinf(value))
-        counts->infinite++;
-    else if (fabs(value) < (double)FLT_MIN)
-        counts->denormal++;
-    else if (value < 0)
-        counts->negative++;
-    else
-        counts->huge++;
-    return value > (double)GGN_PIXEL_HUGE ? 1 : 0;
+    const int huge = value > (double)GGN_PIXEL_HUGE;
+    if (bad)
+        *bad += huge || !isfinite(value);
+    return huge;
 }
 
 static unsigned code_by_formula(double value, const struct ggn_display *display)
@@ -36,15 +23,12 @@ static unsigned code_by_formula(double value, const struct ggn_display *display)
     return (unsigned)(255 * (encoded < 1 ? encoded : 1) + 0.5);
 }
 
-uint8_t ggn_preprocess(double linear, const struct ggn_display *display, struct ggn_pixel_counts *counts)
+uint8_t ggn_preprocess(double linear, const struct ggn_display *display, long *bad)
 {
-    struct ggn_pixel_counts uncounted = {0};
-    double value = clean(linear, counts ? counts : &uncounted);
+    double value = clean(linear, bad);
 
     if (!display)
         return base_srgb_code(value);
     value *= display->exposure;
     return display->transfer == GGN_TRANSFER_SRGB ? base_srgb_code(value) : (uint8_t)code_by_formula(value, display);
 }
-
-long ggn_pixel_counts_bad(const struct ggn_pixel_counts *counts) { return counts->nan + counts->infinite + counts->huge; }

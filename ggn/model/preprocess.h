@@ -2,9 +2,9 @@
  * From linear radiance to what the networks see: the one conversion that data, training and inference share.
  *
  * Linear value, times exposure, cleaned, transfer curve, rounded to 8 bits. Network inputs are these codes divided by 255.
- * Cleaning: NaN and −∞ and negative → 0, +∞ and values above GGN_PIXEL_HUGE → white, denormal as a float → 0; each kind is
- * counted, so that a block with broken pixels can be reported and is never called converged silently. Flush-to-zero modes
- * change nothing. Thread-safe.
+ * Cleaning: NaN and −∞ and negative → 0, +∞ and values above GGN_PIXEL_HUGE → white, denormal as a float → 0. What is
+ * broken is counted, so that a block with such pixels can be reported and is never called converged silently. Flush-to-zero
+ * modes change nothing. Thread-safe.
  */
 #ifndef GGN_MODEL_PREPROCESS_H
 #define GGN_MODEL_PREPROCESS_H
@@ -25,15 +25,9 @@ struct ggn_display {
     double gamma, exposure; /* > 0; gamma is for GGN_TRANSFER_GAMMA */
 };
 
-struct ggn_pixel_counts {
-    long nan, infinite, negative, huge, denormal; /* channel values, not pixels */
-};
-
-/* The code of one channel value. display: NULL is sRGB at exposure 1. *counts (may be NULL) is added to. */
-uint8_t ggn_preprocess(double linear, const struct ggn_display *display, struct ggn_pixel_counts *counts);
-
-/* Values that were not finite or absurdly large: a decision on such a block deserves a warning. */
-long ggn_pixel_counts_bad(const struct ggn_pixel_counts *counts);
+/* The code of one channel value. display: NULL is sRGB at exposure 1. *bad (may be NULL) counts values that are not finite or
+ * absurdly large: a decision on such a block deserves a warning. */
+uint8_t ggn_preprocess(double linear, const struct ggn_display *display, long *bad);
 
 #ifdef __cplusplus
 }

@@ -192,7 +192,7 @@ long gp_windowed_read(const struct gp_block_view *seen, uint8_t *out)
 {
     const struct lull_block *b = seen->block;
     const size_t w = (size_t)(b->x1 - b->x0), plane = w * (size_t)(b->y1 - b->y0);
-    struct ggn_pixel_counts counts = {0};
+    long bad = 0;
     struct lull_kit_span s;
 
     for (lull_kit_span_begin(&s, seen->view, b, LULL_PLANE_BIT(LULL_PLANE_COLOR)); lull_kit_span_next(&s);) {
@@ -200,9 +200,9 @@ long gp_windowed_read(const struct gp_block_view *seen, uint8_t *out)
         for (int32_t i = 0; i < s.count; i++)
             for (int c = 0; c < 3; c++)
                 to[(size_t)c * plane + (size_t)i] =
-                    ggn_preprocess(s.value[LULL_PLANE_COLOR][i][c], &seen->in->display, &counts);
+                    ggn_preprocess(s.value[LULL_PLANE_COLOR][i][c], &seen->in->display, &bad);
     }
-    return ggn_pixel_counts_bad(&counts);
+    return bad;
 }
 
 /* Logs once that a host asks further apart than the model has learned: its windows show other images. The law of a residual

@@ -222,18 +222,16 @@ static void test_cleaning(void **state)
 {
     const float bad[8] = {NAN, INFINITY, -INFINITY, -1, 1e30f, 1e-40f, -1e-40f, -0.0f};
     static const uint8_t want[8] = {0, 255, 0, 0, 255, 0, 0, 0};
-    struct ggn_pixel_counts counts = {0};
+    static const int counted[8] = {1, 2, 3, 3, 4, 4, 4, 4};
+    long count = 0;
 
-    for (int i = 0; i < 8; i++)
-        assert_int_equal(ggn_preprocess((double)bad[i], NULL, &counts), want[i]);
-    assert_int_equal(ggn_preprocess(0.5, NULL, &counts), 188);
+    for (int i = 0; i < 8; i++) {
+        assert_int_equal(ggn_preprocess((double)bad[i], NULL, &count), want[i]);
+        assert_int_equal(count, counted[i]);
+    }
+    assert_int_equal(ggn_preprocess(0.5, NULL, &count), 188);
     assert_int_equal(ggn_preprocess(1e300, NULL, NULL), 255);
-    assert_int_equal(counts.nan, 1);
-    assert_int_equal(counts.infinite, 2);
-    assert_int_equal(counts.negative, 1);
-    assert_int_equal(counts.huge, 1);
-    assert_int_equal(counts.denormal, 2);
-    assert_int_equal(ggn_pixel_counts_bad(&counts), 4);
+    assert_int_equal(count, 4);
     (void)state;
 }
 
