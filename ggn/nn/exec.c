@@ -10,26 +10,6 @@
 
 enum { ALIGN_BYTES = 64 };
 
-/* Of a worker: the lane sums of one weight gradient task, or one task of Winograd's form. Vectors have ≤ 64 bytes. */
-static size_t scratch_size(const struct ggn_graph *g, const struct ggn_kernels *k, int flags)
-{
-    size_t need = (size_t)GGN_TILE_MAX * GGN_GRAD_IC * 9 * (64 / sizeof(real)) + 256;
-
-    for (int i = 0; i < g->n_layers; i++) {
-        const struct ggn_layer *l = &g->layer[i];
-        const struct ggn_value *v = &g->value[l->out];
-        const int c_in = ggn_layer_c_in(g, l);
-        const size_t wino = ggn_wino_scratch(flags & GGN_EXEC_GRADS && v->c > c_in ? v->c : c_in);
-        if (l->op != GGN_OP_CONV || l->kernel != 3)
-            continue;
-        if (k->wino && ggn_wino_suits(c_in, v->c, v->h, v->w, k->lanes))
-            need = wino > need ? wino : need;
-        if (k->wino && flags & GGN_EXEC_GRADS && need < GGN_WINO_GRAD_SCRATCH)
-            need = GGN_WINO_GRAD_SCRATCH;
-    }
-    return (need + 15) / 16 * 16;
-}
-
 /* Where values start among the activations of one image; returns their total. */
 static size_t place_values(const struct ggn_graph *g, int flags, size_t offset[GGN_MAX_LAYERS + 1])
 {
@@ -40,63 +20,66 @@ static size_t place_values(const struct ggn_graph *g, int flags, size_t offset[G
     return g->n_acts;
 }
 
-/* Most channels that a batch norm has. */
-static size_t most_normed(const struct ggn_graph *g)
+static size_t most(size_t a, size_t b) { return a > b ? a : b; }
+
+/* Elements of each kind, and the bytes of all but the executor itself. */
+struct room {
+    size_t acts, scratch, leaf, sums; /* of all images, one worker, one image, all images */
+    size_t bytes;
+};
+
+static struct room room_for(const struct ggn_graph *g, const struct ggn_kernels *k, int capacity, int flags, int workers)
 {
-    int most = 0;
+    const int back = flags & GGN_EXEC_GRADS;
+    const size_t images = (size_t)capacity;
+    size_t offset[GGN_MAX_LAYERS + 1], normed = 0;
+    /* of a worker: the lane sums of one weight gradient task, or one task of Winograd's form; vectors have <= 64 bytes */
+    struct room r = {.acts = place_values(g, flags, offset) * images,
+                     .scratch = (size_t)GGN_TILE_MAX * GGN_GRAD_IC * 9 * (64 / sizeof(real)) + 256};
 
-    for (int i = 0; i < g->n_layers; i++)
-        if (g->layer[i].op == GGN_OP_BN && g->value[g->layer[i].out].c > most)
-            most = g->value[g->layer[i].out].c;
-    return (size_t)most;
-}
-
-/* Most weights of a convolution. */
-static size_t leaf_size(const struct ggn_graph *g, int flags)
-{
-    size_t most = 0;
-
-    for (int i = 0; i < g->n_layers && flags & GGN_EXEC_GRADS; i++) {
+    for (int i = 0; i < g->n_layers; i++) {
         const struct ggn_layer *l = &g->layer[i];
-        if (l->op == GGN_OP_CONV && ggn_conv_weights(g, l) > most)
-            most = ggn_conv_weights(g, l);
+        const struct ggn_value *v = &g->value[l->out];
+        const int c_in = ggn_layer_c_in(g, l);
+        if (l->op == GGN_OP_BN)
+            normed = most(normed, (size_t)v->c);
+        if (l->op == GGN_OP_CONV && back)
+            r.leaf = most(r.leaf, ggn_conv_weights(g, l));
+        if (l->op != GGN_OP_CONV || l->kernel != 3 || !k->wino)
+            continue;
+        if (ggn_wino_suits(c_in, v->c, v->h, v->w, k->lanes))
+            r.scratch = most(r.scratch, ggn_wino_scratch(back && v->c > c_in ? v->c : c_in));
+        if (back)
+            r.scratch = most(r.scratch, GGN_WINO_GRAD_SCRATCH);
     }
-    return most;
-}
-
-static size_t sum_values(const struct ggn_graph *g, int capacity) { return 2 * most_normed(g) * ((size_t)capacity + 1); }
-
-static size_t total_size(const struct ggn_graph *g, const struct ggn_kernels *k, int capacity, int flags, int workers)
-{
-    size_t offset[GGN_MAX_LAYERS + 1];
-    size_t acts = place_values(g, flags, offset) * (size_t)capacity;
-    return acts * (flags & GGN_EXEC_GRADS ? 2 : 1) + 2 * (g->n_stats + 16) + scratch_size(g, k, flags) * (size_t)workers +
-           leaf_size(g, flags) * (size_t)capacity;
+    r.scratch = (r.scratch + 15) / 16 * 16;
+    r.sums = 2 * normed * (images + 1);
+    r.bytes =
+        sizeof(real) * (r.acts * (back ? 2 : 1) + 2 * (g->n_stats + 16) + r.scratch * (size_t)workers + r.leaf * images);
+    return r;
 }
 
 size_t ggn_exec_bytes(const struct ggn_graph *g, int capacity, int flags, int workers)
 {
-    return total_size(g, ggn_kernels_best(), capacity, flags, workers) * sizeof(real) +
-           sum_values(g, capacity) * sizeof(double) + sizeof(struct ggn_exec);
+    const struct room r = room_for(g, ggn_kernels_best(), capacity, flags, workers);
+    return r.bytes + r.sums * sizeof(double) + sizeof(struct ggn_exec);
 }
 
-static void place_memory(struct ggn_exec *e, char *memory, int workers)
+static void place_memory(struct ggn_exec *e, char *memory, const struct room *r, int workers)
 {
     e->memory = memory;
     e->acts = (real *)(void *)(memory + (ALIGN_BYTES - (size_t)memory % ALIGN_BYTES) % ALIGN_BYTES);
     e->n_acts = place_values(e->graph, e->flags, e->offset);
-    size_t acts = e->n_acts * (size_t)e->capacity;
-    real *next = e->acts + acts;
+    e->scratch = e->acts + r->acts;
     if (e->flags & GGN_EXEC_GRADS) {
-        e->grads = next;
-        next += acts;
+        e->grads = e->scratch;
+        e->scratch += r->acts;
     }
-    e->scratch = next;
-    e->scratch_size = scratch_size(e->graph, e->kernels, e->flags);
-    e->bn_mean = e->scratch + e->scratch_size * (size_t)workers;
+    e->scratch_size = r->scratch;
+    e->bn_mean = e->scratch + r->scratch * (size_t)workers;
     e->bn_inv = e->bn_mean + e->graph->n_stats + 16;
     e->leaves = e->bn_inv + e->graph->n_stats + 16;
-    e->leaf_size = leaf_size(e->graph, e->flags);
+    e->leaf_size = r->leaf;
 }
 
 struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity, int flags,
@@ -104,10 +87,10 @@ struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn
 {
     const int workers = threads ? base_threads_count(threads) : 1;
     const struct ggn_kernels *k = kernels ? kernels : ggn_kernels_best();
-    size_t bytes = total_size(graph, k, capacity, flags, workers) * sizeof(real), sums = sum_values(graph, capacity);
+    const struct room room = room_for(graph, k, capacity, flags, workers);
     struct ggn_exec *e = calloc(1, sizeof *e);
     /* calloc: fresh pages are zero already, and the zero padding of the layout is never written with anything else */
-    char *memory = e ? calloc(1, bytes + ALIGN_BYTES) : NULL;
+    char *memory = e ? calloc(1, room.bytes + ALIGN_BYTES) : NULL;
 
     if (e)
         *e = (struct ggn_exec){.graph = graph,
@@ -116,13 +99,13 @@ struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn
                                .capacity = capacity,
                                .flags = flags,
                                .memory = memory,
-                               .sums = malloc((sums + 1) * sizeof *e->sums)};
+                               .sums = malloc((room.sums + 1) * sizeof *e->sums)};
     if (!memory || !e->sums) {
         ggn_exec_destroy(e);
         base_fail_nomem(err, "network activations");
         return NULL;
     }
-    place_memory(e, memory, workers);
+    place_memory(e, memory, &room, workers);
     return e;
 }
 
