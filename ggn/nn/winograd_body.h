@@ -114,8 +114,9 @@ static void forward_channel(float *v, const float *d, const struct block *b)
     }
 }
 
-/* m[o][ξ] = Σ_i u[i][o]·v[i] for `ot` output channels and nv vectors. */
-INLINE void multiply_tile(float *m, const float *u, const float *v, int n_in, int lanes, const int ot, const int nv)
+/* out[o·out_step] = Σ_i a[i·a_step + o]·b[i·b_step] for `ot` channels and nv vectors; `add`: to what is there. */
+INLINE void product_tile(float *out, long out_step, const float *a, long a_step, const float *b, long b_step, int n,
+                         const int ot, const int nv, const int add)
 {
     vf acc[TILE_OC][3];
 
@@ -123,14 +124,15 @@ INLINE void multiply_tile(float *m, const float *u, const float *v, int n_in, in
     for (int o = 0; o < ot; o++)
         UNROLL
     for (int k = 0; k < nv; k++)
-        acc[o][k] = SET1(0);
-    for (int i = 0; i < n_in; i++, u += ot, v += lanes) {
+        acc[o][k] = add ? LOAD(out + o * out_step + k * L) : SET1(0);
+    for (int i = 0; i < n; i++, a += a_step, b += b_step) {
         vf x[3];
         for (int k = 0; k < nv; k++)
-            x[k] = LOAD(v + k * L);
+            x[k] = LOAD(b + k * L);
         for (int o = 0; o < ot; o++) {
-            vf w = SET1(u[o]);
-            KEEP(w);
+            vf w = SET1(a[o]);
+            if (!add)
+                KEEP(w);
             for (int k = 0; k < nv; k++)
                 acc[o][k] = FMA(w, x[k], acc[o][k]);
         }
@@ -139,13 +141,17 @@ INLINE void multiply_tile(float *m, const float *u, const float *v, int n_in, in
     for (int o = 0; o < ot; o++)
         UNROLL
     for (int k = 0; k < nv; k++)
-        STORE(m + (long)o * XI * GGN_WINO_TILES + k * L, acc[o][k]);
+        STORE(out + o * out_step + k * L, acc[o][k]);
 }
 
+/* How many of so many vectors a tile takes: three, but no single one is left over. */
+INLINE int tile_vectors(int left) { return left == 4 ? 2 : left < 3 ? left : 3; }
+
+/* m[o][ξ] = Σ_i u[i][o]·v[i] */
 #define TILE(OT, NV) \
     static void multiply_##OT##_##NV(float *m, const float *u, const float *v, int n_in, int lanes) \
     { \
-        multiply_tile(m, u, v, n_in, lanes, OT, NV); \
+        product_tile(m, XI *GGN_WINO_TILES, u, OT, v, lanes, n_in, OT, NV, 0); \
     }
 #define TILES(OT) TILE(OT, 1) TILE(OT, 2) TILE(OT, 3)
 EACH_OT(TILES)
@@ -165,7 +171,7 @@ static void multiply(float *m, const float *u, const float *v, const struct ggn_
             const float *w = u + ((long)xi * a->n_out + oc) * a->n_in;
             float *to = m + ((long)(oc - oc0) * XI + xi) * GGN_WINO_TILES;
             for (int k = 0, nv; k < vectors; k += nv) {
-                nv = vectors - k == 4 ? 2 : vectors - k < 3 ? vectors - k : 3;
+                nv = tile_vectors(vectors - k);
                 tiles[ot - 1][nv - 1](to + k * L, w, v + xi * b->v_stride + k * L, a->n_in, b->lanes);
             }
         }
@@ -341,44 +347,17 @@ INLINE void transform_block(float *v, const float *const *plane, int n, const st
         }
 }
 
-/* u[o][CHANNELS] += Σ_t m[t][o]·v[t] for `ot` output channels and nv vectors of input channels. */
-INLINE void accumulate_tile(float *u, const float *m, const float *v, int tiles, const int ot, const int nv)
-{
-    vf acc[TILE_OC][3];
-
-    UNROLL
-    for (int o = 0; o < ot; o++)
-        UNROLL
-    for (int k = 0; k < nv; k++)
-        acc[o][k] = LOAD(u + o * CHANNELS + k * L);
-    for (int t = 0; t < tiles; t++, m += CHANNELS, v += CHANNELS) {
-        vf x[3];
-        for (int k = 0; k < nv; k++)
-            x[k] = LOAD(v + k * L);
-        for (int o = 0; o < ot; o++) {
-            vf w = SET1(m[o]);
-            for (int k = 0; k < nv; k++)
-                acc[o][k] = FMA(w, x[k], acc[o][k]);
-        }
-    }
-    UNROLL
-    for (int o = 0; o < ot; o++)
-        UNROLL
-    for (int k = 0; k < nv; k++)
-        STORE(u + o * CHANNELS + k * L, acc[o][k]);
-}
-
-/* All input channels of `ot` output channels. */
+/* u[o][CHANNELS] += Σ_t m[t][o]·v[t] for `ot` output channels and all vectors of input channels. */
 INLINE void accumulate_row(float *u, const float *m, const float *v, int tiles, int vectors, const int ot)
 {
     for (int k = 0, nv; k < vectors; k += nv) {
-        nv = vectors - k == 4 ? 2 : vectors - k < 3 ? vectors - k : 3;
+        nv = tile_vectors(vectors - k);
         if (nv == 3)
-            accumulate_tile(u + k * L, m, v + k * L, tiles, ot, 3);
+            product_tile(u + k * L, CHANNELS, m, CHANNELS, v + k * L, CHANNELS, tiles, ot, 3, 1);
         else if (nv == 2)
-            accumulate_tile(u + k * L, m, v + k * L, tiles, ot, 2);
+            product_tile(u + k * L, CHANNELS, m, CHANNELS, v + k * L, CHANNELS, tiles, ot, 2, 1);
         else
-            accumulate_tile(u + k * L, m, v + k * L, tiles, ot, 1);
+            product_tile(u + k * L, CHANNELS, m, CHANNELS, v + k * L, CHANNELS, tiles, ot, 1, 1);
     }
 }
 
