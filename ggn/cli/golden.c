@@ -48,14 +48,14 @@ static void add_nets(cJSON *to, const char *name, const double value[GGN_NETS], 
 
 static void add_train(cJSON *j, const struct ggn_golden_train *t, int *failed)
 {
-    add_array(j, "denoiser_loss", t->denoiser_loss, 6, failed);
-    add_number(j, "denoiser_grad_l2", t->denoiser_grad_l2, failed);
+    add_array(j, "denoiser_loss", t->step.denoiser_loss, 6, failed);
+    add_number(j, "denoiser_grad_l2", t->step.denoiser_grad_l2, failed);
     add_array(j, "d_prob_before", t->d_prob_before, 4, failed);
-    add_number(j, "bce_before", t->bce_before, failed);
-    add_number(j, "d_grad_l2", t->d_grad_l2, failed);
+    add_number(j, "bce_before", t->step.bce_before, failed);
+    add_number(j, "d_grad_l2", t->step.d_grad_l2, failed);
     add_array(j, "d_prob_after", t->d_prob_after, 4, failed);
-    add_number(j, "bce_after", t->bce_after, failed);
-    add_number(j, "m_grad_l2_accumulated", t->m_grad_l2_accumulated, failed);
+    add_number(j, "bce_after", t->step.bce_after, failed);
+    add_number(j, "m_grad_l2_accumulated", t->step.m_grad_l2_accumulated, failed);
     add_nets(j, "sum_params", t->sum_params, failed);
     add_nets(j, "sum_running_mean", t->sum_running_mean, failed);
     add_nets(j, "sum_running_var", t->sum_running_var, failed);

@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/trainer.h"
 #include "nn/loss.h"
 #include "nn/ssim.h"
 #include "nn/real.h"
@@ -189,20 +188,13 @@ static int train(struct state *s, struct ggn_golden_train *out, struct base_err 
 {
     static const double label[W_COUNT] = {1, 0, 1, 0};
     struct ggn_batch batch = {.count = W_COUNT, .noisy = s->noisy_plane, .reference = s->reference_plane, .label = label};
-    struct ggn_paper_record record;
-    int rc = ggn_trainer_paper_step(s->t, &batch, &record, err);
+    int rc = ggn_trainer_paper_step(s->t, &batch, &out->step, err);
 
     if (rc)
         return rc;
-    memcpy(out->denoiser_loss, record.denoiser_loss, sizeof out->denoiser_loss);
-    out->denoiser_grad_l2 = record.denoiser_grad_l2;
-    out->bce_before = record.bce_before;
-    out->bce_after = record.bce_after;
-    out->d_grad_l2 = record.d_grad_l2;
-    out->m_grad_l2_accumulated = record.m_grad_l2_accumulated;
     for (int i = 0; i < W_COUNT; i++) {
-        out->d_prob_before[i] = ggn_sigmoid(record.logit_before[i]);
-        out->d_prob_after[i] = ggn_sigmoid(record.logit_after[i]);
+        out->d_prob_before[i] = ggn_sigmoid(out->step.logit_before[i]);
+        out->d_prob_after[i] = ggn_sigmoid(out->step.logit_after[i]);
     }
     for (int net = 0; net < GGN_NETS; net++) {
         const struct ggn_weights *w = s->t->weights[net];

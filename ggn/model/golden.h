@@ -7,14 +7,13 @@
 #define GGN_MODEL_GOLDEN_H
 
 #include "base/threads.h"
-#include "model/networks.h"
+#include "model/trainer.h"
 
 enum { GGN_GOLDEN_WINDOWS = 4, GGN_GOLDEN_STAGES = 24 };
 
 struct ggn_golden_train {
-    double denoiser_loss[6], denoiser_grad_l2;
-    double d_prob_before[4], bce_before, d_grad_l2;
-    double d_prob_after[4], bce_after, m_grad_l2_accumulated;
+    struct ggn_paper_record step;
+    double d_prob_before[4], d_prob_after[4];
     double sum_params[GGN_NETS], sum_running_mean[GGN_NETS], sum_running_var[GGN_NETS];
 };
 

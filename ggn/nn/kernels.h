@@ -7,8 +7,6 @@
 #ifndef GGN_NN_KERNELS_H
 #define GGN_NN_KERNELS_H
 
-#include <stdint.h>
-
 #include "base/isa.h"
 #include "nn/real.h"
 

@@ -4,7 +4,6 @@
  * FASTER_FORMS.
  */
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
 #include "nn/graph.h"

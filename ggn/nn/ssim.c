@@ -157,11 +157,8 @@ static void ssim_plane(void *data, long i, int worker)
             exy[at + c] = x[c] * y[c];
         }
     }
-    blur_in_place(s, worker, mx);
-    blur_in_place(s, worker, my);
-    blur_in_place(s, worker, exx);
-    blur_in_place(s, worker, eyy);
-    blur_in_place(s, worker, exy);
+    for (int m = X; m <= XY; m++)
+        blur_in_place(s, worker, map_of(s, worker, m));
     for (int r = 0; r < s->h; r++)
         total += ssim_row(s, worker, (long)r * s->row);
     s->plane_sum[i] = total;

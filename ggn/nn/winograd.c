@@ -1,7 +1,5 @@
 #include "nn/winograd.h"
 
-#include <string.h>
-
 /* Measured: with fewer channels the transforms cost more than the products they save, with fewer tiles too many lanes are
  * empty. 8 lanes pay sooner than 16: their products take twice the time, what moves values about does not. */
 int ggn_wino_suits(int n_in, int n_out, int h, int w, int lanes)

@@ -319,9 +319,8 @@ static void frame_release(struct lull_instance *in)
 
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
 {
-    if (!has_room(in, gp_rect_of(b)))
-        return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
-    if (in->means.count && (size_t)lull_kit_pixels(b) * 3 != gp_means_values(&in->means, b->id))
+    if (!has_room(in, gp_rect_of(b)) ||
+        (in->means.count && (size_t)lull_kit_pixels(b) * 3 != gp_means_values(&in->means, b->id)))
         return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
     return LULL_OK;
 }

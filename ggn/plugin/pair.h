@@ -6,7 +6,6 @@
 #define GGN_PLUGIN_PAIR_H
 
 #include <stddef.h>
-#include <stdint.h>
 
 #include <lull/criterion_kit.h>
 

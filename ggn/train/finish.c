@@ -1,7 +1,6 @@
 /* The end of a training: calibration and stopping policy on the validation scenes, the model file and its card. */
 #include <cjson/cJSON.h>
 #include <math.h>
-#include <string.h>
 
 #include "base/json.h"
 #include "model/policy.h"

@@ -1,7 +1,6 @@
 /* Generator and discriminator, or all three networks of preset paper. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "figures/stats.h"
 #include "model/window.h"

@@ -1,6 +1,5 @@
 /* The denoiser of preset lull. */
 #include <math.h>
-#include <string.h>
 
 #include "nn/hash.h"
 #include "train/phase.h"

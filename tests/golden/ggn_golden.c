@@ -82,16 +82,16 @@ static void test_double(void **state)
     tolerance = DOUBLE_TOLERANCE;
     check_values(&g);
     for (int i = 0; i < 6; i++)
-        near("denoiser loss", g.train.denoiser_loss[i], loss[i]);
+        near("denoiser loss", g.train.step.denoiser_loss[i], loss[i]);
     for (int i = 0; i < 4; i++) {
         near("D before", g.train.d_prob_before[i], before[i]);
         near("D after", g.train.d_prob_after[i], after[i]);
     }
-    near("denoiser gradient", g.train.denoiser_grad_l2, 2.04341175370);
-    near("bce before", g.train.bce_before, 0.590592058240);
-    near("D gradient", g.train.d_grad_l2, 40.3696517922);
-    near("bce after", g.train.bce_after, 0.509938898595);
-    near("M gradient, accumulated", g.train.m_grad_l2_accumulated, 341.842505784);
+    near("denoiser gradient", g.train.step.denoiser_grad_l2, 2.04341175370);
+    near("bce before", g.train.step.bce_before, 0.590592058240);
+    near("D gradient", g.train.step.d_grad_l2, 40.3696517922);
+    near("bce after", g.train.step.bce_after, 0.509938898595);
+    near("M gradient, accumulated", g.train.step.m_grad_l2_accumulated, 341.842505784);
     near("sum of R", g.train.sum_params[0], 724.997300348);
     near("sum of M", g.train.sum_params[1], 985.666488556);
     near("sum of D", g.train.sum_params[2], 851.216414449);
