@@ -16,13 +16,6 @@ static double clean(double value, long *bad)
     return huge;
 }
 
-static unsigned code_by_formula(double value, const struct ggn_display *display)
-{
-    double encoded = display->transfer == GGN_TRANSFER_GAMMA ? pow(value, 1 / display->gamma) : value;
-
-    return (unsigned)(255 * (encoded < 1 ? encoded : 1) + 0.5);
-}
-
 uint8_t ggn_preprocess(double linear, const struct ggn_display *display, long *bad)
 {
     double value = clean(linear, bad);
@@ -30,5 +23,9 @@ uint8_t ggn_preprocess(double linear, const struct ggn_display *display, long *b
     if (!display)
         return base_srgb_code(value);
     value *= display->exposure;
-    return display->transfer == GGN_TRANSFER_SRGB ? base_srgb_code(value) : (uint8_t)code_by_formula(value, display);
+    if (display->transfer == GGN_TRANSFER_SRGB)
+        return base_srgb_code(value);
+    if (display->transfer == GGN_TRANSFER_GAMMA)
+        value = pow(value, 1 / display->gamma);
+    return (uint8_t)(255 * (value < 1 ? value : 1) + 0.5);
 }

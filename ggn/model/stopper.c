@@ -24,13 +24,6 @@ static double joins_at(const struct ggn_stop_rule *rule, const struct ggn_stoppe
     return last + (rule->reach > 0 ? NEARER_WITH_LAW : NEARER) * (ggn_policy_next(&rule->policy, last) - last);
 }
 
-static int due(const struct ggn_stop_rule *rule, const struct ggn_stopper *s, uint64_t spp)
-{
-    if ((double)spp < rule->policy.first_spp)
-        return 0;
-    return !s->used || (double)spp >= joins_at(rule, s);
-}
-
 static void push(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uint64_t spp)
 {
     if (s->used == (uint32_t)rule->window) {
@@ -47,7 +40,7 @@ int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uin
     if (spp && s->asked_spp == spp)
         return GGN_LOOK_NONE;
     s->asked_spp = spp;
-    if (due(rule, s, spp)) {
+    if ((double)spp >= rule->policy.first_spp && (!s->used || (double)spp >= joins_at(rule, s))) {
         s->verdict = nothing;
         push(rule, s, spp);
         return GGN_LOOK_IMAGE;

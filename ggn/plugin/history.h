@@ -2,7 +2,7 @@
  * What a criterion remembers of a frame: for each block what it keeps of the last S images it judged, keyed by spp.
  *
  * One allocation per frame. A block owns S + 1 slots: a new image goes into the spare one and becomes part of the history
- * only when the whole evaluate call has succeeded (gp_history_commit), so that a failed or cancelled call leaves no trace.
+ * only when the whole evaluate call has succeeded, so that a failed or cancelled call leaves no trace.
  * Tasks on different blocks may run at the same time; nothing else is thread-safe.
  */
 #ifndef GGN_PLUGIN_HISTORY_H

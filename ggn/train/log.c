@@ -25,14 +25,6 @@ void ggn_log_release(struct ggn_log *log)
     *log = (struct ggn_log){0};
 }
 
-static void put(FILE *f, double v, char after)
-{
-    if (isnan(v))
-        fprintf(f, "%c", after);
-    else
-        fprintf(f, "%.9g%c", v, after);
-}
-
 int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct base_err *err)
 {
     struct base_file_out out;
@@ -44,14 +36,14 @@ int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct base_e
           out.file);
     for (int i = 0; i < log->n; i++) {
         const struct ggn_log_row *r = &log->rows[i];
+        const double values[] = {r->step,           r->loss, r->accuracy, r->validation_loss, r->validation_accuracy,
+                                 r->validation_auc, r->lr};
         fprintf(out.file, "%s,", ggn_log_phases[r->phase]);
-        put(out.file, r->step, ',');
-        put(out.file, r->loss, ',');
-        put(out.file, r->accuracy, ',');
-        put(out.file, r->validation_loss, ',');
-        put(out.file, r->validation_accuracy, ',');
-        put(out.file, r->validation_auc, ',');
-        put(out.file, r->lr, ',');
+        for (size_t k = 0; k < sizeof values / sizeof values[0]; k++) {
+            if (!isnan(values[k]))
+                fprintf(out.file, "%.9g", values[k]);
+            fputc(',', out.file);
+        }
         fprintf(out.file, "%.1f,%.1f\n", r->seconds, r->processor_s);
     }
     return base_file_commit(&out, err);
