@@ -9,13 +9,6 @@ uint64_t gp_history_block_bytes(int window, struct gp_slot slot)
     return (uint64_t)(window + 1) * slot_bytes(slot) + 2 * sizeof(struct gp_head);
 }
 
-static void head_clear(struct gp_head *head, int window)
-{
-    memset(head, 0, sizeof *head);
-    for (int i = 0; i <= window; i++)
-        head->order[i] = (uint32_t)i;
-}
-
 int32_t gp_history_create(struct gp_history *history, int window, const struct lull_frame *frame,
                           struct gp_slot (*slot)(const void *of, int32_t width, int32_t height), const void *of,
                           struct lull_error *err)
@@ -27,32 +20,23 @@ int32_t gp_history_create(struct gp_history *history, int window, const struct l
         const struct lull_rect *r = lull_kit_rect(frame, i);
         bytes += (uint64_t)(window + 1) * slot_bytes(slot(of, r->x1 - r->x0, r->y1 - r->y0));
     }
-    uint64_t heads =
-        2 * n * sizeof(struct gp_head) + n * (sizeof(struct lull_rect) + sizeof(size_t) + sizeof(struct gp_slot)) + 256;
-    if (bytes > PTRDIFF_MAX - heads)
+    const uint64_t heads = n * sizeof(struct gp_history_block);
+    if (bytes > PTRDIFF_MAX - heads - 64)
         return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: the blocks are too large for memory");
     /* One piece of memory, so that no check allocates and a frame that is too large fails at its beginning. */
     unsigned char *memory = aligned_alloc(64, (size_t)((bytes + heads + 63) & ~(uint64_t)63));
     if (!memory)
         return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: no memory for the history of %u blocks", frame->block_count);
 
-    struct gp_history h = {.window = window, .count = frame->block_count, .memory = memory, .bytes = memory};
-    void *p = memory + bytes;
-    h.head = p;
-    h.pending = h.head + n;
-    p = h.pending + n;
-    h.at = p;
-    p = h.at + n;
-    h.slot = p;
-    p = h.slot + n;
-    h.rect = p;
+    struct gp_history h = {
+        .window = window, .count = frame->block_count, .block = (void *)(memory + bytes), .bytes = memory};
     size_t at = 0;
     for (uint32_t i = 0; i < frame->block_count; i++) {
-        h.rect[i] = *lull_kit_rect(frame, i);
-        h.slot[i] = slot(of, h.rect[i].x1 - h.rect[i].x0, h.rect[i].y1 - h.rect[i].y0);
-        h.at[i] = at;
-        at += (size_t)(window + 1) * slot_bytes(h.slot[i]);
-        head_clear(&h.head[i], window);
+        const struct lull_rect r = *lull_kit_rect(frame, i);
+        h.block[i] = (struct gp_history_block){.rect = r, .slot = slot(of, r.x1 - r.x0, r.y1 - r.y0), .at = at};
+        at += (size_t)(window + 1) * slot_bytes(h.block[i].slot);
+        for (uint32_t k = 0; k <= (uint32_t)window; k++)
+            h.block[i].head.order[k] = k;
     }
     *history = h;
     return LULL_OK;
@@ -60,18 +44,18 @@ int32_t gp_history_create(struct gp_history *history, int window, const struct l
 
 void gp_history_release(struct gp_history *history)
 {
-    free(history->memory);
+    free(history->bytes);
     *history = (struct gp_history){0};
 }
 
 void *gp_history_made(const struct gp_history *h, uint32_t id, uint32_t slot)
 {
-    return h->bytes + h->at[id] + slot * slot_bytes(h->slot[id]);
+    return h->bytes + h->block[id].at + slot * slot_bytes(h->block[id].slot);
 }
 
 void *gp_history_kept(const struct gp_history *h, uint32_t id, uint32_t slot)
 {
-    return (unsigned char *)gp_history_made(h, id, slot) + h->slot[id].made;
+    return (unsigned char *)gp_history_made(h, id, slot) + h->block[id].slot.made;
 }
 
 uint32_t gp_head_push(struct gp_head *head, int window, uint32_t before)
@@ -111,14 +95,14 @@ int32_t gp_history_save(const struct gp_history *h, uint32_t key, const struct l
     int32_t status = writer->write(writer, &header, sizeof header);
 
     for (uint32_t id = 0; !status && id < h->count; id++) {
-        struct gp_head head = h->head[id];
+        struct gp_head head = h->block[id].head;
 
         head.made = 0; /* computed again on demand: the same bytes, and a smaller file */
-        status = writer->write(writer, &h->rect[id], sizeof h->rect[id]);
+        status = writer->write(writer, &h->block[id].rect, sizeof h->block[id].rect);
         if (!status)
             status = writer->write(writer, &head, sizeof head);
         for (uint32_t i = 0; !status && i < head.stopper.used; i++)
-            status = writer->write(writer, gp_history_kept(h, id, head.order[i]), h->slot[id].kept);
+            status = writer->write(writer, gp_history_kept(h, id, head.order[i]), h->block[id].slot.kept);
     }
     return status ? lull_kit_fail(err, status, "state: the host could not write it") : LULL_OK;
 }
@@ -145,12 +129,12 @@ static int32_t load_blocks(struct gp_history *h, const struct ggn_stop_rule *rul
 
         if (reader->read(reader, &rect, sizeof rect) || reader->read(reader, &head, sizeof head))
             return lull_kit_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
-        if (memcmp(&rect, &h->rect[id], sizeof rect) || !head_valid(&head, rule))
+        if (memcmp(&rect, &h->block[id].rect, sizeof rect) || !head_valid(&head, rule))
             return lull_kit_fail(err, LULL_E_IO, "state: block %u does not fit the frame", id);
         for (uint32_t i = 0; i < head.stopper.used; i++)
-            if (reader->read(reader, gp_history_kept(h, id, head.order[i]), h->slot[id].kept))
+            if (reader->read(reader, gp_history_kept(h, id, head.order[i]), h->block[id].slot.kept))
                 return lull_kit_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
-        h->head[id] = head;
+        h->block[id].head = head;
     }
     return LULL_OK;
 }

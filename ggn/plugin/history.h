@@ -31,15 +31,18 @@ struct gp_head {
     uint32_t measured;            /* the last call has measured it */
 };
 
+struct gp_history_block {
+    struct gp_head head, pending;
+    struct lull_rect rect;
+    struct gp_slot slot; /* of each image */
+    size_t at;           /* where its slots begin in `bytes` */
+};
+
 struct gp_history {
-    int window;             /* S */
-    uint32_t count;         /* blocks */
-    struct lull_rect *rect; /* owns, with everything below, as one allocation */
-    size_t *at;             /* offset of the block's slots in `bytes` */
-    struct gp_slot *slot;   /* of each block */
-    struct gp_head *head, *pending;
-    unsigned char *bytes;
-    void *memory;
+    int window;                     /* S */
+    uint32_t count;                 /* blocks */
+    struct gp_history_block *block; /* behind the slots */
+    unsigned char *bytes;           /* owns all of it, as one allocation */
 };
 
 /* Bytes of one block with such slots. */

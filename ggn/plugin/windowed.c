@@ -222,15 +222,15 @@ static void log_late(struct lull_instance *in, const struct ggn_stopper *before,
     gp_say_once(&in->kit, LULL_LOG_WARNING, &in->late, text);
 }
 
-/* Fills in->history.pending[b->id] with the verdict on a checked block. */
+/* Fills in->history.block[b->id].pending with the verdict on a checked block. */
 static void read_block(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, uint32_t worker)
 {
-    struct gp_head *head = &in->history.pending[b->id];
+    struct gp_head *head = &in->history.block[b->id].pending;
     struct gp_block_view seen = {in, view, b, head, in->worker[worker < in->workers ? worker : 0]};
     struct ggn_evidence evidence = in->ops->evidence;
 
     evidence.data = &seen;
-    *head = in->history.head[b->id];
+    *head = in->history.block[b->id].head;
     const struct ggn_stopper before = head->stopper;
     const int what = ggn_stopper_ask(&in->rule, &head->stopper, b->spp);
     if (what == GGN_LOOK_IMAGE)
@@ -250,7 +250,7 @@ static void read_block(struct lull_instance *in, const struct lull_view *view, c
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                   struct lull_decision *d, uint32_t worker)
 {
-    const struct gp_head *head = &in->history.pending[b->id];
+    const struct gp_head *head = &in->history.block[b->id].pending;
     const struct ggn_verdict *v = &head->stopper.verdict;
 
     read_block(in, view, b, worker);
@@ -264,7 +264,7 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
 
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
 {
-    return gp_check_block(b, &in->history.rect[b->id], in->history.head[b->id].stopper.asked_spp, err);
+    return gp_check_block(b, &in->history.block[b->id].rect, in->history.block[b->id].head.stopper.asked_spp, err);
 }
 
 int32_t gp_windowed_evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
@@ -275,9 +275,9 @@ int32_t gp_windowed_evaluate(struct lull_instance *in, const struct lull_view *v
 
     for (uint32_t i = 0; i < count && !status; i++) { /* a call that failed leaves no trace */
         const struct lull_block *b = lull_kit_at(blocks, block_stride, i);
-        if (in->means.count && in->history.pending[b->id].measured)
+        if (in->means.count && in->history.block[b->id].pending.measured)
             gp_means_commit(&in->means, b->id);
-        in->history.head[b->id] = in->history.pending[b->id];
+        in->history.block[b->id].head = in->history.block[b->id].pending;
     }
     return status;
 }
@@ -307,7 +307,7 @@ static int32_t state_load(struct lull_instance *in, const struct lull_reader *re
     if (status)
         return status;
     struct lull_frame frame = {
-        .blocks = in->history.rect, .block_count = in->history.count, .block_stride = sizeof(struct lull_rect)};
+        .blocks = &in->history.block->rect, .block_count = in->history.count, .block_stride = sizeof *in->history.block};
     status = gp_history_create(&history, in->rule.window, &frame, in->ops->slot, in, err);
     if (!status)
         status = gp_history_load(&history, &in->rule, in->key, reader, err);
