@@ -35,7 +35,7 @@ double ggn_inference_logit(struct ggn_inference *inference, const uint8_t *const
                            const uint8_t *noise_map, const float *scalars, int width, int height);
 
 /* The same in double, without its rounding: for measurements; slow. graph, learned: [GGN_NETS]; graphs are borrowed until
- * destroy, learned are parameters and running statistics as struct ggn_weights of floats holds them (params, [n_learned]). */
+ * destroy, learned are params [n_learned] of struct ggn_weights of floats. */
 struct ggn_inference *ggn_inference_create_f64(const struct ggn_hyper *hyper, const struct ggn_graph *graph,
                                                const float *const *learned, struct base_err *err);
 void ggn_inference_destroy_f64(struct ggn_inference *inference);

@@ -25,8 +25,8 @@ struct ggn_display {
     double gamma, exposure; /* > 0; gamma is for GGN_TRANSFER_GAMMA */
 };
 
-/* The code of one channel value. display: NULL is sRGB at exposure 1. *bad (may be NULL) counts values that are not finite or
- * absurdly large: a decision on such a block deserves a warning. */
+/* The code of one channel value. display: NULL is sRGB at exposure 1. *bad (may be NULL) counts values that are not finite
+ * or absurdly large: a decision on such a block deserves a warning. */
 uint8_t ggn_preprocess(double linear, const struct ggn_display *display, long *bad);
 
 #ifdef __cplusplus

@@ -25,8 +25,8 @@ enum { GGN_FIXED_ONE = 65535, GGN_FIXED_NAN = 65535 };
 /* Whether none of the values is GGN_FIXED_NAN: a denoiser whose weights overflow must not look converged. */
 int ggn_fixed_is_finite(const uint16_t *values, size_t count);
 
-/* Copies the tile at (x0, y0) of a planar image into a planar tile, dst(c, y, x) = src · scale. dst_row and dst_plane
- * are the distances in elements between rows and planes of dst. Beyond the edge the image is reflected (… c b a | a b c …). */
+/* Copies the tile at (x0, y0) of a planar image into a planar tile, dst(c, y, x) = src · scale. dst_row and dst_plane are
+ * the distances in elements between rows and planes of dst. Beyond the edge the image is reflected (… c b a | a b c …). */
 void ggn_tile_load_u8(const uint8_t *src, int width, int height, int x0, int y0, int tile_w, int tile_h, real scale,
                       real *dst, size_t dst_row, size_t dst_plane);
 /* The same of an image of one plane. */

@@ -1,7 +1,7 @@
 /*
  * 3×3 convolution by Winograd's F(4×4, 3×3): 36 products per 16 outputs instead of 144. Once per instruction set: its file
- * (nn/kernels_*.c) defines before what moves values between lanes: deinterleave4, interleave4, shift_in, transpose, load_part
- * and store_part.
+ * (nn/kernels_*.c) defines before what moves values between lanes: deinterleave4, interleave4, shift_in, transpose,
+ * load_part and store_part.
  *
  * Lavin & Gray, "Fast Algorithms for Convolutional Neural Networks", CVPR 2016: Y = Aᵀ[(G g Gᵀ) ⊙ (Bᵀ d B)]A. Tiles of 4×4
  * outputs are numbered row by row; a task takes up to 64 of them. The lanes of a vector are consecutive tiles:

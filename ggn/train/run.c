@@ -1,3 +1,4 @@
+/* A training from beginning to end. */
 #include "train/train.h"
 
 #include <stdio.h>
