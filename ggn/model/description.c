@@ -30,27 +30,20 @@ enum {
     N_CALIBRATION = sizeof calibration_field / sizeof calibration_field[0]
 };
 
-static int get_preset(const cJSON *root, enum ggn_preset *out, struct base_err *err)
-{
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(root, "preset");
-
-    const int i =
-        cJSON_IsString(item) ? base_word_index(ggn_preset_names, item->valuestring, strlen(item->valuestring)) : -1;
-
-    if (i < 0)
-        return base_fail(err, BASE_EINVAL, "'preset' is neither \"paper\" nor \"lull\"");
-    *out = (enum ggn_preset)i;
-    return 0;
-}
-
 static int parse_root(const cJSON *root, struct ggn_description *d, struct base_err *err)
 {
     const cJSON *kind = cJSON_GetObjectItemCaseSensitive(root, "kind");
+    const cJSON *preset = cJSON_GetObjectItemCaseSensitive(root, "preset");
     const cJSON *calibration = cJSON_GetObjectItemCaseSensitive(root, "calibration");
+    const char *name = cJSON_IsString(preset) ? preset->valuestring : "";
+    const int index = base_word_index(ggn_preset_names, name, strlen(name));
+    int rc = 0;
 
     if (!cJSON_IsString(kind) || strcmp(kind->valuestring, "model") != 0)
         return base_fail(err, BASE_EINVAL, "not a model (its description has no \"kind\": \"model\")");
-    int rc = get_preset(root, &d->hyper.preset, err);
+    if (index < 0)
+        return base_fail(err, BASE_EINVAL, "'preset' is neither \"paper\" nor \"lull\"");
+    d->hyper.preset = (enum ggn_preset)index;
     for (size_t i = 0; i < N_HYPER && !rc; i++)
         rc = base_json_need_int(root, hyper_field[i].name, 1, 1 << 20,
                                 (int *)(void *)((char *)&d->hyper + hyper_field[i].at), err);

@@ -24,15 +24,6 @@ static double joins_at(const struct ggn_stop_rule *rule, const struct ggn_stoppe
     return last + (rule->reach > 0 ? NEARER_WITH_LAW : NEARER) * (ggn_policy_next(&rule->policy, last) - last);
 }
 
-static void push(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uint64_t spp)
-{
-    if (s->used == (uint32_t)rule->window) {
-        memmove(s->spp, s->spp + 1, (size_t)(rule->window - 1) * sizeof s->spp[0]);
-        s->used--;
-    }
-    s->spp[s->used++] = spp;
-}
-
 int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uint64_t spp)
 {
     const struct ggn_verdict nothing = {.p = (double)NAN, .predicted_spp = (double)NAN, .noise = (double)NAN};
@@ -42,7 +33,11 @@ int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uin
     s->asked_spp = spp;
     if ((double)spp >= rule->policy.first_spp && (!s->used || (double)spp >= joins_at(rule, s))) {
         s->verdict = nothing;
-        push(rule, s, spp);
+        if (s->used == (uint32_t)rule->window) {
+            s->used--;
+            memmove(s->spp, s->spp + 1, s->used * sizeof s->spp[0]);
+        }
+        s->spp[s->used++] = spp;
         return GGN_LOOK_IMAGE;
     }
     if (rule->reach > 0 && s->used && !s->verdict.stop) {
