@@ -132,46 +132,28 @@ static int log_add(struct lc_log *log, const struct lc_answer *answer)
 
 enum { GARBAGE = 0xa5 };
 
-/* Arrays with slack between the elements, as a newer host would have them. */
-struct ask_arrays {
-    char *blocks, *decisions, *view;
-    uint32_t block_stride, decision_stride;
-};
-
-static int ask_arrays_init(struct ask_arrays *a, const struct lc_session *s, const struct lc_image *image,
-                           const uint32_t *ids, uint32_t count)
+/* Elements of `size` bytes, with slack behind each, as a newer host would have them: those with these ids, NULL: the first.
+ * The caller frees it; NULL: no memory. */
+static char *spread(const void *from, size_t size, const uint32_t *ids, uint32_t count, uint32_t slack)
 {
-    a->block_stride = (uint32_t)sizeof(struct lull_block) + s->manner.slack;
-    a->decision_stride = (uint32_t)sizeof(struct lull_decision) + s->manner.slack;
-    a->blocks = malloc((size_t)count * a->block_stride + 1);
-    a->decisions = malloc((size_t)count * a->decision_stride + 1);
-    a->view = malloc(sizeof image->view + s->manner.slack);
-    if (!a->blocks || !a->decisions || !a->view)
-        return -1;
-    struct lull_view view = image->view;
-    view.struct_size += s->manner.slack;
-    memset(a->view, GARBAGE, sizeof view + s->manner.slack);
-    memcpy(a->view, &view, sizeof view);
-    memset(a->blocks, GARBAGE, (size_t)count * a->block_stride);
-    memset(a->decisions, GARBAGE, (size_t)count * a->decision_stride);
-    for (uint32_t i = 0; i < count; i++) {
-        struct lull_decision preset;
-        lc_decision_preset(&preset);
-        memcpy(a->blocks + (size_t)i * a->block_stride, &s->film.blocks[ids[i]], sizeof(struct lull_block));
-        memcpy(a->decisions + (size_t)i * a->decision_stride, &preset, sizeof preset);
-    }
-    return 0;
+    const size_t stride = size + slack;
+    char *to = malloc(count * stride + 1);
+    if (to)
+        memset(to, GARBAGE, count * stride);
+    for (uint32_t i = 0; to && i < count; i++)
+        memcpy(to + i * stride, (const char *)from + (ids ? ids[i] : i) * size, size);
+    return to;
 }
 
-static void ask_arrays_take(struct lc_session *s, const struct ask_arrays *a, const uint32_t *ids, uint32_t count,
-                            struct lull_decision *decisions)
+static void take_decisions(struct lc_session *s, const char *at, const uint32_t *ids, uint32_t count,
+                           struct lull_decision *decisions)
 {
-    for (uint32_t i = 0; i < count; i++) {
-        const char *at = a->decisions + (size_t)i * a->decision_stride;
+    const size_t stride = sizeof *decisions + s->manner.slack;
+    for (uint32_t i = 0; i < count; i++, at += stride) {
         memcpy(&decisions[ids[i]], at, sizeof *decisions);
-        for (uint32_t k = (uint32_t)sizeof *decisions; k < a->decision_stride; k++)
+        for (size_t k = sizeof *decisions; k < stride; k++)
             if (!LC_EXPECT(s->check, (unsigned char)at[k] == GARBAGE,
-                           "evaluate wrote past the end of a decision (stride %u)", a->decision_stride))
+                           "evaluate wrote past the end of a decision (stride %zu)", stride))
                 break;
     }
 }
@@ -180,23 +162,27 @@ static void ask_arrays_take(struct lc_session *s, const struct ask_arrays *a, co
 static int32_t ask_some(struct lc_session *s, const struct lc_image *image, const uint32_t *ids, uint32_t count,
                         struct lull_decision *decisions, struct lull_error *err)
 {
-    struct ask_arrays a = {0};
+    const uint32_t slack = s->manner.slack;
+    struct lull_view v = image->view;
+    v.struct_size += slack;
+    for (uint32_t i = 0; i < count; i++)
+        lc_decision_preset(&decisions[ids[i]]);
+    void *view = spread(&v, sizeof v, NULL, 1, slack), *out = spread(decisions, sizeof *decisions, ids, count, slack);
+    void *blocks = spread(s->film.blocks, sizeof *s->film.blocks, ids, count, slack);
     int32_t status = LULL_E_MEMORY;
-    if (ask_arrays_init(&a, s, image, ids, count) == 0) {
+    if (view && blocks && out) {
         struct lull_process_state before;
         lull_process_state_read(&before);
-        const void *blocks = a.blocks, *view = a.view;
-        void *out = a.decisions;
-        status =
-            s->check->criterion->evaluate(s->instance, view, blocks, a.block_stride, out, a.decision_stride, count, err);
+        status = s->check->criterion->evaluate(s->instance, view, blocks, (uint32_t)sizeof *s->film.blocks + slack, out,
+                                               (uint32_t)sizeof *decisions + slack, count, err);
         const char *changed = lull_process_state_restore(&before);
         LC_EXPECT(s->check, !changed, "evaluate changed %s", changed);
         if (status == LULL_OK)
-            ask_arrays_take(s, &a, ids, count, decisions);
+            take_decisions(s, out, ids, count, decisions);
     }
-    free(a.blocks);
-    free(a.decisions);
-    free(a.view);
+    free(view);
+    free(blocks);
+    free(out);
     return status;
 }
 
@@ -288,28 +274,23 @@ int lc_session_judge(struct lc_session *s, const struct lc_image *image, struct 
 /* A frame struct with a tail, and rectangles with gaps, as the manner asks for. */
 static int32_t begin_with_slack(struct lc_session *s, uint32_t flags, struct lull_error *err)
 {
-    uint32_t slack = s->manner.slack, stride = (uint32_t)sizeof(struct lull_rect) + slack;
-    char *frame_memory = malloc(sizeof(struct lull_frame) + slack);
-    char *rects = malloc((size_t)s->film.block_count * stride);
+    const uint32_t slack = s->manner.slack, count = s->film.block_count;
+    struct lull_frame f;
+    lc_film_frame(&s->film, &f, s->planes);
+    f.struct_size += slack;
+    f.flags |= s->manner.frame_flags | flags;
+    f.block_stride += slack;
+    void *rects = spread(s->film.rects, sizeof *s->film.rects, NULL, count, slack);
+    f.blocks = rects;
+    void *frame = spread(&f, sizeof f, NULL, 1, slack);
     int32_t status = LULL_E_MEMORY;
-    if (frame_memory && rects) {
-        memset(frame_memory, GARBAGE, sizeof(struct lull_frame) + slack);
-        memset(rects, GARBAGE, (size_t)s->film.block_count * stride);
-        for (uint32_t i = 0; i < s->film.block_count; i++)
-            memcpy(rects + (size_t)i * stride, &s->film.rects[i], sizeof(struct lull_rect));
-        struct lull_frame frame;
-        lc_film_frame(&s->film, &frame, s->planes);
-        frame.struct_size += slack;
-        frame.flags |= s->manner.frame_flags | flags;
-        frame.blocks = (const struct lull_rect *)(const void *)rects;
-        frame.block_stride = stride;
-        memcpy(frame_memory, &frame, sizeof frame);
-        status = lc_begin(s->check, s->instance, (const struct lull_frame *)(const void *)frame_memory, err);
+    if (frame && rects) {
+        status = lc_begin(s->check, s->instance, frame, err);
         /* what begin_frame was given is gone now: a criterion that kept a pointer reads garbage */
-        memset(frame_memory, GARBAGE, sizeof frame + slack);
-        memset(rects, GARBAGE, (size_t)s->film.block_count * stride);
+        memset(frame, GARBAGE, sizeof f + slack);
+        memset(rects, GARBAGE, (size_t)count * f.block_stride);
     }
-    free(frame_memory);
+    free(frame);
     free(rects);
     return status;
 }
