@@ -88,7 +88,6 @@ struct lc_film {
     struct lull_rect *rects;       /* owns, [block_count] */
     struct lull_block *blocks;     /* owns, [block_count]: state */
     double *sum[LULL_PLANE_COUNT]; /* owns: sums over samples, [height][width][channels]; SPP and WEIGHT unused */
-    double *half_sum;              /* owns: for HALF */
     void (*paint)(double rgb[3], double *sigma, int32_t x, int32_t y); /* truth and relative noise; NULL = a default */
 };
 

@@ -22,8 +22,7 @@ static int film_alloc(struct lc_film *f)
     size_t pixels = (size_t)f->width * (size_t)f->height;
     f->rects = calloc(f->block_count, sizeof *f->rects);
     f->blocks = calloc(f->block_count, sizeof *f->blocks);
-    f->half_sum = calloc(pixels * 3, sizeof(double));
-    int ok = f->rects && f->blocks && f->half_sum;
+    int ok = f->rects && f->blocks;
     for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
         f->sum[p] = calloc(pixels * lc_plane_channels[p], sizeof(double));
         ok = ok && f->sum[p];
@@ -61,7 +60,6 @@ void lc_film_release(struct lc_film *f)
 {
     for (unsigned p = 0; p < LULL_PLANE_COUNT; p++)
         free(f->sum[p]);
-    free(f->half_sum);
     free(f->rects);
     free(f->blocks);
     *f = (struct lc_film){0};
@@ -106,7 +104,7 @@ static void add_samples(struct lc_film *f, int32_t x, int32_t y, uint64_t from, 
         double sum = rgb[c] * (n + sigma * sqrt(n) * noise);
         f->sum[LULL_PLANE_COLOR][at * 3 + c] += sum;
         if (half)
-            f->half_sum[at * 3 + c] += sum;
+            f->sum[LULL_PLANE_HALF][at * 3 + c] += sum;
         f->sum[LULL_PLANE_ALBEDO][at * 3 + c] += 0.5 * n;
         f->sum[LULL_PLANE_NORMAL][at * 3 + c] += (c == 2 ? -1 : 0) * n;
     }
@@ -139,8 +137,7 @@ static double estimate_in(const struct lc_film *f, const struct lull_block *b, u
     if (plane == LULL_PLANE_WEIGHT)
         return (double)b->spp * (at % 3 == 0 ? 2 : 1);
     double n = (double)(plane == LULL_PLANE_HALF ? b->half_spp : b->spp);
-    const double *sum = plane == LULL_PLANE_HALF ? f->half_sum : f->sum[plane];
-    double value = n > 0 ? sum[at * lc_plane_channels[plane] + channel] / n : 0;
+    double value = n > 0 ? f->sum[plane][at * lc_plane_channels[plane] + channel] / n : 0;
     return fmin(fmax(rint(value * 256) / 256, -7), 7);
 }
 
