@@ -43,23 +43,55 @@ __attribute__((format(printf, 2, 3))) void lc_doing(struct lc *c, const char *fo
 
 #define LC_EXPECT(c, condition, ...) ((condition) ? 1 : (lc_fail((c), __VA_ARGS__), 0))
 
-struct lc_check {
-    const char *name;
-    const char *title;
-    void (*run)(struct lc *c);
-};
+/* Every check in the order of the report: lc_check_FUNCTION, its name, what it holds a criterion to. The first
+ * LC_WITHOUT_INSTANCE need none. */
+#define LC_CHECKS(X) \
+    X(symbols, "symbols", "exports the entry and nothing else") \
+    X(load, "load", "loading leaves floating point, threads and signals alone") \
+    X(entry, "entry", "the entry ends its list with NULL, also far out") \
+    X(table, "table", "the static table is complete") \
+    X(unknown_key, "unknown-key", "an unknown key is refused and named") \
+    X(params, "parameters", "defaults are accepted, bad values refused and named") \
+    X(null, "null", "NULL host, NULL error, a host of NULLs") \
+    X(requirements, "requirements", "requirements are complete and make sense") \
+    X(older, "older-host", "reads and writes nothing past structs of version 1.0") \
+    X(too_short, "short-structs", "structs shorter than 1.0 are refused") \
+    X(newer, "newer-host", "longer structs and wider strides change nothing") \
+    X(strides, "strides", "negative, interleaved and planar strides give the same answers") \
+    X(types, "types", "f16, f64, u32 and scaled values give the same answers") \
+    X(normalisers, "normalisers", "sums and weighted sums give the same answers") \
+    X(window, "window", "a view that does not begin at the origin") \
+    X(missing, "missing-planes", "required planes are missed, others are not") \
+    X(broken_planes, "broken-planes", "planes of an unknown form are refused") \
+    X(values, "bad-values", "NaN, infinite, negative and huge pixels") \
+    X(flat, "flat", "black, constant and half black blocks") \
+    X(firefly, "firefly", "a block is not stopped while a pixel hangs on one sample") \
+    X(no_samples, "no-samples", "blocks without samples continue") \
+    X(order, "order", "calls out of order are refused and do no harm") \
+    X(zero_blocks, "zero-blocks", "no blocks to judge") \
+    X(shapes, "shapes", "1x1 frames, 1x1 blocks, blocks at the edge") \
+    X(block_size, "block-size", "blocks of another size") \
+    X(invalid, "invalid", "senseless frames and blocks are refused and do no harm") \
+    X(restart, "restart", "RESTART forgets") \
+    X(final, "final", "blocks that get no more samples") \
+    X(cancel, "cancel", "cancelled calls do no harm") \
+    X(repeat, "repeat", "the same question gets the same answer and leaves no trace") \
+    X(batch, "batch", "an answer does not depend on the blocks beside it") \
+    X(two, "two-instances", "two instances do not know of each other") \
+    X(workers, "workers", "any number of workers, tasks in any order") \
+    X(concurrent, "concurrent", "concurrent evaluate calls on one instance") \
+    X(instances, "instances", "concurrent instances") \
+    X(fp, "fp", "floating-point control and threads are left alone, FTZ and DAZ tolerated") \
+    X(state, "state", "lull.state/1: saved, loaded, cut short, damaged") \
+    X(misuse, "misuse", "random calls outside the rules are refused and leave no trace") \
+    X(leaks, "leaks", "create and destroy, frames, failures: what is left does not grow with their number") \
+    X(out_of_memory, "out-of-memory", "create and begin_frame survive every failing allocation") \
+    X(evaluate_allocates, "evaluate-allocates", "evaluate allocates nothing") \
+    X(time, "time", "time per block")
+enum { LC_WITHOUT_INSTANCE = 4 };
 
-/* One table per file of checks, ended by a NULL name. */
-extern const struct lc_check lc_table_checks[];
-extern const struct lc_check lc_create_checks[];
-extern const struct lc_check lc_struct_checks[];
-extern const struct lc_check lc_pixel_checks[];
-extern const struct lc_check lc_life_checks[];
-extern const struct lc_check lc_batch_checks[];
-extern const struct lc_check lc_thread_checks[];
-extern const struct lc_check lc_state_checks[];
-extern const struct lc_check lc_misuse_checks[];
-extern const struct lc_check lc_cost_checks[];
+#define LC_DECLARE(function, name, title) void lc_check_##function(struct lc *c);
+LC_CHECKS(LC_DECLARE)
 
 /* --- host -------------------------------------------------------------------------------------------------------------- */
 

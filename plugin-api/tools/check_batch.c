@@ -4,7 +4,7 @@
  */
 #include "check.h"
 
-static void check_repeat(struct lc *c)
+void lc_check_repeat(struct lc *c)
 {
     struct lc_manner twice = {.ask = LC_ASK_TWICE};
     if (!lc_deterministic(c))
@@ -18,7 +18,7 @@ static void check_repeat(struct lc *c)
     lc_run_both(c, &nominal, invariant ? &nominal_singly : &nominal, "blocks of the size it was made for, once more");
 }
 
-static void check_batch(struct lc *c)
+void lc_check_batch(struct lc *c)
 {
     if (!(c->criterion->capabilities & LULL_CAP_BATCH_INVARIANT)) {
         lc_skip(c, "it does not declare BATCH_INVARIANT");
@@ -30,7 +30,7 @@ static void check_batch(struct lc *c)
 }
 
 /* Two instances whose calls alternate, on different pictures. */
-static void check_two(struct lc *c)
+void lc_check_two(struct lc *c)
 {
     struct lc_manner one = {.seed = 1}, two = {.seed = 2};
     struct lc_log alone[2];
@@ -52,10 +52,3 @@ static void check_two(struct lc *c)
     lc_log_release(&alone[0]);
     lc_log_release(&alone[1]);
 }
-
-const struct lc_check lc_batch_checks[] = {
-    {"repeat", "the same question gets the same answer and leaves no trace", check_repeat},
-    {"batch", "an answer does not depend on the blocks beside it", check_batch},
-    {"two-instances", "two instances do not know of each other", check_two},
-    {0},
-};

@@ -68,7 +68,7 @@ static void short_session(struct lc *c)
     lc_session_close(&s);
 }
 
-static void check_leaks(struct lc *c)
+void lc_check_leaks(struct lc *c)
 {
     repeat(c, create_destroy, 50, "create and destroy");
     repeat(c, failing_create, 100, "a failing create");
@@ -79,7 +79,7 @@ static void check_leaks(struct lc *c)
  */
 
 /* create and begin_frame with the k-th allocation failing, for every k: an error or success, never a crash or a leak. */
-static void check_out_of_memory(struct lc *c)
+void lc_check_out_of_memory(struct lc *c)
 {
     enum { MOST = 20000 };
     if (lc_alloc_count() < 0) {
@@ -116,7 +116,7 @@ static void check_out_of_memory(struct lc *c)
 }
 
 /* After its first calls, evaluate allocates nothing. */
-static void check_evaluate_allocates(struct lc *c)
+void lc_check_evaluate_allocates(struct lc *c)
 {
     if (lc_alloc_count() < 0) {
         lc_skip(c, "allocations cannot be counted in a sanitizer build");
@@ -142,7 +142,7 @@ static void check_evaluate_allocates(struct lc *c)
     lc_session_close(&s);
 }
 
-static void check_time(struct lc *c)
+void lc_check_time(struct lc *c)
 {
     int flexible = (c->req.flags & LULL_REQ_FLEXIBLE) != 0;
     int32_t w = c->req.block_width > 0 ? (int32_t)c->req.block_width : 200;
@@ -157,11 +157,3 @@ static void check_time(struct lc *c)
                 flexible ? " (flexible)" : "", (unsigned long long)s.evaluated);
     lc_session_close(&s);
 }
-
-const struct lc_check lc_cost_checks[] = {
-    {"leaks", "create and destroy, frames, failures: what is left does not grow with their number", check_leaks},
-    {"out-of-memory", "create and begin_frame survive every failing allocation", check_out_of_memory},
-    {"evaluate-allocates", "evaluate allocates nothing", check_evaluate_allocates},
-    {"time", "time per block", check_time},
-    {0},
-};

@@ -47,7 +47,7 @@ static void expect_status(struct lc *c, const char *key, const char *value, int3
                   err.message);
 }
 
-static void check_unknown_key(struct lc *c)
+void lc_check_unknown_key(struct lc *c)
 {
     expect_status(c, "no-such-parameter", "1", LULL_E_KEY);
     expect_status(c, "", "1", LULL_E_KEY);
@@ -85,7 +85,7 @@ static int beyond(double limit, double direction, char text[400])
     return 1;
 }
 
-static void check_params(struct lc *c)
+void lc_check_params(struct lc *c)
 {
     static const char *const not_numbers[] = {"",    " ",   "x",  "1x",   "1 2", "--1",
                                               "nan", "inf", "1e", "0x10", "1,5", "1e99999"};
@@ -117,7 +117,7 @@ static void check_params(struct lc *c)
         lc_note(c, "it has no parameters");
 }
 
-static void check_null(struct lc *c)
+void lc_check_null(struct lc *c)
 {
     const struct lull_criterion *t = c->criterion;
     struct lull_instance *instance = NULL;
@@ -140,7 +140,7 @@ static void check_null(struct lc *c)
     lc_run_both(c, NULL, &(struct lc_manner){.host = &bare}, "NULL host against a host of NULLs");
 }
 
-static void check_requirements(struct lc *c)
+void lc_check_requirements(struct lc *c)
 {
     struct lull_instance *instance = lc_create(c, NULL);
     if (!instance)
@@ -170,11 +170,3 @@ static void check_requirements(struct lc *c)
             (unsigned long long)q->first_spp, (unsigned long long)q->bytes_per_block, q->planes_used, q->planes_required);
     c->criterion->destroy(instance);
 }
-
-const struct lc_check lc_create_checks[] = {
-    {"unknown-key", "an unknown key is refused and named", check_unknown_key},
-    {"parameters", "defaults are accepted, bad values refused and named", check_params},
-    {"null", "NULL host, NULL error, a host of NULLs", check_null},
-    {"requirements", "requirements are complete and make sense", check_requirements},
-    {0},
-};

@@ -18,18 +18,26 @@ static void finish_and_compare(struct lc *c, struct lc_session *s, const char *w
     lc_session_close(s);
 }
 
+/* About one block, or none. */
+static int32_t evaluate(struct lc_session *s, const struct lull_view *view, const struct lull_block *block)
+{
+    struct lull_decision d;
+    lc_decision_preset(&d);
+    return s->check->criterion->evaluate(s->instance, view, block, sizeof *block, block ? &d : NULL, sizeof d, block != NULL,
+                                         NULL);
+}
+
 static int32_t evaluate_nothing(struct lc_session *s)
 {
     struct lc_image image;
     if (lc_session_image(s, &image) != 0)
         return 1;
-    int32_t status = s->check->criterion->evaluate(s->instance, &image.view, NULL, sizeof(struct lull_block), NULL,
-                                                   sizeof(struct lull_decision), 0, NULL);
+    int32_t status = evaluate(s, &image.view, NULL);
     lc_image_release(&image);
     return status;
 }
 
-static void check_order(struct lc *c)
+void lc_check_order(struct lc *c)
 {
     struct lc_session s;
     if (lc_session_open(&s, c, NULL) != 0)
@@ -64,7 +72,7 @@ static void check_order(struct lc *c)
     }
 }
 
-static void check_zero_blocks(struct lc *c)
+void lc_check_zero_blocks(struct lc *c)
 {
     struct lc_session s;
     if (lc_session_open(&s, c, NULL) != 0)
@@ -83,7 +91,7 @@ static void run_frame(struct lc *c, int32_t width, int32_t height, int32_t block
         lc_note(c, "that was a frame of %dx%d in blocks of %dx%d", width, height, block_w, block_h);
 }
 
-static void check_shapes(struct lc *c)
+void lc_check_shapes(struct lc *c)
 {
     int flexible = (c->req.flags & LULL_REQ_FLEXIBLE) != 0;
     int32_t w = flexible ? 200 : (int32_t)c->req.block_width, h = flexible ? 200 : (int32_t)c->req.block_height;
@@ -98,7 +106,7 @@ static void check_shapes(struct lc *c)
     }
 }
 
-static void check_block_size(struct lc *c)
+void lc_check_block_size(struct lc *c)
 {
     if (c->req.flags & LULL_REQ_FLEXIBLE) {
         lc_skip(c, "it takes blocks of any size");
@@ -118,7 +126,7 @@ static void check_block_size(struct lc *c)
 }
 
 /* Frames and calls that make no sense, in the middle of a good session. */
-static void check_invalid(struct lc *c)
+void lc_check_invalid(struct lc *c)
 {
     struct lc_session s;
     if (lc_session_open(&s, c, NULL) != 0)
@@ -142,23 +150,20 @@ static void check_invalid(struct lc *c)
     struct lc_image image;
     if (lc_session_image(&s, &image) == 0) {
         struct lull_block block = s.film.blocks[0];
-        struct lull_decision d;
-        lc_decision_preset(&d);
         block.id = s.film.block_count;
-        int32_t status = c->criterion->evaluate(s.instance, &image.view, &block, sizeof block, &d, sizeof d, 1, NULL);
+        int32_t status = evaluate(&s, &image.view, &block);
         LC_EXPECT(c, status == LULL_E_INVALID, "a block that is not in the frame: %d", status);
         block.id = UINT32_MAX;
-        status = c->criterion->evaluate(s.instance, &image.view, &block, sizeof block, &d, sizeof d, 1, NULL);
+        status = evaluate(&s, &image.view, &block);
         LC_EXPECT(c, status == LULL_E_INVALID, "block 4294967295: %d", status);
-        block = s.film.blocks[0];
-        status = c->criterion->evaluate(s.instance, NULL, &block, sizeof block, &d, sizeof d, 1, NULL);
+        status = evaluate(&s, NULL, s.film.blocks);
         LC_EXPECT(c, status == LULL_E_INVALID, "a NULL view: %d", status);
         lc_image_release(&image);
     }
     finish_and_compare(c, &s, "after refused calls");
 }
 
-static void check_restart(struct lc *c)
+void lc_check_restart(struct lc *c)
 {
     struct lc_session s;
     if (lc_session_open(&s, c, NULL) != 0)
@@ -176,7 +181,7 @@ static void check_restart(struct lc *c)
         finish_and_compare(c, &first, "RESTART of nothing");
 }
 
-static void check_final(struct lc *c)
+void lc_check_final(struct lc *c)
 {
     struct lc_session s;
     if (lc_session_open(&s, c, NULL) != 0)
@@ -197,7 +202,7 @@ static void check_final(struct lc *c)
 }
 
 /* A host that wants the call back, and leaves out tasks: an error or a full answer, and no harm to what follows. */
-static void check_cancel(struct lc *c)
+void lc_check_cancel(struct lc *c)
 {
     struct lc_host host;
     struct lc_session s;
@@ -225,15 +230,3 @@ static void check_cancel(struct lc *c)
     }
     lc_host_release(&host);
 }
-
-const struct lc_check lc_life_checks[] = {
-    {"order", "calls out of order are refused and do no harm", check_order},
-    {"zero-blocks", "no blocks to judge", check_zero_blocks},
-    {"shapes", "1x1 frames, 1x1 blocks, blocks at the edge", check_shapes},
-    {"block-size", "blocks of another size", check_block_size},
-    {"invalid", "senseless frames and blocks are refused and do no harm", check_invalid},
-    {"restart", "RESTART forgets", check_restart},
-    {"final", "blocks that get no more samples", check_final},
-    {"cancel", "cancelled calls do no harm", check_cancel},
-    {0},
-};

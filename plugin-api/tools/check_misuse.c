@@ -122,7 +122,7 @@ static void live(struct lc_misuse *m, const struct lc_log *expected)
     lc_host_release(&host);
 }
 
-static void check_misuse(struct lc *c)
+void lc_check_misuse(struct lc *c)
 {
     struct lc_misuse m = {.check = c, .random = c->seed, .state = c->criterion->get_extension(LULL_EXT_STATE)};
     struct lc_log expected;
@@ -135,8 +135,3 @@ static void check_misuse(struct lc *c)
     free(m.saved.data);
     lc_slots_release(&m.slots);
 }
-
-const struct lc_check lc_misuse_checks[] = {
-    {"misuse", "random calls outside the rules are refused and leave no trace", check_misuse},
-    {0},
-};

@@ -26,7 +26,7 @@ static void compare_layouts(struct lc *c, const struct stored *list, size_t coun
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
-static void check_strides(struct lc *c)
+void lc_check_strides(struct lc *c)
 {
     static const struct stored list[] = {
         {{.bottom_up = 1}, "rows bottom-up"},
@@ -41,7 +41,7 @@ static void check_strides(struct lc *c)
     compare_layouts(c, list, COUNT(list), 1);
 }
 
-static void check_types(struct lc *c)
+void lc_check_types(struct lc *c)
 {
     static const struct stored list[] = {
         {{.type = LULL_TYPE_F16}, "f16"},
@@ -52,7 +52,7 @@ static void check_types(struct lc *c)
     compare_layouts(c, list, COUNT(list), 0);
 }
 
-static void check_normalisers(struct lc *c)
+void lc_check_normalisers(struct lc *c)
 {
     static const struct stored list[] = {
         {{.normaliser = LULL_NORM_SPP}, "f32 sums"},
@@ -67,7 +67,7 @@ static void check_normalisers(struct lc *c)
 /* --- a crop ------------------------------------------------------------------------------------------------------------ */
 
 /* The same blocks as the window of a larger picture: a view that does not begin at the origin. */
-static void check_window(struct lc *c)
+void lc_check_window(struct lc *c)
 {
     enum { DX = 1000, DY = 700 };
     struct lc_session s;
@@ -135,7 +135,7 @@ static int32_t ask_spoilt(struct lc *c, unsigned plane, enum spoil spoil)
     return status;
 }
 
-static void check_missing(struct lc *c)
+void lc_check_missing(struct lc *c)
 {
     struct lull_instance *instance = lc_create(c, NULL);
     struct lc_film film;
@@ -167,7 +167,7 @@ static void check_missing(struct lc *c)
     }
 }
 
-static void check_broken_planes(struct lc *c)
+void lc_check_broken_planes(struct lc *c)
 {
     static const char *const what[SPOIL_COUNT] = {
         "", "", "of an unknown type", "of an unknown normaliser", "with too few channels", "normalised by an absent WEIGHT"};
@@ -214,7 +214,7 @@ static uint32_t steps_with_value(struct lc *c, float value, int every)
     return flags;
 }
 
-static void check_values(struct lc *c)
+void lc_check_values(struct lc *c)
 {
     static const float values[] = {NAN, INFINITY, -INFINITY, -1, 1e30f, -1e30f, 3e38f, 1e-42f, 0};
     for (size_t i = 0; i < COUNT(values); i++)
@@ -256,7 +256,7 @@ static void run_painted(struct lc *c, void (*paint)(double *, double *, int32_t,
     lc_run_film(c, &film);
 }
 
-static void check_flat(struct lc *c)
+void lc_check_flat(struct lc *c)
 {
     run_painted(c, paint_black);
     run_painted(c, paint_constant);
@@ -320,7 +320,7 @@ static int grey_stops_at(struct lc *c, int fireflies)
 
 /* Whoever is given the halves or the second moment can see that a pixel hangs on one sample; the mean over 40,000 pixels
  * hardly shows it. Only what would stop the block without these pixels can fail. */
-static void check_firefly(struct lc *c)
+void lc_check_firefly(struct lc *c)
 {
     int has_evidence =
         (c->req.planes_required & (LULL_PLANE_BIT(LULL_PLANE_HALF) | LULL_PLANE_BIT(LULL_PLANE_MOMENT2))) != 0;
@@ -335,7 +335,7 @@ static void check_firefly(struct lc *c)
 }
 
 /* Before the first sample nothing can be decided, and nothing may be divided by it. */
-static void check_no_samples(struct lc *c)
+void lc_check_no_samples(struct lc *c)
 {
     static const int32_t normalisers[] = {LULL_NORM_ONE, LULL_NORM_SPP, LULL_NORM_WEIGHT};
     for (size_t k = 0; k < COUNT(normalisers); k++) {
@@ -357,17 +357,3 @@ static void check_no_samples(struct lc *c)
         lc_session_close(&s);
     }
 }
-
-const struct lc_check lc_pixel_checks[] = {
-    {"strides", "negative, interleaved and planar strides give the same answers", check_strides},
-    {"types", "f16, f64, u32 and scaled values give the same answers", check_types},
-    {"normalisers", "sums and weighted sums give the same answers", check_normalisers},
-    {"window", "a view that does not begin at the origin", check_window},
-    {"missing-planes", "required planes are missed, others are not", check_missing},
-    {"broken-planes", "planes of an unknown form are refused", check_broken_planes},
-    {"bad-values", "NaN, infinite, negative and huge pixels", check_values},
-    {"flat", "black, constant and half black blocks", check_flat},
-    {"firefly", "a block is not stopped while a pixel hangs on one sample", check_firefly},
-    {"no-samples", "blocks without samples continue", check_no_samples},
-    {0},
-};

@@ -144,7 +144,7 @@ static void run_refused(struct lc *c, const struct lull_state *state)
     lc_log_release(&expected);
 }
 
-static void check_state(struct lc *c)
+void lc_check_state(struct lc *c)
 {
     const struct lull_state *state = c->criterion->get_extension(LULL_EXT_STATE);
     if (!state) {
@@ -156,8 +156,3 @@ static void check_state(struct lc *c)
     run_state(c, state);
     run_refused(c, state);
 }
-
-const struct lc_check lc_state_checks[] = {
-    {"state", "lull.state/1: saved, loaded, cut short, damaged", check_state},
-    {0},
-};

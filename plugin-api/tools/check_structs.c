@@ -93,7 +93,7 @@ static struct short_calls short_life(struct lc *c, const struct short_structs *c
     return l.calls;
 }
 
-static void check_older(struct lc *c)
+void lc_check_older(struct lc *c)
 {
     struct short_structs exact = {0};
     struct short_calls calls = short_life(c, &exact);
@@ -116,7 +116,7 @@ static void check_older(struct lc *c)
     LC_EXPECT(c, calls.create != LULL_OK, "create succeeds with a host struct shorter than 1.0");
 }
 
-static void check_too_short(struct lc *c)
+void lc_check_too_short(struct lc *c)
 {
     struct short_structs cut = {0};
     struct short_calls calls;
@@ -169,7 +169,7 @@ static void check_tails(struct lc *c)
             return;
 }
 
-static void check_newer(struct lc *c)
+void lc_check_newer(struct lc *c)
 {
     struct lc_manner wide = {.slack = 40, .layout = {.extra_planes = 3, .plane_slack = 24}};
     lc_run_both(c, NULL, &wide, "wider structs and strides");
@@ -184,10 +184,3 @@ static void check_newer(struct lc *c)
               "pairs with a wider stride are misread");
     check_tails(c);
 }
-
-const struct lc_check lc_struct_checks[] = {
-    {"older-host", "reads and writes nothing past structs of version 1.0", check_older},
-    {"short-structs", "structs shorter than 1.0 are refused", check_too_short},
-    {"newer-host", "longer structs and wider strides change nothing", check_newer},
-    {0},
-};

@@ -39,7 +39,7 @@ static void note_export(void *context, const char *name)
         lc_fail(e->check, "exports %s", name);
 }
 
-static void check_symbols(struct lc *c)
+void lc_check_symbols(struct lc *c)
 {
     struct exports e = {.check = c};
     if (lc_elf_exports(c->path, note_export, &e) != 0)
@@ -60,7 +60,7 @@ static void note_log(void *context, int32_t level, const char *text)
         lc_fail(context, "%s", text);
 }
 
-static void check_load(struct lc *c)
+void lc_check_load(struct lc *c)
 {
     struct sigaction before[SIGNALS];
     for (int i = 0; i < SIGNALS; i++)
@@ -80,7 +80,7 @@ static void check_load(struct lc *c)
 
 /* --- entry ----------------------------------------------------------------------------------------------------------- */
 
-static void check_entry(struct lc *c)
+void lc_check_entry(struct lc *c)
 {
     lull_entry_fn entry = lc_entry(c->path);
     uint32_t count = 0;
@@ -93,7 +93,7 @@ static void check_entry(struct lc *c)
     lc_note(c, "%u criteria in the library", count);
 }
 
-static void check_table(struct lc *c)
+void lc_check_table(struct lc *c)
 {
     const struct lull_criterion *t = c->criterion;
     struct lull_error err = {.struct_size = sizeof err};
@@ -110,11 +110,3 @@ static void check_table(struct lc *c)
             t->capabilities & LULL_CAP_BATCH_INVARIANT ? ", batch invariant" : "",
             t->capabilities & LULL_CAP_REOPENS ? ", reopens" : "");
 }
-
-const struct lc_check lc_table_checks[] = {
-    {"symbols", "exports the entry and nothing else", check_symbols},
-    {"load", "loading leaves floating point, threads and signals alone", check_load},
-    {"entry", "the entry ends its list with NULL, also far out", check_entry},
-    {"table", "the static table is complete", check_table},
-    {0},
-};

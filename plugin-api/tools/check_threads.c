@@ -12,7 +12,7 @@
 #include <xmmintrin.h>
 #endif
 
-static void check_workers(struct lc *c)
+void lc_check_workers(struct lc *c)
 {
     struct lc_log expected;
     if (lc_run(c, NULL, &expected) != 0)
@@ -31,7 +31,7 @@ static void check_workers(struct lc *c)
     lc_log_release(&expected);
 }
 
-static void check_concurrent(struct lc *c)
+void lc_check_concurrent(struct lc *c)
 {
     if (c->criterion->thread_level < LULL_THREADS_FULL) {
         lc_skip(c, "it does not declare FULL");
@@ -65,7 +65,7 @@ static void *instance_run(void *arg)
     return NULL;
 }
 
-static void check_instances(struct lc *c)
+void lc_check_instances(struct lc *c)
 {
     enum { THREADS = 3 };
     if (c->criterion->thread_level < LULL_THREADS_INSTANCE) {
@@ -96,7 +96,7 @@ static void check_instances(struct lc *c)
  */
 
 /* Every call already compares the control register; here with a host that flushes subnormals and traps nothing. */
-static void check_fp(struct lc *c)
+void lc_check_fp(struct lc *c)
 {
     struct lc_log expected, got;
     struct lull_process_state before, after;
@@ -121,11 +121,3 @@ static void check_fp(struct lc *c)
 #endif
     lc_log_release(&expected);
 }
-
-const struct lc_check lc_thread_checks[] = {
-    {"workers", "any number of workers, tasks in any order", check_workers},
-    {"concurrent", "concurrent evaluate calls on one instance", check_concurrent},
-    {"instances", "concurrent instances", check_instances},
-    {"fp", "floating-point control and threads are left alone, FTZ and DAZ tolerated", check_fp},
-    {0},
-};

@@ -26,11 +26,12 @@ struct arguments {
     int quiet, list, required_only;
 };
 
-/* The first group needs no instance. */
-static const struct lc_check *const groups[] = {lc_table_checks,  lc_create_checks, lc_struct_checks, lc_pixel_checks,
-                                                lc_life_checks,   lc_batch_checks,  lc_thread_checks, lc_state_checks,
-                                                lc_misuse_checks, lc_cost_checks};
-enum { GROUPS = sizeof groups / sizeof *groups };
+#define ROW(function, name, title) {name, title, lc_check_##function},
+static const struct lc_check {
+    const char *name, *title;
+    void (*run)(struct lc *c);
+} checks[] = {LC_CHECKS(ROW)};
+enum { CHECKS = sizeof checks / sizeof *checks };
 
 /* --- command line --------------------------------------------------------------------------------------------------------
  */
@@ -39,9 +40,8 @@ static int add_only(void *into, const char *name, struct base_err *err)
 {
     struct arguments *a = into;
     int known = 0;
-    for (int g = 0; g < GROUPS; g++)
-        for (const struct lc_check *k = groups[g]; k->name != NULL; k++)
-            known |= strcmp(k->name, name) == 0;
+    for (int k = 0; k < CHECKS; k++)
+        known |= strcmp(checks[k].name, name) == 0;
     if (!known)
         return base_fail(err, BASE_EINVAL, "no such check; --list names them");
     if (a->only_count == NAMES_MAX)
@@ -180,17 +180,16 @@ static int prepare(struct lc *c)
 
 struct task {
     const char *id;
-    const struct lc_check *check; /* NULL: only see whether the criterion can be made */
-    int needs_instance;
+    int check; /* CHECKS: only see whether the criterion can be made */
 };
 
 static void run_task(struct lc *c, const void *arg)
 {
     const struct task *task = arg;
-    if (find_table(c, task->id) != 0 || (task->needs_instance && prepare(c) != 0) || !task->check)
+    if (find_table(c, task->id) != 0 || (task->check >= LC_WITHOUT_INSTANCE && prepare(c) != 0) || task->check == CHECKS)
         return;
     lc_doing(c, "%s", "");
-    task->check->run(c);
+    checks[task->check].run(c);
 }
 
 struct totals {
@@ -235,15 +234,17 @@ static int no_process(void)
     return LC_EXIT_FAILED;
 }
 
-static int run_group(const struct arguments *a, struct lc *c, const struct lc_check *group, struct task task,
-                     struct totals *t, struct lc_report *r)
+/* Those from `task.check` up to `end`. */
+static int run_checks(const struct arguments *a, struct lc *c, struct task task, int end, struct totals *t,
+                      struct lc_report *r)
 {
-    for (task.check = group; task.check->name != NULL; task.check++) {
-        if (!wanted(a, task.check))
+    for (; task.check < end; task.check++) {
+        const struct lc_check *check = &checks[task.check];
+        if (!wanted(a, check))
             continue;
         if (lc_child_run(c, run_task, &task, a->limit_s, r) != 0)
             return no_process();
-        print_report(a, t, task.check->name, task.check->title, r);
+        print_report(a, t, check->name, check->title, r);
     }
     return LC_EXIT_OK;
 }
@@ -251,7 +252,7 @@ static int run_group(const struct arguments *a, struct lc *c, const struct lc_ch
 static int check_criterion(const struct arguments *a, struct lc *c, const char *id, struct totals *t)
 {
     struct lc_report *r = malloc(sizeof *r), *made = malloc(sizeof *made);
-    const struct task make_one = {id, NULL, 1};
+    const struct task make_one = {id, CHECKS};
     int result = LC_EXIT_OK;
     if (!r || !made || lc_child_run(c, run_task, &make_one, a->limit_s, made) != 0) {
         result = no_process();
@@ -261,12 +262,12 @@ static int check_criterion(const struct arguments *a, struct lc *c, const char *
     } else {
         if (!a->quiet)
             printf("# %s:%s\n", c->path, id);
-        result = run_group(a, c, groups[0], (struct task){id, NULL, 0}, t, r);
+        result = run_checks(a, c, (struct task){id, 0}, LC_WITHOUT_INSTANCE, t, r);
         const int usable = made->failures == 0 && !made->skipped;
         if (!usable)
             print_report(a, t, "create", "an instance can be made", made);
-        for (int g = 1; g < GROUPS && result == LC_EXIT_OK && usable; g++)
-            result = run_group(a, c, groups[g], (struct task){id, NULL, 1}, t, r);
+        if (result == LC_EXIT_OK && usable)
+            result = run_checks(a, c, (struct task){id, LC_WITHOUT_INSTANCE}, CHECKS, t, r);
     }
     free(r);
     free(made);
@@ -324,9 +325,8 @@ int main(int argc, char **argv)
         return LC_EXIT_USAGE;
     }
     if (a.list) {
-        for (int g = 0; g < GROUPS; g++)
-            for (const struct lc_check *k = groups[g]; k->name != NULL; k++)
-                printf("%-20s %s\n", k->name, k->title);
+        for (int k = 0; k < CHECKS; k++)
+            printf("%-20s %s\n", checks[k].name, checks[k].title);
         return finish(LC_EXIT_OK);
     }
     struct totals t = {0};
