@@ -226,7 +226,7 @@ static int load_plane(const struct seq_block *b, const struct seq_record *r, enu
     uLong used = s->stored_bytes;
     if (uncompress2(raw, &got, s->stored, &used) != Z_OK || got != s->raw_bytes || used != s->stored_bytes)
         return base_fail(err, BASE_EINVAL, "block %u at %u spp: plane %d does not inflate", b->id, r->spp, (int)plane);
-    return seq_plane_unfilter(s->plane, s->filter, raw, b->width, b->height, err);
+    return seq_plane_filter(s->plane, s->filter, raw, b->width, b->height, 1, err);
 }
 
 /* As load_plane, into memory of its own. NULL on failure. */

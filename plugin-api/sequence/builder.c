@@ -58,7 +58,7 @@ static int add_plane(struct seq_builder *w, enum seq_plane_number plane, uint32_
     uLongf stored = compressBound(raw_bytes);
     int rc = make_room(w, SEQ_PLANE_HEADER + stored, err);
     if (!rc)
-        rc = seq_plane_filter((uint32_t)plane, filter, raw, w->width, w->height, err);
+        rc = seq_plane_filter((uint32_t)plane, filter, raw, w->width, w->height, 0, err);
     if (rc)
         return rc;
     if (compress2(w->bytes + w->size + SEQ_PLANE_HEADER, &stored, raw, raw_bytes, 6) != Z_OK)
@@ -72,57 +72,41 @@ static int add_plane(struct seq_builder *w, enum seq_plane_number plane, uint32_
     return 0;
 }
 
-/* Each fills raw [6P] from planar values. */
-static void code_display(const struct seq_frame *f, size_t n, uint8_t *raw)
+/* Fills raw [6P] from planar values. */
+static void code_plane(const struct seq_frame *f, enum seq_plane_number plane, size_t pixels, uint8_t *raw)
 {
-    for (size_t i = 0; i < n; i++)
-        raw[i] = f->display ? f->display[i] : base_srgb_code(f->mean[i]);
-}
-
-static void code_f16(const double *from, size_t n, uint8_t *raw)
-{
-    for (size_t i = 0; i < n; i++) {
-        uint16_t h = seq_half_float(from[i]);
-        raw[2 * i] = (uint8_t)h;
-        raw[2 * i + 1] = (uint8_t)(h >> 8);
-    }
-}
-
-static void code_fine(const struct seq_frame *f, size_t n, uint8_t *raw)
-{
-    for (size_t i = 0; i < n; i++)
-        raw[i] = seq_fine_encode(f->display ? f->display[i] : base_srgb_code(f->mean[i]), f->mean[i]);
-}
-
-static void code_half_log(const double *half, size_t pixels, uint8_t *raw)
-{
-    for (size_t i = 0; i < pixels; i++)
-        raw[i] = seq_half_log_encode(base_luminance(half[i], half[pixels + i], half[2 * pixels + i]));
+    const double *half = f->half, *light = plane == SEQ_PLANE_HALF_F16 ? half : f->mean;
+    for (size_t i = 0; i < (plane == SEQ_PLANE_HALF_LOG ? pixels : 3 * pixels); i++)
+        switch (plane) {
+        case SEQ_PLANE_DISPLAY: raw[i] = f->display ? f->display[i] : base_srgb_code(f->mean[i]); break;
+        case SEQ_PLANE_FINE:
+            raw[i] = seq_fine_encode(f->display ? f->display[i] : base_srgb_code(f->mean[i]), f->mean[i]);
+            break;
+        case SEQ_PLANE_HALF_LOG:
+            raw[i] = seq_half_log_encode(base_luminance(half[i], half[pixels + i], half[2 * pixels + i]));
+            break;
+        default: raw[2 * i] = (uint8_t)seq_half_float(light[i]); raw[2 * i + 1] = (uint8_t)(seq_half_float(light[i]) >> 8);
+        }
 }
 
 static int add_planes(struct seq_builder *w, const struct seq_frame *f, uint8_t *raw, uint32_t *count, struct base_err *err)
 {
-    size_t pixels = (size_t)w->width * w->height;
-    int full = f->full || f->is_reference;
-    code_display(f, 3 * pixels, raw);
-    int rc = add_plane(w, SEQ_PLANE_DISPLAY, SEQ_FILTER_AVERAGE | SEQ_FILTER_GREEN, raw, err);
-    *count = 1;
-    if (!rc && f->mean) {
-        if (full)
-            code_f16(f->mean, 3 * pixels, raw);
-        else
-            code_fine(f, 3 * pixels, raw);
-        rc = add_plane(w, full ? SEQ_PLANE_MEAN_F16 : SEQ_PLANE_FINE, full ? SEQ_FILTER_SHUFFLE : 0, raw, err);
-        ++*count;
-    }
-    if (!rc && f->half) {
-        if (full)
-            code_f16(f->half, 3 * pixels, raw);
-        else
-            code_half_log(f->half, pixels, raw);
-        rc = add_plane(w, full ? SEQ_PLANE_HALF_F16 : SEQ_PLANE_HALF_LOG, full ? SEQ_FILTER_SHUFFLE : 0, raw, err);
-        ++*count;
-    }
+    const int full = f->full || f->is_reference;
+    const struct {
+        int is_there;
+        enum seq_plane_number plane;
+        uint32_t filter;
+    } planes[] = {{1, SEQ_PLANE_DISPLAY, SEQ_FILTER_AVERAGE | SEQ_FILTER_GREEN},
+                  {f->mean != NULL, full ? SEQ_PLANE_MEAN_F16 : SEQ_PLANE_FINE, full ? SEQ_FILTER_SHUFFLE : 0},
+                  {f->half != NULL, full ? SEQ_PLANE_HALF_F16 : SEQ_PLANE_HALF_LOG, full ? SEQ_FILTER_SHUFFLE : 0}};
+    int rc = 0;
+    *count = 0;
+    for (int i = 0; i < 3 && !rc; i++)
+        if (planes[i].is_there) {
+            code_plane(f, planes[i].plane, (size_t)w->width * w->height, raw);
+            rc = add_plane(w, planes[i].plane, planes[i].filter, raw, err);
+            ++*count;
+        }
     return rc;
 }
 

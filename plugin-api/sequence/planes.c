@@ -7,32 +7,27 @@
 #include "base/colour.h"
 #include "base/half.h"
 
+/* Bytes of a pixel before compression, and which filters may be on it; zeros: not known. */
+static const struct {
+    uint32_t bytes, filters;
+} planes[] = {
+    [SEQ_PLANE_DISPLAY] = {3, SEQ_FILTER_AVERAGE | SEQ_FILTER_GREEN},
+    [SEQ_PLANE_FINE] = {3, SEQ_FILTER_AVERAGE | SEQ_FILTER_GREEN},
+    [SEQ_PLANE_HALF_LOG] = {1, 0},
+    [SEQ_PLANE_MEAN_F16] = {6, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_HALF_F16] = {6, SEQ_FILTER_SHUFFLE},
+};
+enum { PLANES = sizeof planes / sizeof *planes };
+
 size_t seq_plane_raw_bytes(uint32_t plane, uint32_t width, uint32_t height)
 {
-    size_t pixels = (size_t)width * height;
-    switch (plane) {
-    case SEQ_PLANE_DISPLAY:
-    case SEQ_PLANE_FINE: return 3 * pixels;
-    case SEQ_PLANE_HALF_LOG: return pixels;
-    case SEQ_PLANE_MEAN_F16:
-    case SEQ_PLANE_HALF_F16: return 6 * pixels;
-    default: return 0;
-    }
+    return plane < PLANES ? planes[plane].bytes * (size_t)width * height : 0;
 }
 
-uint32_t seq_plane_filters(uint32_t plane)
-{
-    switch (plane) {
-    case SEQ_PLANE_DISPLAY:
-    case SEQ_PLANE_FINE: return SEQ_FILTER_AVERAGE | SEQ_FILTER_GREEN;
-    case SEQ_PLANE_MEAN_F16:
-    case SEQ_PLANE_HALF_F16: return SEQ_FILTER_SHUFFLE;
-    default: return 0;
-    }
-}
+uint32_t seq_plane_filters(uint32_t plane) { return plane < PLANES ? planes[plane].filters : 0; }
 
 /* Little-endian 16-bit values <-> all low bytes, then all high bytes. */
-static int shuffle(uint8_t *data, size_t bytes, int forward, struct base_err *err)
+static int shuffle(uint8_t *data, size_t bytes, int undo, struct base_err *err)
 {
     uint8_t *copy = malloc(bytes);
     if (!copy)
@@ -41,10 +36,10 @@ static int shuffle(uint8_t *data, size_t bytes, int forward, struct base_err *er
     size_t n = bytes / 2;
     for (size_t i = 0; i < n; i++)
         for (size_t k = 0; k < 2; k++) {
-            if (forward)
-                data[k * n + i] = copy[2 * i + k];
-            else
+            if (undo)
                 data[2 * i + k] = copy[k * n + i];
+            else
+                data[k * n + i] = copy[2 * i + k];
         }
     free(copy);
     return 0;
@@ -56,7 +51,7 @@ static uint8_t predict(const uint8_t *at, size_t x, size_t y, size_t width)
     return (uint8_t)((left + up) / 2);
 }
 
-/* sign +1 undoes the difference (first pixel to last), -1 makes it (last to first, so that neighbours are still whole). */
+/* Undoes the difference (first pixel to last), or makes it (last to first, so that neighbours are still whole). */
 static void average(uint8_t *channel, size_t width, size_t height, int undo)
 {
     size_t n = width * height;
@@ -76,33 +71,20 @@ static void green(uint8_t *data, size_t pixels, int undo)
         }
 }
 
-int seq_plane_unfilter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct base_err *err)
+int seq_plane_filter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, int undo,
+                     struct base_err *err)
 {
     size_t pixels = (size_t)width * height;
     if ((filter & ~seq_plane_filters(plane)) != 0)
         return base_fail(err, BASE_EINVAL, "filter %u does not fit plane %u", filter, plane);
     if (filter & SEQ_FILTER_SHUFFLE)
-        return shuffle(data, seq_plane_raw_bytes(plane, width, height), 0, err);
-    if (filter & SEQ_FILTER_AVERAGE)
-        for (size_t c = 0; c < 3; c++)
-            average(data + c * pixels, width, height, 1);
-    if (filter & SEQ_FILTER_GREEN)
-        green(data, pixels, 1);
-    return 0;
-}
-
-int seq_plane_filter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct base_err *err)
-{
-    size_t pixels = (size_t)width * height;
-    if ((filter & ~seq_plane_filters(plane)) != 0)
-        return base_fail(err, BASE_EINVAL, "filter %u does not fit plane %u", filter, plane);
-    if (filter & SEQ_FILTER_SHUFFLE)
-        return shuffle(data, seq_plane_raw_bytes(plane, width, height), 1, err);
-    if (filter & SEQ_FILTER_GREEN)
+        return shuffle(data, seq_plane_raw_bytes(plane, width, height), undo, err);
+    if ((filter & SEQ_FILTER_GREEN) && !undo)
         green(data, pixels, 0);
-    if (filter & SEQ_FILTER_AVERAGE)
-        for (size_t c = 0; c < 3; c++)
-            average(data + c * pixels, width, height, 0);
+    for (size_t c = 0; c < 3 && (filter & SEQ_FILTER_AVERAGE); c++)
+        average(data + c * pixels, width, height, undo);
+    if ((filter & SEQ_FILTER_GREEN) && undo)
+        green(data, pixels, 1);
     return 0;
 }
 

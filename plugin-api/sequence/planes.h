@@ -25,10 +25,9 @@ size_t seq_plane_raw_bytes(uint32_t plane, uint32_t width, uint32_t height);
 /* Which filters may be on a plane. */
 uint32_t seq_plane_filters(uint32_t plane);
 
-/* Undo or apply a filter set in place. data: the plane's raw bytes. BASE_ENOMEM only. */
-int seq_plane_unfilter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height,
-                       struct base_err *err);
-int seq_plane_filter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, struct base_err *err);
+/* Applies a filter set in place, or undoes it. data: the plane's raw bytes. BASE_ENOMEM only. */
+int seq_plane_filter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t width, uint32_t height, int undo,
+                     struct base_err *err);
 
 /* The half float of a pixel: nearest even, clamped to +-65504; NaN becomes 0. */
 uint16_t seq_half_float(double value);
