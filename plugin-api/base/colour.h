@@ -44,7 +44,7 @@ extern const double base_srgb_limit[257];
  * narrow that the code grows by at most one inside it. */
 enum { BASE_SRGB_BINS = 1633, BASE_SRGB_BIN_BITS = 45 };
 #define BASE_SRGB_FIRST_BITS 0x3f23e00000000000u
-extern const uint8_t base_srgb_bin[BASE_SRGB_BINS];
+extern uint8_t base_srgb_bin[BASE_SRGB_BINS];
 
 /* What a display shows for linear light: floor(255 oetf(clamp(linear, 0, 1)) + 0.5); NaN gives 0. The only way from light to
  * such codes: compared with exact limits and rounded to no other type before, so that two programs that have the same mean
