@@ -51,33 +51,24 @@ int base_file_read(const char *path, size_t max_size, char **data, size_t *size,
     int rc = base_file_open(path, &f, err);
     if (rc)
         return rc;
-    if (fstat(fileno(f), &st) != 0) {
+    if (fstat(fileno(f), &st) != 0)
         rc = base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
-        goto out;
-    }
-    if ((unsigned long long)st.st_size > max_size) {
+    else if ((unsigned long long)st.st_size > max_size)
         rc = base_fail(err, BASE_EINVAL, "%s: %lld bytes, more than the %zu this kind of file may have", path,
                        (long long)st.st_size, max_size);
-        goto out;
-    }
-    size_t n = (size_t)st.st_size;
-    buffer = malloc(n + 1);
-    if (!buffer) {
+    else if (!(buffer = malloc((size_t)st.st_size + 1)))
         rc = base_fail_nomem(err, path);
-        goto out;
-    }
-    if (fread(buffer, 1, n, f) != n) {
+    else if (fread(buffer, 1, (size_t)st.st_size, f) != (size_t)st.st_size)
         rc = base_fail(err, BASE_EIO, "%s: read error", path);
-        goto out;
-    }
-    buffer[n] = '\0';
-    *data = buffer;
-    *size = n;
-    buffer = NULL;
-out:
-    free(buffer);
     fclose(f);
-    return rc;
+    if (rc) {
+        free(buffer);
+        return rc;
+    }
+    buffer[st.st_size] = '\0';
+    *data = buffer;
+    *size = (size_t)st.st_size;
+    return 0;
 }
 
 /* --- names of outputs --- */
@@ -169,10 +160,9 @@ static int check_output(const char *path, char *target, struct base_err *err)
     folder_of(target, folder);
     if (access(folder, W_OK | X_OK) != 0)
         return base_fail(err, BASE_EIO, "%s: cannot write there: %s", path, strerror(errno));
-    if (lstat(target, &st) != 0 && errno == ENAMETOOLONG)
-        return too_long(path, err);
     if (lstat(target, &st) != 0 && errno != ENOENT)
-        return base_fail(err, BASE_EIO, "%s: cannot write there: %s", path, strerror(errno));
+        return errno == ENAMETOOLONG ? too_long(path, err)
+                                     : base_fail(err, BASE_EIO, "%s: cannot write there: %s", path, strerror(errno));
     if (stat(target, &st) == 0 && !S_ISREG(st.st_mode))
         return base_fail(err, BASE_EINVAL, "%s: cannot write there: %s", path,
                          S_ISDIR(st.st_mode) ? "it is a folder" : "it is no regular file and would be replaced");

@@ -61,29 +61,24 @@ static void read_text(const char *folder, const char *name, char *to, size_t roo
         close(fd);
 }
 
-/* Reads up to n numbers of a file; returns how many there are. */
-static int read_numbers(const char *folder, const char *name, double *to, int n)
+/* Reads one or two numbers of a file; returns how many there are. */
+static int read_numbers(const char *folder, const char *name, long to[2])
 {
-    char text[64], *at = text;
-    int found = 0;
-    for (read_text(folder, name, text, sizeof text); found < n; found++) {
-        char *end;
-        to[found] = (double)strtol(at, &end, 10);
-        if (end == at)
-            break;
-        at = end;
-    }
-    return found;
+    char text[64];
+    read_text(folder, name, text, sizeof text);
+    return sscanf(text, "%ld %ld", &to[0], &to[1]);
 }
 
 /* Processors' worth of time of one control group, of version 2 ("max": none) or 1 (-1: none); 0: no limit. */
 static double quota_of(const char *folder)
 {
-    double v[2];
-    const int is_there =
-        read_numbers(folder, "cpu.max", v, 2) == 2 ||
-        (read_numbers(folder, "cpu.cfs_quota_us", v, 1) == 1 && read_numbers(folder, "cpu.cfs_period_us", v + 1, 1) == 1);
-    return is_there && v[0] > 0 && v[1] > 0 ? v[0] / v[1] : 0;
+    long v[2], period[2];
+    if (read_numbers(folder, "cpu.max", v) != 2) {
+        if (read_numbers(folder, "cpu.cfs_quota_us", v) < 1 || read_numbers(folder, "cpu.cfs_period_us", period) < 1)
+            return 0;
+        v[1] = period[0];
+    }
+    return v[0] > 0 && v[1] > 0 ? (double)v[0] / (double)v[1] : 0;
 }
 
 /* The least of a group's and of all that it is in. In a container the path may begin elsewhere: what is not there limits
