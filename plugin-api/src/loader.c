@@ -8,6 +8,10 @@
 
 #include <dirent.h>
 #include <dlfcn.h>
+#include <elf.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <link.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,7 +19,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "elf_file.h"
 #include "process_state.h"
 
 int32_t lull_error_set(struct lull_error *err, int32_t code, const char *format, ...)
@@ -46,6 +49,59 @@ __attribute__((format(printf, 3, 4))) static void say(const struct lull_search *
     search->log(search->log_context, level, text);
 }
 
+/* --- a file ----------------------------------------------------------------------------------------------------------- */
+
+static int read_at(int fd, void *out, size_t size, uint64_t offset)
+{
+    return offset <= INT64_MAX && pread(fd, out, size, (off_t)offset) == (ssize_t)size;
+}
+
+static const char *header_fault(const ElfW(Ehdr) * h)
+{
+    unsigned char own_class = sizeof(void *) == 8 ? ELFCLASS64 : ELFCLASS32;
+    if (memcmp(h->e_ident, ELFMAG, SELFMAG) != 0)
+        return "not a shared object";
+    if (h->e_ident[EI_CLASS] != own_class)
+        return "a shared object of another word size";
+    if (h->e_type != ET_DYN || h->e_phentsize != sizeof(ElfW(Phdr)))
+        return "not a shared object";
+    return NULL;
+}
+
+static const char *segments_fault(int fd, const ElfW(Ehdr) * h, uint64_t size)
+{
+    for (unsigned i = 0; i < h->e_phnum; i++) {
+        ElfW(Phdr) p;
+        if (h->e_phoff > size || !read_at(fd, &p, sizeof p, h->e_phoff + (uint64_t)i * sizeof p))
+            return "a shared object that was cut short";
+        if (p.p_type == PT_LOAD && (p.p_offset > size || p.p_filesz > size - p.p_offset))
+            return "a shared object that was cut short";
+    }
+    return NULL;
+}
+
+/* NULL if the file is an ELF shared object of this machine's class whose segments all lie within the file; else what is wrong
+ * with it. */
+static const char *find_fault(const char *path)
+{
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (fd < 0)
+        return errno == ENOENT ? "no such file" : "cannot be opened";
+    struct stat st;
+    ElfW(Ehdr) header;
+    const char *fault;
+    if (fstat(fd, &st) != 0 || !S_ISREG(st.st_mode))
+        fault = "not a file";
+    else if (!read_at(fd, &header, sizeof header, 0))
+        fault = "not a shared object";
+    else
+        fault = header_fault(&header);
+    if (!fault)
+        fault = segments_fault(fd, &header, (uint64_t)st.st_size);
+    close(fd);
+    return fault;
+}
+
 /* --- one library ----------------------------------------------------------------------------------------------------- */
 
 /* Tells about, and where possible undoes, what loading did to the process. */
@@ -62,7 +118,7 @@ static void compare_process(const struct lull_search *search, const char *path, 
 
 static int32_t load_entry(const struct lull_search *search, const char *path, lull_entry_fn *entry, struct lull_error *err)
 {
-    const char *fault = lull_elf_file_fault(path);
+    const char *fault = find_fault(path);
     if (fault)
         return lull_error_set(err, LULL_E_IO, "%s: %s", path, fault);
 
@@ -211,102 +267,66 @@ static int has_suffix(const char *text, const char *suffix)
     return n > m && strcmp(text + n - m, suffix) == 0;
 }
 
-struct library_name {
-    char *path;
-    const char *base; /* within path */
-};
-
-struct library_list {
-    struct library_name *items;
-    size_t count, room;
-};
-
-static void library_list_release(struct library_list *list)
+/* Writes the path of a file there; 0 if there is none. */
+static int find_file(const char *dir, const char *name, const char *ending, char path[LULL_PATH_MAX])
 {
-    for (size_t i = 0; i < list->count; i++)
-        free(list->items[i].path);
-    free(list->items);
+    return snprintf(path, LULL_PATH_MAX, "%s/%s%s", dir, name, ending) < LULL_PATH_MAX && is_file(path);
 }
 
-static int32_t library_list_add(struct library_list *list, const char *dir, const char *name)
-{
-    for (size_t i = 0; i < list->count; i++)
-        if (strcmp(list->items[i].base, name) == 0)
-            return LULL_OK; /* an earlier directory hides it */
-    if (list->count == list->room) {
-        size_t room = list->room == 0 ? 16 : 2 * list->room;
-        struct library_name *items = realloc(list->items, room * sizeof *items);
-        if (!items)
-            return LULL_E_MEMORY;
-        list->items = items;
-        list->room = room;
-    }
-    size_t size = strlen(dir) + 1 + strlen(name) + 1;
-    char *path = malloc(size);
-    if (!path)
-        return LULL_E_MEMORY;
-    snprintf(path, size, "%s/%s", dir, name);
-    if (size > LULL_PATH_MAX || !is_file(path)) {
-        free(path);
-        return LULL_OK;
-    }
-    list->items[list->count].path = path;
-    list->items[list->count].base = path + strlen(dir) + 1;
-    list->count++;
-    return LULL_OK;
-}
+static int is_library(const struct dirent *e) { return e->d_name[0] != '.' && has_suffix(e->d_name, ".so"); }
 
-static int by_base(const void *a, const void *b)
-{
-    return strcmp(((const struct library_name *)a)->base, ((const struct library_name *)b)->base);
-}
+static int by_name(const struct dirent **a, const struct dirent **b) { return strcmp((*a)->d_name, (*b)->d_name); }
 
-/* Every *.so of the directories; the caller releases the list, also after a failure. */
-static int32_t library_list_scan(const struct lull_search *search, struct library_list *list)
+/* Whether one of the first so many directories has it, too. */
+static int is_hidden(const struct lull_search *search, const char *name, size_t earlier)
 {
-    char dir[LULL_PATH_MAX];
-    int32_t status = LULL_OK;
-    for (struct dir_walk walk = {.search = search}; status == LULL_OK && next_dir(&walk, dir);) {
-        DIR *d = opendir(dir);
-        if (!d)
-            continue; /* a directory that does not exist holds no criterion */
-        size_t first = list->count;
-        for (struct dirent *e; status == LULL_OK && (e = readdir(d));)
-            if (e->d_name[0] != '.' && has_suffix(e->d_name, ".so"))
-                status = library_list_add(list, dir, e->d_name);
-        closedir(d);
-        if (list->count > first)
-            qsort(list->items + first, list->count - first, sizeof *list->items, by_base);
-    }
-    return status;
+    char dir[LULL_PATH_MAX], path[LULL_PATH_MAX];
+    int found = 0;
+    for (struct dir_walk walk = {.search = search}; earlier > 0 && !found && next_dir(&walk, dir); earlier--)
+        found = find_file(dir, name, "", path);
+    return found;
 }
 
 /* --- public ---------------------------------------------------------------------------------------------------------- */
 
+static int32_t visit_library(const struct lull_search *search, struct lull_found *found,
+                             int32_t (*visit)(void *context, const struct lull_found *found), void *context)
+{
+    lull_entry_fn entry;
+    uint32_t count;
+    struct lull_error err = {.struct_size = sizeof err};
+    int32_t status = LULL_OK;
+    if (load_library(search, found->path, &entry, &count, &err) != LULL_OK) {
+        say(search, LULL_LOG_ERROR, "skipped: %s", err.message);
+        return LULL_OK;
+    }
+    for (uint32_t k = 0; status == LULL_OK && k < count; k++) {
+        found->criterion = entry(k);
+        status = visit(context, found);
+    }
+    return status;
+}
+
 int32_t lull_list(const struct lull_search *search, int32_t (*visit)(void *context, const struct lull_found *found),
                   void *context)
 {
-    struct library_list list = {0};
-    int32_t status = library_list_scan(search, &list);
-    struct lull_found *found = status == LULL_OK ? malloc(sizeof *found) : NULL;
-    if (!found)
-        status = LULL_E_MEMORY;
-    for (size_t i = 0; status == LULL_OK && i < list.count; i++) {
-        lull_entry_fn entry;
-        uint32_t count;
-        struct lull_error err = {.struct_size = sizeof err};
-        if (load_library(search, list.items[i].path, &entry, &count, &err) != LULL_OK) {
-            say(search, LULL_LOG_ERROR, "skipped: %s", err.message);
-            continue;
+    struct lull_found *found = malloc(sizeof *found);
+    struct dir_walk walk = {.search = search};
+    char dir[LULL_PATH_MAX];
+    int32_t status = found ? LULL_OK : LULL_E_MEMORY;
+    for (size_t earlier = 0; status == LULL_OK && next_dir(&walk, dir); earlier++) {
+        struct dirent **list = NULL;
+        const int count = scandir(dir, &list, is_library, by_name); /* -1: most often there is no such directory */
+        status = count < 0 && errno == ENOMEM ? LULL_E_MEMORY : LULL_OK;
+        for (int i = 0; i < count; i++) {
+            const char *name = list[i]->d_name;
+            if (status == LULL_OK && find_file(dir, name, "", found->path) && !is_hidden(search, name, earlier))
+                status = visit_library(search, found, visit, context);
+            free(list[i]);
         }
-        snprintf(found->path, sizeof found->path, "%s", list.items[i].path);
-        for (uint32_t k = 0; status == LULL_OK && k < count; k++) {
-            found->criterion = entry(k);
-            status = visit(context, found);
-        }
+        free(list);
     }
     free(found);
-    library_list_release(&list);
     return status;
 }
 
@@ -349,13 +369,10 @@ static int32_t take_if_named(void *context, const struct lull_found *found)
 static int32_t open_name(const struct lull_search *search, const char *name, const char *id, struct lull_found *found,
                          struct lull_error *err)
 {
-    char dir[LULL_PATH_MAX], path[2 * LULL_PATH_MAX + 8];
-    for (struct dir_walk walk = {.search = search}; next_dir(&walk, dir);) {
-        snprintf(path, sizeof path, "%s/%s.so", dir, name);
-        if (strlen(path) >= LULL_PATH_MAX || !is_file(path))
-            continue;
-        return open_path(search, path, id ? id : name, found, err);
-    }
+    char dir[LULL_PATH_MAX], path[LULL_PATH_MAX];
+    for (struct dir_walk walk = {.search = search}; next_dir(&walk, dir);)
+        if (find_file(dir, name, ".so", path))
+            return open_path(search, path, id ? id : name, found, err);
     if (!id) {
         struct name_query query = {.id = name, .found = found};
         int32_t status = lull_list(search, take_if_named, &query);
