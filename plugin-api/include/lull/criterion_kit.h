@@ -95,26 +95,15 @@ lull_kit_fail(struct lull_error *err, int32_t code, const char *format, ...)
 /* --- parameters ---------------------------------------------------------------------------------------------------- */
 
 /* Elements of a parameter table. `preset` is the default's text. */
-#define LULL_KIT_INT(name, preset, min, max, help) \
+#define LULL_KIT_OF(name, help, preset, choices, min, max, type) \
     { \
-        name, help, preset, NULL, min, max, LULL_PARAM_INT, 0 \
+        name, help, preset, choices, min, max, type, 0 \
     }
-#define LULL_KIT_FLOAT(name, preset, min, max, help) \
-    { \
-        name, help, preset, NULL, min, max, LULL_PARAM_FLOAT, 0 \
-    }
-#define LULL_KIT_BOOL(name, preset, help) \
-    { \
-        name, help, preset, NULL, 0, 0, LULL_PARAM_BOOL, 0 \
-    }
-#define LULL_KIT_CHOICE(name, preset, choices, help) \
-    { \
-        name, help, preset, choices, 0, 0, LULL_PARAM_CHOICE, 0 \
-    }
-#define LULL_KIT_FILE(name, preset, help) \
-    { \
-        name, help, preset, NULL, 0, 0, LULL_PARAM_FILE, 0 \
-    }
+#define LULL_KIT_INT(name, preset, min, max, help) LULL_KIT_OF(name, help, preset, NULL, min, max, LULL_PARAM_INT)
+#define LULL_KIT_FLOAT(name, preset, min, max, help) LULL_KIT_OF(name, help, preset, NULL, min, max, LULL_PARAM_FLOAT)
+#define LULL_KIT_BOOL(name, preset, help) LULL_KIT_OF(name, help, preset, NULL, 0, 0, LULL_PARAM_BOOL)
+#define LULL_KIT_CHOICE(name, preset, choices, help) LULL_KIT_OF(name, help, preset, choices, 0, 0, LULL_PARAM_CHOICE)
+#define LULL_KIT_FILE(name, preset, help) LULL_KIT_OF(name, help, preset, NULL, 0, 0, LULL_PARAM_FILE)
 
 /* A decimal number that fills the whole text; 0 if it is none. Not strtod, which follows the process's locale. */
 static inline int lull_kit_number(const char *text, double *out)
