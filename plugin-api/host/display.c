@@ -3,23 +3,25 @@
  * takes them. Between the two stands one picture and a mark per block, so that a slow viewer gets the newest state of a
  * block instead of a queue of old ones, and memory is bounded.
  */
+#include <errno.h>
 #include <math.h>
 #include <netdb.h>
+#include <poll.h>
 #include <pthread.h>
 #include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
 
 #include <lull/criterion_kit.h>
 
 #include "base/clock.h"
-#include "base/tcp.h"
+#include "base/options.h"
 #include "host/frame.h"
 #include "host/viewer.h"
-
-static const char PORT[] = "14158";
 
 /* Between two copies there is so much time, and more where a copy would take more than that share of it. */
 static const double EVERY_S = 0.25, COPY_SHARE = 0.02;
@@ -47,6 +49,85 @@ struct lull_host_display {
     int socket;                    /* of the thread, as the next; -1: no viewer */
     struct viewer_packet packet;
 };
+
+/* --- a connection to somebody who may be slow, hostile or gone ---------------------------------------------------------- */
+
+/* Cuts "HOST", "HOST:PORT" or "[IPv6]:PORT" into host and port, which stays where none is named; an IPv6 address without
+ * brackets has none. 0: that is no address. */
+static int split(const char *text, char host[256], char port[8])
+{
+    const char *from = text, *end = strrchr(text, ':'), *named = NULL;
+    if (text[0] == '[') {
+        from = text + 1;
+        end = strchr(text, ']');
+        if (!end || (end[1] != '\0' && end[1] != ':'))
+            return 0;
+        named = end[1] == ':' ? end + 2 : NULL;
+    } else if (end && strchr(text, ':') == end)
+        named = end + 1;
+    else
+        end = text + strlen(text);
+    int64_t number;
+    if (end == from || end - from >= 256 || (named && !base_parse_integer(named, 1, 65535, &number)))
+        return 0;
+    snprintf(host, 256, "%.*s", (int)(end - from), from);
+    if (named)
+        snprintf(port, 8, "%d", (int)number);
+    return 1;
+}
+
+/* May wait for a name server. *out is freed with freeaddrinfo. */
+static int32_t find_address(const char *text, struct addrinfo **out, struct lull_error *err)
+{
+    char host[256], port[8] = "14158";
+    const struct addrinfo hints = {.ai_family = AF_UNSPEC, .ai_socktype = SOCK_STREAM};
+    if (!split(text, host, port))
+        return lull_error_set(err, LULL_E_INVALID, "%.200s: expected HOST or HOST:PORT, the port from 1 to 65535", text);
+    int code = getaddrinfo(host, port, &hints, out);
+    if (code != 0)
+        return lull_error_set(err, LULL_E_INVALID, "%.200s: no such host (%s)", text, gai_strerror(code));
+    return LULL_OK;
+}
+
+/* Until the socket can be written to; 0: not within wait_s. */
+static int wait_for(int socket, double wait_s)
+{
+    struct pollfd p = {.fd = socket, .events = POLLOUT};
+    return poll(&p, 1, (int)(wait_s * 1e3)) == 1;
+}
+
+/* A socket that never blocks and that no child inherits; -1: nobody answered in time. */
+static int connect_to(const struct addrinfo *to)
+{
+    for (; to; to = to->ai_next) {
+        int fd = socket(to->ai_family, to->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, to->ai_protocol), failed = 0;
+        socklen_t size = sizeof failed;
+        if (fd < 0)
+            continue;
+        if (connect(fd, to->ai_addr, to->ai_addrlen) == 0)
+            return fd;
+        if (errno == EINPROGRESS && wait_for(fd, CONNECT_S) && getsockopt(fd, SOL_SOCKET, SO_ERROR, &failed, &size) == 0 &&
+            failed == 0)
+            return fd;
+        close(fd);
+    }
+    return -1;
+}
+
+/* Sends what the other side takes, without SIGPIPE, and waits for at most STEP_S until it takes something. The number of
+ * bytes; -1: it is gone. */
+static ssize_t send_some(int socket, const void *data, size_t size)
+{
+    for (int waited = 0;; waited = 1) {
+        ssize_t n = send(socket, data, size, MSG_NOSIGNAL);
+        if (n >= 0)
+            return n;
+        if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)
+            return -1;
+        if (waited || !wait_for(socket, STEP_S))
+            return 0;
+    }
+}
 
 /* --- the renderer's side ---------------------------------------------------------------------------------------------- */
 
@@ -142,7 +223,7 @@ static void send_packet(struct lull_host_display *d)
     int gone = 0;
     pthread_mutex_unlock(&d->lock);
     while (sent < d->packet.size && !gone) {
-        const ptrdiff_t n = base_tcp_send(d->socket, d->packet.at + sent, d->packet.size - sent, STEP_S);
+        const ssize_t n = send_some(d->socket, d->packet.at + sent, d->packet.size - sent);
         const double now_s = base_clock_wall_s();
         taken_s = n > 0 ? now_s : taken_s;
         sent += n > 0 ? (size_t)n : 0;
@@ -157,7 +238,7 @@ static void find_viewer(struct lull_host_display *d)
 {
     const struct lull_host_blocks *b = d->blocks;
     pthread_mutex_unlock(&d->lock);
-    int socket = base_tcp_connect(d->address, CONNECT_S);
+    int socket = connect_to(d->address);
     pthread_mutex_lock(&d->lock);
     d->socket = socket;
     if (socket >= 0) {
@@ -286,7 +367,6 @@ static int32_t begin_thread(struct lull_host_display *d, struct lull_error *err)
 int32_t lull_host_display_open(const struct lull_host_frame *frame, const char *address, const char *name,
                                struct lull_host_display **out, struct lull_error *err)
 {
-    struct base_err why = {0};
     int32_t code = lull_host_given(err, "frame", frame, "address", address, "name", name, "out", out, NULL);
     if (code != LULL_OK)
         return code;
@@ -295,7 +375,9 @@ int32_t lull_host_display_open(const struct lull_host_frame *frame, const char *
         return lull_host_no_memory(err, "the live view");
     d->socket = -1;
     d->blocks = &frame->blocks;
-    code = base_tcp_find(address, PORT, &d->address, &why) ? lull_host_translate(&why, err) : allocate(d, name, err);
+    code = find_address(address, &d->address, err);
+    if (code == LULL_OK)
+        code = allocate(d, name, err);
     if (code == LULL_OK)
         code = begin_thread(d, err);
     if (code == LULL_OK)
