@@ -131,6 +131,10 @@ void lull_host_say(struct lull_host_criterion *criterion, int32_t level, const c
 /* Passes a warning that was logged nowhere to err, once, with the code LULL_OK; returns LULL_OK. */
 int32_t lull_host_pass_warning(struct lull_host_criterion *criterion, struct lull_error *err);
 
+/* After a call of a criterion: puts back what it changed of what was read before, such as rounding, signals or the locale,
+ * and tells that once. */
+void lull_host_leave(struct lull_host_criterion *criterion, const struct lull_process_state *before, const char *call);
+
 /* --- given.c: what the renderer hands in ----------------------------------------------------------------------------- */
 
 /* Pairs of a name and a pointer, NULL at the end: LULL_E_INVALID names the first pointer that is NULL. */
@@ -240,14 +244,6 @@ struct cJSON;
  * memory. */
 struct cJSON *lull_host_report_block(struct cJSON *list, const struct lull_host_block *b, const double *noisy_error,
                                      int *failed);
-
-/* --- leave.c -------------------------------------------------------------------------------------------------------- */
-
-/* After a call of a criterion: puts back what it changed of what was read before, such as rounding, signals or the locale,
- * and tells that once. */
-void lull_host_leave(struct lull_host_criterion *criterion, const struct lull_process_state *before, const char *call);
-/* `count` tasks of a criterion; each leaves its thread as it found it. */
-int32_t lull_host_tasks(struct lull_host_criterion *criterion, uint64_t count, lull_task_fn fn, void *arg);
 
 /* --- failure.c ------------------------------------------------------------------------------------------------------ */
 
