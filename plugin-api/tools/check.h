@@ -111,6 +111,11 @@ void lc_host_release(struct lc_host *h);
 
 /* --- image ------------------------------------------------------------------------------------------------------------- */
 
+/* Grey in stripes: of columns 0 to 11, of the next twelve, and so on; noise relative to it. */
+struct lc_paint {
+    double even, odd, sigma;
+};
+
 /* A picture of blocks with made-up noise that falls with the number of samples. All estimates are multiples of 1/256
  * below 8 in magnitude, so that every storage type holds them exactly and answers can be compared across types. */
 struct lc_film {
@@ -120,7 +125,7 @@ struct lc_film {
     struct lull_rect *rects;       /* owns, [block_count] */
     struct lull_block *blocks;     /* owns, [block_count]: state */
     double *sum[LULL_PLANE_COUNT]; /* owns: sums over samples, [height][width][channels]; SPP and WEIGHT unused */
-    void (*paint)(double rgb[3], double *sigma, int32_t x, int32_t y); /* truth and relative noise; NULL = a default */
+    const struct lc_paint *paint;  /* borrows; NULL: a gradient with noise */
 };
 
 extern const uint32_t lc_plane_channels[LULL_PLANE_COUNT];
@@ -299,9 +304,6 @@ lull_entry_fn lc_entry(const char *path);
 
 /* The i-th parameter of the criterion. */
 const struct lull_param *lc_param(const struct lc *c, uint32_t i);
-
-/* Calls visit for every symbol that a shared object defines for others. 0, or -1 if the file is not understood. */
-int lc_elf_exports(const char *path, void (*visit)(void *context, const char *name), void *context);
 
 /* Calls of malloc and friends by this process; -1 in a build that cannot count them (sanitizers). */
 long lc_alloc_count(void);

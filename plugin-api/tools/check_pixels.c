@@ -226,52 +226,20 @@ void lc_check_values(struct lc *c)
         }
 }
 
-static void paint_black(double rgb[3], double *sigma, int32_t x, int32_t y)
-{
-    (void)x, (void)y;
-    rgb[0] = rgb[1] = rgb[2] = 0;
-    *sigma = 0;
-}
-
-static void paint_constant(double rgb[3], double *sigma, int32_t x, int32_t y)
-{
-    (void)x, (void)y;
-    rgb[0] = rgb[1] = rgb[2] = 0.5;
-    *sigma = 0;
-}
-
-static void paint_half_black(double rgb[3], double *sigma, int32_t x, int32_t y)
-{
-    paint_black(rgb, sigma, x, y);
-    if (x % 24 >= 12)
-        rgb[0] = rgb[1] = rgb[2] = *sigma = 1;
-}
-
-static void run_painted(struct lc *c, void (*paint)(double *, double *, int32_t, int32_t))
-{
-    struct lc_film film;
-    if (lc_film_init_for(&film, &c->req, 1, 0) != 0)
-        return;
-    film.paint = paint;
-    lc_run_film(c, &film);
-}
-
 void lc_check_flat(struct lc *c)
 {
-    run_painted(c, paint_black);
-    run_painted(c, paint_constant);
-    run_painted(c, paint_half_black);
+    static const struct lc_paint paints[] = {{0, 0, 0}, {0.5, 0.5, 0}, {0, 1, 1}}; /* black, constant, half black */
+    for (size_t i = 0; i < COUNT(paints); i++) {
+        struct lc_film film;
+        if (lc_film_init_for(&film, &c->req, 1, 0) != 0)
+            return;
+        film.paint = &paints[i];
+        lc_run_film(c, &film);
+    }
 }
 
 #define GREY 0.25f
 enum { BLOCK_SIDE = 200 }; /* what renderers' blocks are like, if the criterion takes any */
-
-static void paint_grey(double rgb[3], double *sigma, int32_t x, int32_t y)
-{
-    (void)x, (void)y;
-    rgb[0] = rgb[1] = rgb[2] = (double)GREY;
-    *sigma = 0;
-}
 
 /* A light that one sample of the pixel has found, n times as bright as it is shown: in the half buffer's samples or not. */
 static void light_pixel(struct lc_image *image, const struct lull_block *b, int32_t x, int in_half)
@@ -288,6 +256,7 @@ static void light_pixel(struct lc_image *image, const struct lull_block *b, int3
  * sample. */
 static int grey_stops_at(struct lc *c, int fireflies)
 {
+    static const struct lc_paint grey = {(double)GREY, (double)GREY, 0};
     struct lc_session s;
     struct lc_film film;
     int step = 0, action = LULL_CONTINUE, sized = c->req.block_width > 0 && c->req.block_height > 0;
@@ -296,7 +265,7 @@ static int grey_stops_at(struct lc *c, int fireflies)
     if (!LC_EXPECT(c, lc_film_init(&film, w, h, w, h, 1) == 0, "out of memory") ||
         lc_session_open_film(&s, c, NULL, &film) != 0)
         return 0;
-    s.film.paint = paint_grey;
+    s.film.paint = &grey;
     for (; step < LC_STEPS && action == LULL_CONTINUE; step += action == LULL_CONTINUE, s.spp *= 2) {
         struct lc_image image;
         struct lull_decision d[LC_FILM_BLOCKS];

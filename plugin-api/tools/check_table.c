@@ -5,10 +5,14 @@
 #include "check.h"
 
 #include <dlfcn.h>
+#include <elf.h>
+#include <link.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "base/files.h"
 
 lull_entry_fn lc_entry(const char *path)
 {
@@ -25,27 +29,67 @@ const struct lull_param *lc_param(const struct lc *c, uint32_t i)
 
 /* --- symbols --------------------------------------------------------------------------------------------------------- */
 
-struct exports {
-    struct lc *check;
-    unsigned entries;
+struct bytes {
+    const char *data;
+    uint64_t size;
 };
 
-static void note_export(void *context, const char *name)
+static const void *within(const struct bytes *file, uint64_t offset, uint64_t size)
 {
-    struct exports *e = context;
-    if (strcmp(name, LULL_ENTRY_NAME) == 0)
-        e->entries++;
-    else
-        lc_fail(e->check, "exports %s", name);
+    return offset <= file->size && size <= file->size - offset ? file->data + offset : NULL;
+}
+
+static int is_export(const ElfW(Sym) * symbol)
+{
+    unsigned bind = symbol->st_info >> 4, visibility = symbol->st_other & 3;
+    return symbol->st_shndx != SHN_UNDEF && symbol->st_shndx != SHN_ABS &&
+           (bind == STB_GLOBAL || bind == STB_WEAK || bind == STB_GNU_UNIQUE) &&
+           (visibility == STV_DEFAULT || visibility == STV_PROTECTED);
+}
+
+static int look_at_table(struct lc *c, const struct bytes *file, const ElfW(Shdr) * table, const ElfW(Shdr) * strings)
+{
+    const ElfW(Sym) *symbols = within(file, table->sh_offset, table->sh_size);
+    const char *text = within(file, strings->sh_offset, strings->sh_size);
+    if (!symbols || !text || strings->sh_size == 0 || text[strings->sh_size - 1] != '\0')
+        return -1;
+    int entries = 0;
+    for (uint64_t i = 0; i < table->sh_size / sizeof *symbols; i++) {
+        if (!is_export(&symbols[i]) || symbols[i].st_name >= strings->sh_size)
+            continue;
+        const int is_entry = strcmp(text + symbols[i].st_name, LULL_ENTRY_NAME) == 0;
+        LC_EXPECT(c, is_entry, "exports %s", text + symbols[i].st_name);
+        entries += is_entry;
+    }
+    return entries;
+}
+
+/* How often a shared object defines the entry; what else it defines for others is reported. -1: it is not understood. */
+static int look_at_exports(struct lc *c, const struct bytes *file)
+{
+    const ElfW(Ehdr) *header = within(file, 0, sizeof *header);
+    if (!header || memcmp(header->e_ident, ELFMAG, SELFMAG) != 0 || header->e_shentsize != sizeof(ElfW(Shdr)))
+        return -1;
+    const ElfW(Shdr) *sections = within(file, header->e_shoff, (uint64_t)header->e_shnum * sizeof *sections);
+    if (!sections)
+        return -1;
+    for (unsigned i = 0; i < header->e_shnum; i++)
+        if (sections[i].sh_type == SHT_DYNSYM && sections[i].sh_link < header->e_shnum)
+            return look_at_table(c, file, &sections[i], &sections[sections[i].sh_link]);
+    return -1;
 }
 
 void lc_check_symbols(struct lc *c)
 {
-    struct exports e = {.check = c};
-    if (lc_elf_exports(c->path, note_export, &e) != 0)
-        lc_fail(c, "its symbol table cannot be read");
-    else
-        LC_EXPECT(c, e.entries == 1, "does not export %s", LULL_ENTRY_NAME);
+    char *data;
+    size_t size;
+    int entries = -1;
+    if (base_file_read(c->path, SIZE_MAX, &data, &size, NULL) == 0) {
+        entries = look_at_exports(c, &(struct bytes){data, size});
+        free(data);
+    }
+    if (LC_EXPECT(c, entries >= 0, "its symbol table cannot be read"))
+        LC_EXPECT(c, entries == 1, "does not export %s", LULL_ENTRY_NAME);
 }
 
 /* --- loading --------------------------------------------------------------------------------------------------------- */

@@ -139,26 +139,19 @@ static void keep_output(FILE *output, struct lc_report *report)
     }
 }
 
-static void keep_end(int status, struct lc_report *report)
-{
-    if (WIFSIGNALED(status))
-        keep(report, 'F', "it crashed: %s", strsignal(WTERMSIG(status)));
-    else if (!report->completed)
-        keep(report, 'F', "it ended the process (exit status %d)", WEXITSTATUS(status));
-}
-
 /* Waits for the child and says how it ended, what it was at if that was no good end, and what it printed. */
 static void gather(struct lc *c, pid_t pid, int fd, unsigned limit_s, FILE *output, struct lc_report *report)
 {
-    int status = 0;
-    if (!read_lines(fd, limit_s, report)) {
+    int status = 0, in_time = read_lines(fd, limit_s, report);
+    if (!in_time)
         kill(pid, SIGKILL);
-        waitpid(pid, &status, 0);
+    waitpid(pid, &status, 0);
+    if (!in_time)
         keep(report, 'F', "it hangs: it did not end within %u s", limit_s);
-    } else {
-        waitpid(pid, &status, 0);
-        keep_end(status, report);
-    }
+    else if (WIFSIGNALED(status))
+        keep(report, 'F', "it crashed: %s", strsignal(WTERMSIG(status)));
+    else if (!report->completed)
+        keep(report, 'F', "it ended the process (exit status %d)", WEXITSTATUS(status));
     if (!report->completed && c->doing[0] != '\0')
         keep(report, 'N', "%s", c->doing);
     keep_output(output, report);

@@ -86,19 +86,20 @@ static double normal(uint32_t a, uint32_t b, uint32_t c, uint32_t d)
     return sum - 6;
 }
 
-static void paint_default(double rgb[3], double *sigma, int32_t x, int32_t y)
+/* The truth at a pixel; returns the relative noise of a sample. */
+static double paint(const struct lc_paint *p, int32_t x, int32_t y, double rgb[3])
 {
-    rgb[0] = 0.2 + 0.3 * (x % 32) / 32.0;
-    rgb[1] = 0.4 + 0.2 * (y % 32) / 32.0;
-    rgb[2] = 0.3;
-    *sigma = 0.4;
+    rgb[0] = p ? x % 24 < 12 ? p->even : p->odd : 0.2 + 0.3 * (x % 32) / 32.0;
+    rgb[1] = p ? rgb[0] : 0.4 + 0.2 * (y % 32) / 32.0;
+    rgb[2] = p ? rgb[0] : 0.3;
+    return p ? p->sigma : 0.4;
 }
 
 static void add_samples(struct lc_film *f, int32_t x, int32_t y, uint64_t from, uint64_t count, int half)
 {
     size_t at = (size_t)y * (size_t)f->width + (size_t)x;
-    double rgb[3], sigma, mean_y, n = (double)count;
-    (f->paint ? f->paint : paint_default)(rgb, &sigma, x, y);
+    double rgb[3], mean_y, n = (double)count;
+    const double sigma = paint(f->paint, x, y, rgb);
     for (uint32_t c = 0; c < 3; c++) {
         double noise = sigma == 0 ? 0 : normal(f->seed * 7919u + c * 3u, (uint32_t)at, (uint32_t)from, (uint32_t)half);
         double sum = rgb[c] * (n + sigma * sqrt(n) * noise);
