@@ -10,6 +10,8 @@
 
 #include <lull/loader.h>
 
+#include <stdatomic.h>
+
 #include "../src/process_state.h"
 
 /* --- a check and its world ------------------------------------------------------------------------------------------- */
@@ -95,6 +97,8 @@ LC_CHECKS(LC_DECLARE)
 
 /* --- host -------------------------------------------------------------------------------------------------------------- */
 
+enum { LC_WORKERS_MAX = 64 };
+
 /* A host with real threads that can misbehave on request. */
 struct lc_host {
     struct lull_host host; /* first: context points back */
@@ -102,12 +106,11 @@ struct lc_host {
     int reverse;           /* last task first */
     int cancel;            /* cancelled() says so, and parallel_for leaves out all tasks but the first */
     struct lc *check;
-    struct lc_workers *workers; /* owns: which worker numbers are taken */
+    atomic_uchar taken[LC_WORKERS_MAX]; /* which worker numbers are */
 };
 
 /* max_workers is 2 * threads, so that two evaluate calls may each run `threads` tasks. */
-int lc_host_init(struct lc_host *h, struct lc *c, uint32_t threads);
-void lc_host_release(struct lc_host *h);
+void lc_host_init(struct lc_host *h, struct lc *c, uint32_t threads);
 
 /* --- image ------------------------------------------------------------------------------------------------------------- */
 
