@@ -119,22 +119,24 @@ struct lc_paint {
     double even, odd, sigma;
 };
 
+enum { LC_BLOCKS_MAX = 20, LC_STEPS = 7 }; /* blocks of a film, steps of a session */
+
 /* A picture of blocks with made-up noise that falls with the number of samples. All estimates are multiples of 1/256
  * below 8 in magnitude, so that every storage type holds them exactly and answers can be compared across types. */
 struct lc_film {
     int32_t width, height;
     uint32_t seed;
     uint32_t block_count;
-    struct lull_rect *rects;       /* owns, [block_count] */
-    struct lull_block *blocks;     /* owns, [block_count]: state */
-    double *sum[LULL_PLANE_COUNT]; /* owns: sums over samples, [height][width][channels]; SPP and WEIGHT unused */
-    const struct lc_paint *paint;  /* borrows; NULL: a gradient with noise */
+    struct lull_rect rects[LC_BLOCKS_MAX];
+    struct lull_block blocks[LC_BLOCKS_MAX]; /* their state */
+    double *sum[LULL_PLANE_COUNT];           /* owns: sums over samples, [height][width][channels]; SPP and WEIGHT unused */
+    const struct lc_paint *paint;            /* borrows; NULL: a gradient with noise */
 };
 
 extern const uint32_t lc_plane_channels[LULL_PLANE_COUNT];
 extern const char *const lc_plane_names[LULL_PLANE_COUNT];
 
-/* Blocks of block_w x block_h, smaller at the right and bottom edge. 0 or -1 (out of memory). */
+/* Blocks of block_w x block_h, smaller at the right and bottom edge, LC_BLOCKS_MAX at most. 0 or -1 (out of memory). */
 int lc_film_init(struct lc_film *f, int32_t width, int32_t height, int32_t block_w, int32_t block_h, uint32_t seed);
 void lc_film_release(struct lc_film *f);
 /* The frame that suits the criterion: two by one blocks and the rest at the edges, one of them 1x1. The blocks are of the
@@ -217,14 +219,14 @@ struct lc_manner {
 };
 
 struct lc_answer {
-    uint32_t step, id;
+    uint32_t id;
     uint64_t spp;
     struct lull_decision decision;
 };
 
 struct lc_log {
-    struct lc_answer *items; /* owns */
-    size_t count, room;
+    struct lc_answer items[LC_STEPS * LC_BLOCKS_MAX];
+    size_t count;
 };
 
 /* One render from begin_frame to end_frame. */
@@ -241,8 +243,6 @@ struct lc_session {
     uint64_t evaluated; /* blocks */
     int open;
 };
-
-enum { LC_STEPS = 7 };
 
 /* Makes an instance and begins the frame. Not 0 if that failed (which is reported). */
 int lc_session_open(struct lc_session *s, struct lc *c, const struct lc_manner *manner);
@@ -267,7 +267,6 @@ void lc_session_close(struct lc_session *s);
 
 /* The whole session in one manner: its log. Not 0 if it failed (which is reported). */
 int lc_run(struct lc *c, const struct lc_manner *manner, struct lc_log *log);
-void lc_log_release(struct lc_log *log);
 /* Such a session, whose log is held against the expected one. Negative if it failed, 1 if it
  * differs; both are reported. */
 int lc_run_as(struct lc *c, const struct lc_manner *manner, const struct lc_log *expected, int exact, const char *what);

@@ -49,6 +49,4 @@ void lc_check_two(struct lc *c)
         }
         lc_session_close(&a);
     }
-    lc_log_release(&alone[0]);
-    lc_log_release(&alone[1]);
 }

@@ -127,7 +127,6 @@ void lc_check_misuse(struct lc *c)
     if (lc_slots_init(&m.slots, c) == 0 && lc_run(c, NULL, &expected) == 0) {
         while (m.calls < c->misuse && !c->failed)
             live(&m, &expected);
-        lc_log_release(&expected);
     }
     lc_note(c, "%llu calls, %llu of them had to be refused", (unsigned long long)m.calls, (unsigned long long)m.refused);
     free(m.saved.data);

@@ -21,7 +21,6 @@ static void compare_layouts(struct lc *c, const struct stored *list, size_t coun
             if (lc_run_as(c, &manner, &expected, exact, list[i].name) < 0)
                 lc_note(c, "that was with %s", list[i].name);
         }
-    lc_log_release(&expected);
 }
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
@@ -160,11 +159,8 @@ void lc_check_missing(struct lc *c)
     lc_film_release(&film);
     struct lc_log log;
     lc_run(c, &(struct lc_manner){.required_only = 1}, &log);
-    lc_log_release(&log);
-    if (c->req.halo > 0) {
+    if (c->req.halo > 0)
         lc_run(c, &(struct lc_manner){.no_all = 1}, &log);
-        lc_log_release(&log);
-    }
 }
 
 void lc_check_broken_planes(struct lc *c)

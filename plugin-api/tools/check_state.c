@@ -91,12 +91,8 @@ static void run_state(struct lc *c, const struct lull_state *state)
 {
     struct lc_log expected;
     struct lc_session s;
-    if (lc_run(c, NULL, &expected) != 0)
+    if (lc_run(c, NULL, &expected) != 0 || lc_session_open(&s, c, NULL) != 0)
         return;
-    if (lc_session_open(&s, c, NULL) != 0) {
-        lc_log_release(&expected);
-        return;
-    }
     struct lc_buffer whole = {.limit = UINT64_MAX};
     int ok = 1;
     for (int step = 0; step < LC_STEPS && ok; step++) {
@@ -120,7 +116,6 @@ static void run_state(struct lc *c, const struct lull_state *state)
     lc_note(c, "%llu bytes for %u blocks", (unsigned long long)whole.size, s.film.block_count);
     free(whole.data);
     lc_session_close(&s);
-    lc_log_release(&expected);
 }
 
 static void run_refused(struct lc *c, const struct lull_state *state)
@@ -141,7 +136,6 @@ static void run_refused(struct lc *c, const struct lull_state *state)
             lc_log_compare(c, &expected, &s.log, lc_deterministic(c), "after a refused load");
         lc_session_close(&s);
     }
-    lc_log_release(&expected);
 }
 
 void lc_check_state(struct lc *c)

@@ -26,7 +26,6 @@ void lc_check_workers(struct lc *c)
             if (lc_run_as(c, &hosted, &expected, 1, "parallel_for of the host") < 0)
                 lc_note(c, "that was with %u workers", host.host.max_workers);
         }
-    lc_log_release(&expected);
 }
 
 void lc_check_concurrent(struct lc *c)
@@ -44,7 +43,6 @@ void lc_check_concurrent(struct lc *c)
         struct lc_manner concurrent = {.ask = LC_ASK_CONCURRENTLY, .host = &host.host, .slack = i % 2 ? 8 : 0};
         lc_run_as(c, &concurrent, &expected, 1, "concurrent calls");
     }
-    lc_log_release(&expected);
 }
 
 /* --- several instances at once ---------------------------------------------------------------------------------------- */
@@ -84,10 +82,8 @@ void lc_check_instances(struct lc *c)
             pthread_join(threads[i].id, NULL);
         if (threads[i].result == 0)
             lc_log_compare(c, &expected, &threads[i].log, lc_deterministic(c), "one of three concurrent instances");
-        lc_log_release(&threads[i].log);
     }
     c->concurrent = 0;
-    lc_log_release(&expected);
 }
 
 /* --- floating point ----------------------------------------------------------------------------------------------------- */
@@ -111,10 +107,8 @@ void lc_check_fp(struct lc *c)
     _mm_setcsr(_mm_getcsr() & ~(unsigned)FTZ_DAZ);
     if (result == 0)
         lc_log_compare(c, &expected, &got, 0, "with FTZ and DAZ");
-    lc_log_release(&got);
 #else
     (void)got;
     lc_note(c, "FTZ and DAZ are not tried on this machine");
 #endif
-    lc_log_release(&expected);
 }

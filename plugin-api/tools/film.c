@@ -20,9 +20,7 @@ const char *const lc_plane_names[LULL_PLANE_COUNT] = {"COLOR", "WEIGHT", "SPP", 
 static int film_alloc(struct lc_film *f)
 {
     size_t pixels = (size_t)f->width * (size_t)f->height;
-    f->rects = calloc(f->block_count, sizeof *f->rects);
-    f->blocks = calloc(f->block_count, sizeof *f->blocks);
-    int ok = f->rects && f->blocks;
+    int ok = 1;
     for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
         f->sum[p] = calloc(pixels * lc_plane_channels[p], sizeof(double));
         ok = ok && f->sum[p];
@@ -60,8 +58,6 @@ void lc_film_release(struct lc_film *f)
 {
     for (unsigned p = 0; p < LULL_PLANE_COUNT; p++)
         free(f->sum[p]);
-    free(f->rects);
-    free(f->blocks);
     *f = (struct lc_film){0};
 }
 

@@ -108,26 +108,6 @@ int lc_log_compare(struct lc *c, const struct lc_log *expected, const struct lc_
     return LC_EXPECT(c, same, "%s: %zu answers, %zu before", what, got->count, expected->count) ? 0 : -1;
 }
 
-void lc_log_release(struct lc_log *log)
-{
-    free(log->items);
-    *log = (struct lc_log){0};
-}
-
-static int log_add(struct lc_log *log, const struct lc_answer *answer)
-{
-    if (log->count == log->room) {
-        size_t room = log->room == 0 ? 64 : 2 * log->room;
-        struct lc_answer *items = realloc(log->items, room * sizeof *items);
-        if (!items)
-            return -1;
-        log->items = items;
-        log->room = room;
-    }
-    log->items[log->count++] = *answer;
-    return 0;
-}
-
 /* --- asking ------------------------------------------------------------------------------------------------------------ */
 
 enum { GARBAGE = 0xa5 };
@@ -234,9 +214,7 @@ int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const
 {
     double start = base_clock_wall_s();
     int32_t status = LULL_OK;
-    uint32_t *order = malloc((count + 1) * sizeof *order);
-    if (!order)
-        return LULL_E_MEMORY;
+    uint32_t order[LC_BLOCKS_MAX];
     for (uint32_t i = 0; i < count; i++)
         order[i] = s->manner.ask == LC_ASK_REVERSED ? ids[count - 1 - i] : ids[i];
     if (s->manner.ask == LC_ASK_SINGLY)
@@ -248,7 +226,6 @@ int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const
         status = ask_some(s, image, order, count, decisions, err);
     if (s->manner.ask == LC_ASK_TWICE && status == LULL_OK) /* the second answer is the one that is logged */
         status = ask_some(s, image, order, count, decisions, err);
-    free(order);
     s->evaluate_s += base_clock_wall_s() - start;
     s->evaluated += count;
     return status;
@@ -370,8 +347,9 @@ static uint64_t next_spp(const struct lc_session *s, const struct lull_decision 
     return wanted + wanted % 2;
 }
 
-static int step_with(struct lc_session *s, const uint32_t *ids, uint32_t count, struct lull_decision *decisions)
+static int step_with(struct lc_session *s, const uint32_t *ids, uint32_t count)
 {
+    struct lull_decision decisions[LC_BLOCKS_MAX];
     struct lc_image image;
     if (lc_session_image(s, &image) != 0)
         return -1;
@@ -384,8 +362,7 @@ static int step_with(struct lc_session *s, const uint32_t *ids, uint32_t count, 
         struct lull_block *b = &s->film.blocks[ids[i]];
         const struct lull_decision *d = &decisions[ids[i]];
         lc_decision_check(s->check, b, d);
-        if (!LC_EXPECT(s->check, log_add(&s->log, &(struct lc_answer){s->step, b->id, b->spp, *d}) == 0, "out of memory"))
-            return -1;
+        s->log.items[s->log.count++] = (struct lc_answer){b->id, b->spp, *d};
         if (d->action == LULL_STOP)
             b->flags |= LULL_BLOCK_STOPPED;
     }
@@ -407,14 +384,8 @@ uint32_t lc_session_advance(struct lc_session *s, uint32_t *ids)
 
 int lc_session_step(struct lc_session *s)
 {
-    uint32_t *ids = calloc(s->film.block_count, sizeof *ids);
-    struct lull_decision *decisions = calloc(s->film.block_count, sizeof *decisions);
-    int result = -1;
-    if (LC_EXPECT(s->check, ids && decisions, "out of memory"))
-        result = step_with(s, ids, lc_session_advance(s, ids), decisions);
-    free(ids);
-    free(decisions);
-    return result;
+    uint32_t ids[LC_BLOCKS_MAX];
+    return step_with(s, ids, lc_session_advance(s, ids));
 }
 
 int lc_session_steps(struct lc_session *s, int steps)
@@ -432,19 +403,16 @@ void lc_session_close(struct lc_session *s)
     if (s->instance)
         s->check->criterion->destroy(s->instance);
     lc_film_release(&s->film);
-    lc_log_release(&s->log);
     s->instance = NULL;
 }
 
 int lc_run(struct lc *c, const struct lc_manner *manner, struct lc_log *log)
 {
     struct lc_session s;
-    *log = (struct lc_log){0};
     if (lc_session_open(&s, c, manner) != 0)
         return -1;
     int result = lc_session_steps(&s, LC_STEPS);
     *log = s.log;
-    s.log = (struct lc_log){0};
     lc_session_close(&s);
     return result;
 }
@@ -462,11 +430,9 @@ int lc_run_film(struct lc *c, struct lc_film *film)
 int lc_run_as(struct lc *c, const struct lc_manner *manner, const struct lc_log *expected, int exact, const char *what)
 {
     struct lc_log got;
-    int result = lc_run(c, manner, &got);
-    if (result == 0)
-        result = lc_log_compare(c, expected, &got, exact && lc_deterministic(c), what) != 0;
-    lc_log_release(&got);
-    return result;
+    if (lc_run(c, manner, &got) != 0)
+        return -1;
+    return lc_log_compare(c, expected, &got, exact && lc_deterministic(c), what) != 0;
 }
 
 void lc_run_both(struct lc *c, const struct lc_manner *a, const struct lc_manner *b, const char *what)
@@ -474,5 +440,4 @@ void lc_run_both(struct lc *c, const struct lc_manner *a, const struct lc_manner
     struct lc_log expected;
     if (lc_run(c, a, &expected) == 0)
         lc_run_as(c, b, &expected, 1, what);
-    lc_log_release(&expected);
 }
