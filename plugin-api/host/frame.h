@@ -94,6 +94,7 @@ struct lull_host_response {
     double predicted;     /* samples at which it expects to stop; NaN: it does not say */
     int32_t stopped;      /* its response is stop: `predicted` is where, at most spp */
     int32_t undersampled; /* its noise sits in few pixels or grows: light that most of its pixels have not met yet */
+    double error;         /* that it was given; of rows of a quote by error alone */
 };
 
 /* What a row of a quote asks, and the responses to it. */
@@ -102,7 +103,6 @@ struct lull_host_quote_asked {
     struct lull_host_response *response;   /* owns; [blocks] */
     struct lull_host_response *first;      /* owns; [blocks] its first response */
     struct lull_host_quote_block *blocks;  /* owns; the answer */
-    double *errors;                        /* owns; [blocks] that it was given at response->spp; of rows by error alone */
     double limit;                          /* the error at which a row by error stops; 0: another row */
     uint64_t first_spp;                    /* samples at the first check of such a row */
     int other;                             /* not the frame's criterion: its checks take their own time */

@@ -32,17 +32,16 @@ int32_t lull_host_quote_begin(const struct lull_host_frame *frame, int32_t threa
 
 void lull_host_quote_end(struct lull_host_quote *q)
 {
-    for (uint32_t i = 0; q && i < q->count; i++) {
+    if (!q)
+        return;
+    for (uint32_t i = 0; i < q->count; i++) {
         lull_host_close(q->asked[i].criterion);
         free(q->asked[i].response);
         free(q->asked[i].first);
         free(q->asked[i].blocks);
-        free(q->asked[i].errors);
     }
-    if (q) {
-        free(q->asked);
-        free(q->rows);
-    }
+    free(q->asked);
+    free(q->rows);
     free(q);
 }
 
@@ -122,8 +121,7 @@ int32_t lull_host_quote_add_error(struct lull_host_quote *q, double limit, struc
     struct lull_host_quote_asked *a = &q->asked[q->count - 1];
     a->limit = limit;
     a->first_spp = first_check(q->frame->criterion, limit);
-    a->errors = calloc(q->frame->blocks.count, sizeof *a->errors);
-    return a->errors ? LULL_OK : no_memory(err);
+    return LULL_OK;
 }
 
 int32_t lull_host_quote_add_other(struct lull_host_quote *q, struct lull_host_criterion *criterion, struct lull_error *err)
@@ -168,7 +166,7 @@ static void note_error(struct lull_host_quote_asked *a, uint32_t index, const st
     struct lull_host_response *response = &a->response[index];
     if (response->stopped || b->spp <= response->spp)
         return;
-    const double spp = (double)b->spp, before = a->errors[index], limit = a->limit * lull_host_mask_factor(b->step);
+    const double spp = (double)b->spp, before = response->error, limit = a->limit * lull_host_mask_factor(b->step);
     const int has_before = response->spp > 0 && before > 0.0;
     double fall = FALL_OF_NOISE;
     if (has_before && error > 0.0)
@@ -179,8 +177,7 @@ static void note_error(struct lull_host_quote_asked *a, uint32_t index, const st
     const double least = has_before ? (double)response->spp : b->checks > 1 ? 0.0 : first;
     if (stopped)
         stop = fmax(fmin(fmax(stop, least), spp), (double)spp_min);
-    *response = (struct lull_host_response){.spp = b->spp, .predicted = stop, .stopped = stopped};
-    a->errors[index] = error;
+    *response = (struct lull_host_response){.spp = b->spp, .predicted = stop, .error = error, .stopped = stopped};
 }
 
 static void note_errors(const struct lull_host_quote *q, const uint32_t *due, uint32_t count,
