@@ -94,18 +94,13 @@ void base_identity_release(struct base_identity *id)
 
 /* --- comparing -------------------------------------------------------------------------------------------------------- */
 
-struct lines {
-    const char *text;
-    size_t size;
-};
-
 struct line {
     const char *text;   /* NULL: there is none */
     size_t length, key; /* of the whole line; of what stands before '=' */
 };
 
 /* The line at `from`; moves it on. */
-static struct line next_line(const struct lines *l, size_t *from)
+static struct line next_line(const struct base_identity *l, size_t *from)
 {
     struct line line = {0};
     if (*from >= l->size)
@@ -125,7 +120,7 @@ static int same_key(const struct line *a, const struct line *b)
 }
 
 /* The n-th line with this line's key. */
-static struct line find(const struct lines *l, const struct line *like, int n)
+static struct line find(const struct base_identity *l, const struct line *like, int n)
 {
     struct line line;
     for (size_t from = 0; (line = next_line(l, &from)).text;)
@@ -143,8 +138,8 @@ static int role_of(const struct base_identity *id, const struct line *line)
 }
 
 /* The first line of `a` that decides and that `b` has not the same, and what it has instead. */
-static struct line find_difference(const struct lines *a, const struct lines *b, const struct base_identity *roles,
-                                   struct line *instead, unsigned *changed)
+static struct line find_difference(const struct base_identity *a, const struct base_identity *b,
+                                   const struct base_identity *roles, struct line *instead, unsigned *changed)
 {
     struct line line, before;
     for (size_t from = 0; (line = next_line(a, &from)).text;) {
@@ -162,7 +157,7 @@ static struct line find_difference(const struct lines *a, const struct lines *b,
     return line;
 }
 
-static int are_text(const struct lines *l)
+static int are_text(const struct base_identity *l)
 {
     for (size_t i = 0; i < l->size; i++)
         if (l->text[i] != '\n' && !is_text(l->text[i]))
@@ -181,7 +176,7 @@ static const char *show(const struct line *line, char text[SHOWN + 4])
 int base_identity_compare(const struct base_identity *ours, const char *theirs, size_t size, const char *name,
                           const struct base_identity_words *w, unsigned *changed, struct base_err *err)
 {
-    const struct lines a = {theirs, size}, b = {ours->text, ours->size};
+    const struct base_identity a = {.text = (char *)(size_t)theirs, .size = size};
     struct line line, instead = {0};
     char one[SHOWN + 4], other[SHOWN + 4];
     unsigned unused = 0;
@@ -189,14 +184,14 @@ int base_identity_compare(const struct base_identity *ours, const char *theirs, 
     *to = 0;
     if (!are_text(&a))
         return base_fail(err, BASE_EINVAL, "%s%s other settings", name, w->with);
-    line = find_difference(&a, &b, ours, &instead, to);
+    line = find_difference(&a, ours, ours, &instead, to);
     if (line.text && instead.text)
         return base_fail(err, BASE_EINVAL, "%s%s %s, but %s has %s", name, w->with, show(&line, one), w->here,
                          show(&instead, other));
     if (line.text)
         return base_fail(err, BASE_EINVAL, "%s%s %s, but %s has no %.*s", name, w->with, show(&line, one), w->here,
                          (int)line.key, line.text);
-    line = find_difference(&b, &a, ours, &instead, to);
+    line = find_difference(ours, &a, ours, &instead, to);
     if (line.text)
         return base_fail(err, BASE_EINVAL, "%s%s %.*s, but %s has %s", name, w->without, (int)line.key, line.text, w->here,
                          show(&line, one));
