@@ -259,9 +259,10 @@ int lc_session_steps(struct lc_session *s, int steps);
 int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const uint32_t *ids, uint32_t count,
                        struct lull_decision *decisions, struct lull_error *err);
 int lc_session_image(struct lc_session *s, struct lc_image *image);
-/* The asking about all blocks as they are, LC_FILM_BLOCKS at most; answers into decisions by id. Returns whether there were
- * any, each held against the header's rules; else "evaluate WHAT: …" is reported. */
-int lc_session_judge(struct lc_session *s, const struct lc_image *image, struct lull_decision decisions[LC_FILM_BLOCKS],
+/* The asking about all blocks as they are, LC_FILM_BLOCKS at most, by an image that is released then (NULL: that of the
+ * film); answers into decisions by id. Returns whether there were any, each held against the header's rules; else "evaluate
+ * WHAT: …" is reported. */
+int lc_session_judge(struct lc_session *s, struct lc_image *image, struct lull_decision decisions[LC_FILM_BLOCKS],
                      const char *what);
 void lc_session_close(struct lc_session *s);
 

@@ -231,14 +231,19 @@ int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const
     return status;
 }
 
-int lc_session_judge(struct lc_session *s, const struct lc_image *image, struct lull_decision decisions[LC_FILM_BLOCKS],
+int lc_session_judge(struct lc_session *s, struct lc_image *image, struct lull_decision decisions[LC_FILM_BLOCKS],
                      const char *what)
 {
+    struct lc_image own;
+    if (!image && lc_session_image(s, &own) != 0)
+        return 0;
+    image = image ? image : &own;
     uint32_t ids[LC_FILM_BLOCKS] = {0}, count = s->film.block_count;
     struct lull_error err = {.struct_size = sizeof err};
     for (uint32_t i = 0; i < count; i++)
         ids[i] = i;
     int32_t status = lc_session_ask(s, image, ids, count, decisions, &err);
+    lc_image_release(image);
     if (!LC_EXPECT(s->check, status == LULL_OK, "evaluate %s: %d, %s", what, status, err.message))
         return 0;
     for (uint32_t i = 0; i < count; i++)
