@@ -87,23 +87,16 @@ static int32_t evaluate(struct lull_host_criterion *c, const struct question *q,
     return code == LULL_OK ? code : lull_host_blame(c, "", code, &e, err);
 }
 
-static int32_t check_due(const struct lull_host_blocks *b, const uint32_t *due, uint32_t count, struct lull_error *err)
-{
-    for (uint32_t k = 0; k < count; k++)
-        if (due[k] >= b->count || (k > 0 && due[k] <= due[k - 1]))
-            return lull_error_set(err, LULL_E_INVALID, "due[%u] is %u: expected rising indices of %u blocks", k, due[k],
-                                  b->count);
-    return LULL_OK;
-}
-
 static int32_t check_question(const struct lull_host_criterion *c, const struct lull_host_frame *f, const uint32_t *due,
                               uint32_t count, const struct lull_decision *decisions, struct lull_error *err)
 {
     int32_t code = lull_host_given(err, "criterion", c, "frame", f, NULL);
     if (code == LULL_OK && count > 0)
         code = lull_host_given(err, "due", due, "decisions", decisions, NULL);
-    if (code == LULL_OK)
-        code = check_due(&f->blocks, due, count, err);
+    for (uint32_t k = 0; k < count && code == LULL_OK; k++)
+        if (due[k] >= f->blocks.count || (k > 0 && due[k] <= due[k - 1]))
+            code = lull_error_set(err, LULL_E_INVALID, "due[%u] is %u: expected rising indices of %u blocks", k, due[k],
+                                  f->blocks.count);
     return code == LULL_OK ? lull_host_check_samples(f, err) : code;
 }
 

@@ -278,13 +278,6 @@ static void send_block(struct lull_host_display *d, uint32_t i)
     }
 }
 
-static void send_marks(struct lull_host_display *d)
-{
-    d->marks_are_new = 0;
-    viewer_mark(&d->packet, d->seen, d->blocks->count, d->blocks->x0, d->blocks->y0);
-    send_packet(d);
-}
-
 static void *serve(void *data)
 {
     struct lull_host_display *d = data;
@@ -299,9 +292,11 @@ static void *serve(void *data)
             while (!d->is_new[next % d->blocks->count])
                 next++;
             send_block(d, next++ % d->blocks->count);
-        } else if (d->marks_are_new)
-            send_marks(d);
-        else
+        } else if (d->marks_are_new) {
+            d->marks_are_new = 0;
+            viewer_mark(&d->packet, d->seen, d->blocks->count, d->blocks->x0, d->blocks->y0);
+            send_packet(d);
+        } else
             pthread_cond_wait(&d->changed, &d->lock);
     }
     pthread_mutex_unlock(&d->lock);

@@ -8,12 +8,6 @@
  * (docs/results/quote.md). */
 static const double NEAR = 0.15, PER_OCTAVE = 0.08, UNDERSAMPLED = 1.0;
 
-static double half_width(const struct lull_host_response *response, double end)
-{
-    double ahead = log2(end / (double)response->spp);
-    return response->undersampled ? UNDERSAMPLED : NEAR + PER_OCTAVE * fmax(ahead, 0.0);
-}
-
 struct lull_host_stop_at lull_host_expect(const struct lull_host_response *response, uint64_t spp, uint64_t spp_max)
 {
     double has = (double)spp, most = (double)spp_max;
@@ -22,7 +16,8 @@ struct lull_host_stop_at lull_host_expect(const struct lull_host_response *respo
     double end = fmin(fmax(response->predicted, 1.0), most);
     if (response->stopped)
         return (struct lull_host_stop_at){end, end, end, 1};
-    double factor = exp2(half_width(response, end));
+    double ahead = fmax(log2(end / (double)response->spp), 0.0);
+    double factor = exp2(response->undersampled ? UNDERSAMPLED : NEAR + PER_OCTAVE * ahead);
     end = fmax(end, has);
     return (struct lull_host_stop_at){end, fmax(end / factor, has), fmin(end * factor, most), 1};
 }

@@ -5,16 +5,6 @@
 
 #include "base/json.h"
 
-/* One number for square blocks, [width, height] for others. */
-static void add_block_size(cJSON *root, int32_t width, int32_t height, int *failed)
-{
-    if (width == height) {
-        base_json_number(root, "block", width, failed);
-        return;
-    }
-    base_json_numbers(root, "block", (const double[]){width, height}, 2, failed);
-}
-
 /* What it said, if anything. */
 static void add_messages(cJSON *of, struct lull_host_criterion *criterion, int *failed)
 {
@@ -162,22 +152,21 @@ static void add_origin(cJSON *root, const struct lull_host_report *r, int *faile
         base_json_text(command, NULL, r->command[i], failed);
 }
 
-static void add_crop(cJSON *root, const struct lull_host_config *config, int *failed)
-{
-    const int32_t *c = config->crop;
-    if (c[2] != 0 && ((uint32_t)(c[2] - c[0]) != config->width || (uint32_t)(c[3] - c[1]) != config->height))
-        base_json_numbers(root, "crop", (const double[]){c[0], c[1], c[2], c[3]}, 4, failed);
-}
-
 /* The caller deletes it. */
 static cJSON *make(const struct lull_host_frame *f, const struct lull_host_report *r, int *failed)
 {
+    const int32_t *c = f->config.crop;
+    const double crop[] = {c[0], c[1], c[2], c[3]}, size[] = {f->blocks.block_width, f->blocks.block_height};
     cJSON *root = cJSON_CreateObject();
     base_json_text(root, "scene", r->scene, failed);
     base_json_number(root, "width", f->config.width, failed);
     base_json_number(root, "height", f->config.height, failed);
-    add_crop(root, &f->config, failed);
-    add_block_size(root, f->blocks.block_width, f->blocks.block_height, failed);
+    if (crop[2] != 0 && (crop[2] - crop[0] != f->config.width || crop[3] - crop[1] != f->config.height))
+        base_json_numbers(root, "crop", crop, 4, failed);
+    if (size[0] == size[1])
+        base_json_number(root, "block", size[0], failed);
+    else
+        base_json_numbers(root, "block", size, 2, failed);
     base_json_number(root, "seed", (double)f->config.seed, failed);
     base_json_number(root, "threads", r->threads, failed);
     add_processes(root, r, failed);

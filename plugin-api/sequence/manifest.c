@@ -227,14 +227,6 @@ static void put_block(cJSON *blocks, const struct seq_manifest_block *b, int *fa
         base_json_number(o, "dropped", (double)b->dropped, failed);
 }
 
-static void put_view(cJSON *root, const struct seq_manifest *m, int *failed)
-{
-    if (m->has_look_at)
-        base_json_numbers(root, "look_at", m->look_at, 9, failed);
-    if (m->fov_deg > 0)
-        base_json_number(root, "fov", m->fov_deg, failed);
-}
-
 static void put_all(cJSON *root, const struct seq_manifest *m, int *failed)
 {
     base_json_text(root, "format", "lull-sequence", failed);
@@ -246,7 +238,10 @@ static void put_all(cJSON *root, const struct seq_manifest *m, int *failed)
     if (m->inputs_crc32)
         put_crc(root, "inputs_crc32", m->inputs_crc32, failed);
     base_json_text(root, "camera", m->camera, failed);
-    put_view(root, m, failed);
+    if (m->has_look_at)
+        base_json_numbers(root, "look_at", m->look_at, 9, failed);
+    if (m->fov_deg > 0)
+        base_json_number(root, "fov", m->fov_deg, failed);
     base_json_text(root, "renderer", m->renderer, failed);
     base_json_number(root, "width", m->width, failed);
     base_json_number(root, "height", m->height, failed);

@@ -169,14 +169,6 @@ static int32_t load_library(const struct lull_search *search, const char *path, 
     return status != LULL_OK ? status : entry_check(path, *entry, count, err);
 }
 
-static const struct lull_criterion *find_id(lull_entry_fn entry, uint32_t count, const char *id)
-{
-    for (uint32_t i = 0; i < count; i++)
-        if (strcmp(entry(i)->id, id) == 0)
-            return entry(i);
-    return NULL;
-}
-
 /* What the library holds, as "ID, ID …". */
 static void list_ids(lull_entry_fn entry, uint32_t count, char *text, size_t room)
 {
@@ -335,17 +327,18 @@ static int32_t open_path(const struct lull_search *search, const char *path, con
                          struct lull_error *err)
 {
     lull_entry_fn entry;
-    uint32_t count;
+    uint32_t count, i = 0;
     int32_t status = load_library(search, path, &entry, &count, err);
     if (status != LULL_OK)
         return status;
-    const struct lull_criterion *c = !id ? entry(0) : find_id(entry, count, id);
-    if (!c) {
+    while (id && i < count && strcmp(entry(i)->id, id) != 0)
+        i++;
+    if (i == count) {
         char ids[256];
         list_ids(entry, count, ids, sizeof ids);
         return lull_error_set(err, LULL_E_KEY, "%s: holds no criterion with the id %s, but %s", path, id, ids);
     }
-    found->criterion = c;
+    found->criterion = entry(i);
     snprintf(found->path, sizeof found->path, "%s", path);
     return LULL_OK;
 }
