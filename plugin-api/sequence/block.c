@@ -229,16 +229,17 @@ static int load_plane(const struct seq_block *b, const struct seq_record *r, enu
     return seq_plane_filter(s->plane, s->filter, raw, b->width, b->height, 1, err);
 }
 
-/* As load_plane, into memory of its own. NULL on failure. */
-static uint8_t *load_plane_new(const struct seq_block *b, const struct seq_record *r, enum seq_plane_number plane, int *rc,
-                               struct base_err *err)
+/* As load_plane, into memory that the caller frees; NULL after a failure. */
+static int load_plane_new(const struct seq_block *b, const struct seq_record *r, enum seq_plane_number plane, uint8_t **raw,
+                          struct base_err *err)
 {
-    uint8_t *raw = malloc(seq_plane_raw_bytes((uint32_t)plane, b->width, b->height));
-    *rc = !raw ? base_fail_nomem(err, "plane") : load_plane(b, r, plane, raw, err);
-    if (!*rc)
-        return raw;
-    free(raw);
-    return NULL;
+    *raw = malloc(seq_plane_raw_bytes((uint32_t)plane, b->width, b->height));
+    int rc = *raw ? load_plane(b, r, plane, *raw, err) : base_fail_nomem(err, "plane");
+    if (rc) {
+        free(*raw);
+        *raw = NULL;
+    }
+    return rc;
 }
 
 int seq_display_planar(const struct seq_block *b, const struct seq_record *r, uint8_t *rgb, struct base_err *err)
@@ -248,26 +249,22 @@ int seq_display_planar(const struct seq_block *b, const struct seq_record *r, ui
 
 int seq_display(const struct seq_block *b, const struct seq_record *r, uint8_t *rgb, struct base_err *err)
 {
-    int rc;
     size_t pixels = (size_t)b->width * b->height;
-    uint8_t *planar = load_plane_new(b, r, SEQ_PLANE_DISPLAY, &rc, err);
-    if (!planar)
-        return rc;
-    for (size_t i = 0; i < pixels; i++)
+    uint8_t *planar;
+    int rc = load_plane_new(b, r, SEQ_PLANE_DISPLAY, &planar, err);
+    for (size_t i = 0; i < pixels && !rc; i++)
         for (size_t c = 0; c < 3; c++)
             rgb[3 * i + c] = planar[c * pixels + i];
     free(planar);
-    return 0;
+    return rc;
 }
 
 static int load_f16(const struct seq_block *b, const struct seq_record *r, enum seq_plane_number plane, float *out,
                     struct base_err *err)
 {
-    int rc;
     size_t n = 3 * (size_t)b->width * b->height;
-    uint8_t *raw = load_plane_new(b, r, plane, &rc, err);
-    if (!raw)
-        return rc;
+    uint8_t *raw;
+    int rc = load_plane_new(b, r, plane, &raw, err);
     for (size_t i = 0; i < n && !rc; i++) {
         out[i] = base_f16_to_f32((uint16_t)(raw[2 * i] | raw[2 * i + 1] << 8));
         if (!isfinite(out[i]))
@@ -279,27 +276,21 @@ static int load_f16(const struct seq_block *b, const struct seq_record *r, enum 
 
 int seq_mean(const struct seq_block *b, const struct seq_record *r, float *rgb, struct base_err *err)
 {
-    int rc;
     size_t n = 3 * (size_t)b->width * b->height;
     if (seq_has(r, SEQ_PLANE_MEAN_F16))
         return load_f16(b, r, SEQ_PLANE_MEAN_F16, rgb, err);
-    uint8_t *fine = NULL, *display = load_plane_new(b, r, SEQ_PLANE_DISPLAY, &rc, err);
-    if (!display)
-        return rc;
-    if (seq_has(r, SEQ_PLANE_FINE)) {
-        fine = load_plane_new(b, r, SEQ_PLANE_FINE, &rc, err);
-        if (!fine)
-            goto out;
-    }
+    uint8_t *fine = NULL, *display;
+    int rc = load_plane_new(b, r, SEQ_PLANE_DISPLAY, &display, err);
+    if (!rc && seq_has(r, SEQ_PLANE_FINE))
+        rc = load_plane_new(b, r, SEQ_PLANE_FINE, &fine, err);
     float table[256][8];
     for (int d = 0; d < 256; d++)
         for (int q = 0; q < 8; q++)
             table[d][q] = (float)(fine ? seq_fine_decode((uint8_t)d, (uint8_t)q) : base_srgb_linear[d]);
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < n && !rc; i++) {
         uint8_t q = fine ? fine[i] : 0;
         rgb[i] = q < 8 ? table[display[i]][q] : (float)seq_fine_decode(display[i], q);
     }
-out:
     free(fine);
     free(display);
     return rc;
@@ -330,17 +321,15 @@ int seq_mean_luminance(const struct seq_block *b, const struct seq_record *r, fl
 
 int seq_half_luminance(const struct seq_block *b, const struct seq_record *r, float *y, struct base_err *err)
 {
-    int rc;
     if (seq_has(r, SEQ_PLANE_HALF_F16))
         return read_luminance(seq_half, b, r, y, err);
-    uint8_t *code = load_plane_new(b, r, SEQ_PLANE_HALF_LOG, &rc, err);
-    if (!code)
-        return rc;
+    uint8_t *code;
+    int rc = load_plane_new(b, r, SEQ_PLANE_HALF_LOG, &code, err);
     float table[256];
     for (int i = 0; i < 256; i++)
         table[i] = (float)seq_half_log_decode((uint8_t)i);
-    for (size_t i = 0; i < (size_t)b->width * b->height; i++)
+    for (size_t i = 0; i < (size_t)b->width * b->height && !rc; i++)
         y[i] = table[code[i]];
     free(code);
-    return 0;
+    return rc;
 }
