@@ -310,14 +310,6 @@ static int add_input(struct files *files, const char *path, enum base_path what,
     return what == BASE_FILE && base_file_check_input(path, NULL) != 0 ? 0 : base_inputs_add(&files->inputs, path, err);
 }
 
-/* Values of a row that keeps several, or only a part, are met one by one. */
-static int note_value(const struct base_option *o, const char *value, struct files *files, struct base_err *err)
-{
-    if (o->set && o->input)
-        return add_input(files, value, o->input, err);
-    return o->set && o->output ? base_outputs_add(&files->outputs, o->name, value, err) : 0;
-}
-
 static int note_files(const struct base_options *options, const void *into, struct files *files, struct base_err *err)
 {
     int rc = 0;
@@ -374,8 +366,10 @@ static int parse(const struct base_options *options, int argc, char **argv, void
             return bad_option(key, token, err);
         const struct base_option *o = find(options->list, key);
         int rc = take(o, into, optarg, err);
-        if (!rc)
-            rc = note_value(o, optarg, files, err);
+        if (!rc && o->set && o->input) /* of a row that keeps several, or only a part, values are met one by one */
+            rc = add_input(files, optarg, o->input, err);
+        else if (!rc && o->set && o->output)
+            rc = base_outputs_add(&files->outputs, o->name, optarg, err);
         if (rc)
             return rc;
     }

@@ -9,15 +9,6 @@
 
 /* --- a criterion ---------------------------------------------------------------------------------------------------- */
 
-static void release_pairs(struct lull_host_criterion *c)
-{
-    for (uint32_t i = 0; c->pairs && i < c->pair_count; i++) {
-        free((void *)(uintptr_t)c->pairs[i].key);
-        free((void *)(uintptr_t)c->pairs[i].value);
-    }
-    free(c->pairs);
-}
-
 static int32_t copy_pairs(struct lull_host_criterion *c, const struct lull_pair *pairs, uint32_t count,
                           struct lull_error *err)
 {
@@ -162,7 +153,11 @@ void lull_host_close(struct lull_host_criterion *c)
     }
     lull_host_leave(c, &before, "destroy");
     release_frame(c);
-    release_pairs(c);
+    for (uint32_t i = 0; c->pairs && i < c->pair_count; i++) {
+        free((void *)(uintptr_t)c->pairs[i].key);
+        free((void *)(uintptr_t)c->pairs[i].value);
+    }
+    free(c->pairs);
     lull_host_withdraw(c);
     pthread_mutex_destroy(&c->messages_lock);
     free(c);
@@ -326,19 +321,13 @@ static uint64_t first_check(const struct lull_host_frame *f)
     return lull_host_next_check(&f->blocks, spp - 1, spp);
 }
 
-/* A criterion without a quality parameter is refused whatever the mask shows. */
-static int32_t read_mask(const struct lull_host_criterion *c, const struct lull_plane *mask, struct lull_host_blocks *b,
-                         struct lull_error *err)
-{
-    char value[32];
-    struct lull_pair quality;
-    int32_t code = lull_host_scale_quality(c->table, c->pairs, c->pair_count, 0, value, &quality, err);
-    return code == LULL_OK ? lull_host_read_mask(mask, b, err) : code;
-}
-
 static int32_t fill_frame(struct lull_host_frame *f, const struct lull_plane *mask, struct lull_error *err)
 {
     struct lull_host_blocks *b = &f->blocks;
+    struct lull_host_criterion *c = f->criterion;
+    char value[32];
+    struct lull_pair quality;
+    int32_t code = LULL_OK;
     f->due = calloc(b->count, sizeof *f->due);
     f->final = calloc(b->count, sizeof *f->final);
     f->decisions = calloc(b->count, sizeof *f->decisions);
@@ -348,9 +337,12 @@ static int32_t fill_frame(struct lull_host_frame *f, const struct lull_plane *ma
     f->answer_count = calloc(b->count, sizeof *f->answer_count);
     if (!f->due || !f->final || !f->decisions || !f->answers || !f->answer_count)
         return lull_host_no_memory(err, "blocks");
-    int32_t code = mask ? read_mask(f->criterion, mask, b, err) : LULL_OK;
-    if (code == LULL_OK && f->criterion)
-        code = lull_host_join(f, f->criterion, err);
+    if (mask) /* a criterion without a quality parameter is refused whatever the mask shows */
+        code = lull_host_scale_quality(c->table, c->pairs, c->pair_count, 0, value, &quality, err);
+    if (mask && code == LULL_OK)
+        code = lull_host_read_mask(mask, b, err);
+    if (code == LULL_OK && c)
+        code = lull_host_join(f, c, err);
     for (uint32_t i = 0; i < b->count && code == LULL_OK; i++)
         b->list[i].next_spp = first_check(f);
     return code;

@@ -151,16 +151,6 @@ static int32_t put_page(FILE *file, const char *data, const struct lull_host_lay
     return code;
 }
 
-static int32_t check_page(const char *report, const struct lull_host_layer *layers, uint32_t layer_count, const char *path,
-                          struct lull_error *err)
-{
-    int32_t code =
-        lull_host_given(err, "report", report, "path", path, "layers", layer_count > 0 ? layers : (const void *)path, NULL);
-    for (uint32_t i = 0; i < layer_count && code == LULL_OK; i++)
-        code = lull_host_given(err, "the name of a layer", layers[i].name, "rgb of a layer", layers[i].rgb, NULL);
-    return code;
-}
-
 int32_t lull_host_page(const char *report, const char *quote, const struct lull_host_layer *layers, uint32_t layer_count,
                        uint32_t width, uint32_t height, const char *path, struct lull_error *err)
 {
@@ -168,7 +158,10 @@ int32_t lull_host_page(const char *report, const char *quote, const struct lull_
     struct base_file_out out;
     const double size[2] = {width, height};
     char *data = NULL;
-    int32_t code = check_page(report, layers, layer_count, path, err);
+    int32_t code =
+        lull_host_given(err, "report", report, "path", path, "layers", layer_count > 0 ? layers : (const void *)path, NULL);
+    for (uint32_t i = 0; i < layer_count && code == LULL_OK; i++)
+        code = lull_host_given(err, "the name of a layer", layers[i].name, "rgb of a layer", layers[i].rgb, NULL);
     if (code == LULL_OK)
         code = parse(report, quote, layer_count, size, &data, err);
     if (code != LULL_OK)
