@@ -17,24 +17,16 @@ const char *const lc_plane_names[LULL_PLANE_COUNT] = {"COLOR", "WEIGHT", "SPP", 
 
 /* --- film ------------------------------------------------------------------------------------------------------------ */
 
-static int film_alloc(struct lc_film *f)
-{
-    size_t pixels = (size_t)f->width * (size_t)f->height;
-    int ok = 1;
-    for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
-        f->sum[p] = calloc(pixels * lc_plane_channels[p], sizeof(double));
-        ok = ok && f->sum[p];
-    }
-    return ok ? 0 : -1;
-}
-
 int lc_film_init(struct lc_film *f, int32_t width, int32_t height, int32_t block_w, int32_t block_h, uint32_t seed)
 {
     int32_t columns = (width + block_w - 1) / block_w, rows = (height + block_h - 1) / block_h;
     *f = (struct lc_film){.width = width, .height = height, .seed = seed, .block_count = (uint32_t)(columns * rows)};
-    if (film_alloc(f) != 0) {
-        lc_film_release(f);
-        return -1;
+    for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
+        f->sum[p] = calloc((size_t)width * (size_t)height * lc_plane_channels[p], sizeof(double));
+        if (!f->sum[p]) {
+            lc_film_release(f);
+            return -1;
+        }
     }
     for (int32_t i = 0; i < columns * rows; i++) {
         int32_t x0 = i % columns * block_w, y0 = i / columns * block_h;

@@ -14,16 +14,14 @@
 enum { PAIRS_MAX = 64, NAMES_MAX = 64, SPECS_MAX = 256 };
 
 struct arguments {
+    struct lc lc; /* what the checks get */
     struct lull_pair pairs[PAIRS_MAX];
-    uint32_t pair_count;
     const char *only[NAMES_MAX];
     int only_count;
     const char *specs[SPECS_MAX];
     int spec_count;
-    uint32_t workers;
     unsigned limit_s;
-    uint64_t misuse, seed;
-    int quiet, list, required_only;
+    int quiet, list;
 };
 
 #define ROW(function, name, title) {name, title, lc_check_##function},
@@ -56,10 +54,10 @@ static int add_pair(void *into, const char *text, struct base_err *err)
     char *equals = strchr(text, '=');
     if (!equals || equals == text)
         return base_fail(err, BASE_EINVAL, "expected KEY=VALUE");
-    if (a->pair_count == PAIRS_MAX)
+    if (a->lc.pair_count == PAIRS_MAX)
         return base_fail(err, BASE_EINVAL, "more than %d parameters", PAIRS_MAX);
     *equals++ = '\0';
-    a->pairs[a->pair_count++] = (struct lull_pair){text, equals};
+    a->pairs[a->lc.pair_count++] = (struct lull_pair){text, equals};
     return 0;
 }
 
@@ -68,12 +66,13 @@ static const struct base_option list[] = {
     {"param", 'p', "KEY=VALUE", .set = add_pair, .help = "Give the criterion this parameter (repeatable)"},
     {"only", 'o', "CHECK", .set = add_only, .help = "Run this check only (repeatable)"},
     {"list", 'l', NULL, TO(list), .help = "List the checks and exit"},
-    {"required-only", 'r', NULL, TO(required_only), .help = "Supply only the planes that it requires, as poorer hosts do"},
+    {"required-only", 'r', NULL, TO(lc.required_only),
+     .help = "Supply only the planes that it requires, as poorer hosts do"},
     {"quiet", 'q', NULL, TO(quiet), .help = "Print failures and the last line only"},
-    {"threads", 't', "N", TO(workers), 2, 32, .help = "Threads for the concurrent checks (4)"},
+    {"threads", 't', "N", TO(lc.workers), 2, 32, .help = "Threads for the concurrent checks (4)"},
     {"limit", 'L', "SECONDS", TO(limit_s), 1, 100000, .help = "A check that takes longer has failed (120)"},
-    {"misuse", 'm', "CALLS", TO(misuse), 1, 1e12, .help = "Random calls outside the rules in the check misuse (2000)"},
-    {"seed", 's', "N", TO(seed), 0, 1e15, .help = "Where these calls begin (1)"},
+    {"misuse", 'm', "CALLS", TO(lc.misuse), 1, 1e12, .help = "Random calls outside the rules in the check misuse (2000)"},
+    {"seed", 's', "N", TO(lc.seed), 0, 1e15, .help = "Where these calls begin (1)"},
     {0}};
 static const struct base_options options = {
     .list = list,
@@ -273,12 +272,7 @@ static int check_criterion(const struct arguments *a, struct lc *c, const char *
 
 static int check_spec(const struct arguments *a, const char *spec, struct totals *t)
 {
-    struct lc c = {.pairs = a->pairs,
-                   .pair_count = a->pair_count,
-                   .workers = a->workers,
-                   .seed = a->seed,
-                   .misuse = a->misuse,
-                   .required_only = a->required_only};
+    struct lc c = a->lc;
     struct lc_report *r = malloc(sizeof *r);
     if (!r || lc_child_run(&c, find, spec, a->limit_s, r) != 0) {
         free(r);
@@ -312,7 +306,7 @@ static int finish(int status)
 
 int main(int argc, char **argv)
 {
-    static struct arguments a = {.workers = 4, .limit_s = 120, .misuse = 2000, .seed = 1};
+    static struct arguments a = {.lc = {.pairs = a.pairs, .workers = 4, .misuse = 2000, .seed = 1}, .limit_s = 120};
     struct base_err err = {0};
     base_interrupt_begin();
     if (!base_options_parse(&options, argc, argv, &a, &err) && a.spec_count == 0 && !a.list)

@@ -254,9 +254,10 @@ int lc_session_judge(struct lc_session *s, struct lc_image *image, struct lull_d
 /* --- sessions ---------------------------------------------------------------------------------------------------------- */
 
 /* A frame struct with a tail, and rectangles with gaps, as the manner asks for. */
-static int32_t begin_with_slack(struct lc_session *s, uint32_t flags, struct lull_error *err)
+static int begin(struct lc_session *s, uint32_t flags)
 {
     const uint32_t slack = s->manner.slack, count = s->film.block_count;
+    struct lull_error err = {.struct_size = sizeof err};
     struct lull_frame f;
     lc_film_frame(&s->film, &f, s->planes);
     f.struct_size += slack;
@@ -267,20 +268,13 @@ static int32_t begin_with_slack(struct lc_session *s, uint32_t flags, struct lul
     void *frame = spread(&f, sizeof f, NULL, 1, slack);
     int32_t status = LULL_E_MEMORY;
     if (frame && rects) {
-        status = lc_begin(s->check, s->instance, frame, err);
+        status = lc_begin(s->check, s->instance, frame, &err);
         /* what begin_frame was given is gone now: a criterion that kept a pointer reads garbage */
         memset(frame, GARBAGE, sizeof f + slack);
         memset(rects, GARBAGE, (size_t)count * f.block_stride);
     }
     free(frame);
     free(rects);
-    return status;
-}
-
-static int begin(struct lc_session *s, uint32_t flags)
-{
-    struct lull_error err = {.struct_size = sizeof err};
-    int32_t status = begin_with_slack(s, flags, &err);
     if (!LC_EXPECT(s->check, status == LULL_OK, "begin_frame failed (%d): %s", status, err.message))
         return -1;
     s->spp = s->check->req.first_spp > 2 ? s->check->req.first_spp : 2;
@@ -352,9 +346,22 @@ static uint64_t next_spp(const struct lc_session *s, const struct lull_decision 
     return wanted + wanted % 2;
 }
 
-static int step_with(struct lc_session *s, const uint32_t *ids, uint32_t count)
+uint32_t lc_session_advance(struct lc_session *s, uint32_t *ids)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < s->film.block_count; i++)
+        if (!(s->film.blocks[i].flags & LULL_BLOCK_STOPPED)) {
+            lc_film_advance(&s->film, i, s->spp << (i % 2)); /* neighbours with different spp */
+            ids[count++] = i;
+        }
+    return count;
+}
+
+int lc_session_step(struct lc_session *s)
 {
     struct lull_decision decisions[LC_BLOCKS_MAX];
+    uint32_t ids[LC_BLOCKS_MAX];
+    const uint32_t count = lc_session_advance(s, ids);
     struct lc_image image;
     if (lc_session_image(s, &image) != 0)
         return -1;
@@ -374,23 +381,6 @@ static int step_with(struct lc_session *s, const uint32_t *ids, uint32_t count)
     s->spp = next_spp(s, decisions, ids, count);
     s->step++;
     return 0;
-}
-
-uint32_t lc_session_advance(struct lc_session *s, uint32_t *ids)
-{
-    uint32_t count = 0;
-    for (uint32_t i = 0; i < s->film.block_count; i++)
-        if (!(s->film.blocks[i].flags & LULL_BLOCK_STOPPED)) {
-            lc_film_advance(&s->film, i, s->spp << (i % 2)); /* neighbours with different spp */
-            ids[count++] = i;
-        }
-    return count;
-}
-
-int lc_session_step(struct lc_session *s)
-{
-    uint32_t ids[LC_BLOCKS_MAX];
-    return step_with(s, ids, lc_session_advance(s, ids));
 }
 
 int lc_session_steps(struct lc_session *s, int steps)
