@@ -236,17 +236,6 @@ static int name_tmp(const char *target, int n, char *tmp_path, size_t room, stru
 
 /* --- writing --- */
 
-static int put_in_place(const char *tmp_path, const char *path, struct base_err *err)
-{
-    char target[PATH_ROOM];
-    int rc = follow(path, target, err);
-    if (!rc && rename(tmp_path, target) != 0)
-        rc = base_fail(err, BASE_EIO, "%s: %s", path, strerror(errno));
-    if (rc)
-        unlink(tmp_path);
-    return rc;
-}
-
 int base_make_folder(const char *path, int *made, struct base_err *err)
 {
     const int is_new = mkdir(path, 0777) == 0;
@@ -339,12 +328,14 @@ int base_file_commit(struct base_file_out *out, struct base_err *err)
     int saved = errno;
     bad |= fclose(out->file) != 0;
     out->file = NULL;
-    if (bad) {
+    char target[PATH_ROOM];
+    int rc = bad ? base_fail(err, BASE_EIO, "%s: write failed: %s", out->path, strerror(saved != 0 ? saved : EIO))
+                 : follow(out->path, target, err);
+    if (!rc && rename(out->tmp_path, target) != 0)
+        rc = base_fail(err, BASE_EIO, "%s: %s", out->path, strerror(errno));
+    if (rc)
         unlink(out->tmp_path);
-        return base_fail(err, BASE_EIO, "%s: write failed: %s", out->path, strerror(saved != 0 ? saved : EIO));
-    }
-    int rc = put_in_place(out->tmp_path, out->path, err);
-    if (!rc && out->durable)
+    else if (out->durable)
         sync_folder(out->path);
     return rc;
 }

@@ -87,19 +87,6 @@ static int32_t evaluate(struct lull_host_criterion *c, const struct question *q,
     return code == LULL_OK ? code : lull_host_blame(c, "", code, &e, err);
 }
 
-static int32_t check_question(const struct lull_host_criterion *c, const struct lull_host_frame *f, const uint32_t *due,
-                              uint32_t count, const struct lull_decision *decisions, struct lull_error *err)
-{
-    int32_t code = lull_host_given(err, "criterion", c, "frame", f, NULL);
-    if (code == LULL_OK && count > 0)
-        code = lull_host_given(err, "due", due, "decisions", decisions, NULL);
-    for (uint32_t k = 0; k < count && code == LULL_OK; k++)
-        if (due[k] >= f->blocks.count || (k > 0 && due[k] <= due[k - 1]))
-            code = lull_error_set(err, LULL_E_INVALID, "due[%u] is %u: expected rising indices of %u blocks", k, due[k],
-                                  f->blocks.count);
-    return code == LULL_OK ? lull_host_check_samples(f, err) : code;
-}
-
 int32_t lull_host_evaluate(struct lull_host_criterion *c, const struct lull_host_frame *f, const struct lull_host_view *view,
                            const uint32_t *due, const uint8_t *final, uint32_t count, struct lull_decision *decisions,
                            struct lull_error *err)
@@ -107,10 +94,19 @@ int32_t lull_host_evaluate(struct lull_host_criterion *c, const struct lull_host
     struct lull_host_shown shown;
     for (uint32_t k = 0; decisions && k < count; k++)
         decisions[k] = lull_host_undecided();
-    int32_t code = check_question(c, f, due, count, decisions, err);
+    int32_t code = lull_host_given(err, "criterion", c, "frame", f, NULL);
+    if (code == LULL_OK && count > 0)
+        code = lull_host_given(err, "due", due, "decisions", decisions, NULL);
     if (code != LULL_OK)
         return code;
     const struct lull_host_blocks *b = &f->blocks;
+    for (uint32_t k = 0; k < count; k++)
+        if (due[k] >= b->count || (k > 0 && due[k] <= due[k - 1]))
+            return lull_error_set(err, LULL_E_INVALID, "due[%u] is %u: expected rising indices of %u blocks", k, due[k],
+                                  b->count);
+    code = lull_host_check_samples(f, err);
+    if (code != LULL_OK)
+        return code;
     const struct question q = {b, due, final, count, decisions};
     if (c->frame != f || c->block_count != b->count)
         return lull_error_set(err, LULL_E_STATE, "criterion %s: it has not been opened for this frame", c->table->id);

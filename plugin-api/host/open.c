@@ -31,18 +31,6 @@ static void give_back(const struct lull_host_services *services)
         services->release(services->context);
 }
 
-static int32_t check_offer(const struct lull_host_services *services, const struct lull_criterion *table,
-                           const struct lull_pair *pairs, uint32_t pair_count, struct lull_host_criterion **out,
-                           struct lull_error *err)
-{
-    int32_t code = lull_host_given(err, "table", table, "out", out, NULL);
-    if (code == LULL_OK)
-        code = lull_table_check(table, err);
-    if (code == LULL_OK)
-        code = lull_host_check_services(services, err);
-    return code == LULL_OK ? lull_host_check_pairs(pairs, pair_count, err) : code;
-}
-
 /* Of a step of the mask. Nothing is believed of what a failed create leaves behind. */
 static int32_t make_instance(struct lull_host_criterion *c, const struct lull_pair *pairs, uint32_t count, uint32_t step,
                              struct lull_error *err)
@@ -77,7 +65,13 @@ int32_t lull_host_create(const struct lull_host_services *services, const struct
                          const struct lull_pair *pairs, uint32_t pair_count, struct lull_host_criterion **out,
                          struct lull_error *err)
 {
-    int32_t code = check_offer(services, table, pairs, pair_count, out, err);
+    int32_t code = lull_host_given(err, "table", table, "out", out, NULL);
+    if (code == LULL_OK)
+        code = lull_table_check(table, err);
+    if (code == LULL_OK)
+        code = lull_host_check_services(services, err);
+    if (code == LULL_OK)
+        code = lull_host_check_pairs(pairs, pair_count, err);
     struct lull_host_criterion *c = code == LULL_OK ? calloc(1, sizeof *c) : NULL;
     if (!c) {
         give_back(services);

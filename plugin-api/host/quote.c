@@ -230,20 +230,6 @@ void lull_host_quote_ask(struct lull_host_quote *q, const struct lull_host_view 
         ask_row(q, i, view, due, count, NULL);
 }
 
-static int32_t ask_all(const struct lull_host_quote *q, const struct lull_host_view *view, struct lull_error *err)
-{
-    const struct lull_host_blocks *blocks = &q->frame->blocks;
-    uint32_t *due = calloc(blocks->count, sizeof *due), n = 0;
-    int32_t code = due ? LULL_OK : no_memory(err);
-    for (uint32_t i = 0; i < blocks->count && due; i++)
-        if (blocks->list[i].spp > 0)
-            due[n++] = i;
-    for (uint32_t i = 0; i < q->count && code == LULL_OK; i++)
-        code = ask_row(q, i, view, due, n, err);
-    free(due);
-    return code;
-}
-
 /* --- light that is rare --- */
 
 /* One pixel in a hundred with more than this share of the squared difference of the halves (8 % in normal noise) … */
@@ -395,14 +381,22 @@ int32_t lull_host_quote_finish(struct lull_host_quote *q, const struct lull_host
     if (code != LULL_OK)
         return code;
     const struct lull_host_totals *totals = &q->frame->totals;
-    struct lull_host_work *work = calloc(q->frame->blocks.count, sizeof *work);
-    code = work ? ask_all(q, view, err) : no_memory(err);
+    const struct lull_host_blocks *blocks = &q->frame->blocks;
+    struct lull_host_work *work = calloc(blocks->count, sizeof *work);
+    uint32_t *due = calloc(blocks->count, sizeof *due), n = 0;
+    code = work && due ? LULL_OK : no_memory(err);
+    for (uint32_t i = 0; i < blocks->count && code == LULL_OK; i++)
+        if (blocks->list[i].spp > 0)
+            due[n++] = i;
+    for (uint32_t i = 0; i < q->count && code == LULL_OK; i++)
+        code = ask_row(q, i, view, due, n, err);
     if (code == LULL_OK)
         code = find_undersampled(q, view, err);
     q->check_s = totals->checks > 0 ? totals->criterion_s / (double)totals->checks : 0.0;
     for (uint32_t i = 0; i < q->count && code == LULL_OK; i++)
         add_up(q, &q->asked[i], &q->rows[i], work);
     free(work);
+    free(due);
     *rows = q->rows;
     *count = q->count;
     return code;

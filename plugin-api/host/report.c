@@ -82,15 +82,6 @@ static void add_totals(cJSON *root, const struct lull_host_totals *t, int has_ra
     base_json_number(o, "dropped_samples", (double)t->dropped, failed);
 }
 
-static void add_phases(cJSON *root, const struct lull_host_report *r, int *failed)
-{
-    if (!LULL_HAS(struct lull_host_report, r, phase_count) || r->phase_count == 0)
-        return;
-    cJSON *o = base_json_object(root, "phases", failed);
-    for (uint64_t i = 0; i < r->phase_count; i++)
-        base_json_number(o, r->phases[i].name, r->phases[i].seconds, failed);
-}
-
 /* How many took part, and what went between them. */
 static void add_processes(cJSON *root, const struct lull_host_report *r, int *failed)
 {
@@ -112,14 +103,6 @@ static void add_dropped(cJSON *root, const struct lull_host_frame *f, int *faile
         base_json_number(o, "y", f->dropped[i].y, failed);
         base_json_number(o, "sample", f->dropped[i].sample, failed);
     }
-}
-
-static void add_memory(cJSON *root, const struct lull_host_report *r, int *failed)
-{
-    cJSON *o = base_json_object(root, "memory", failed);
-    base_json_number(o, "film_bytes", (double)r->film_bytes, failed);
-    base_json_number(o, "film_bytes_per_pixel", (double)r->film_bytes / (double)r->film_pixels, failed);
-    base_json_number(o, "scene_bytes", r->scene_bytes, failed);
 }
 
 /* The response at each check, by block: [samples, error, p_noisy]. */
@@ -178,13 +161,19 @@ static cJSON *make(const struct lull_host_frame *f, const struct lull_host_repor
     add_blocks(root, f, r->flags & LULL_REPORT_DENOISED ? r->noisy_error : NULL, failed);
     add_history(root, f, failed);
     add_totals(root, &f->totals, !(r->flags & LULL_REPORT_NO_RAYS), failed);
-    add_phases(root, r, failed);
+    const uint64_t phases = LULL_HAS(struct lull_host_report, r, phase_count) ? r->phase_count : 0;
+    cJSON *seconds = phases > 0 ? base_json_object(root, "phases", failed) : NULL;
+    for (uint64_t i = 0; i < phases; i++)
+        base_json_number(seconds, r->phases[i].name, r->phases[i].seconds, failed);
     base_json_bool(root, "interrupted", (r->flags & LULL_REPORT_INTERRUPTED) != 0, failed);
     base_json_text(root, "kernel", r->kernel, failed);
     if (r->flags & LULL_REPORT_DENOISED)
         base_json_number(root, "noisy_weight", r->noisy_weight, failed);
     add_dropped(root, f, failed);
-    add_memory(root, r, failed);
+    cJSON *memory = base_json_object(root, "memory", failed);
+    base_json_number(memory, "film_bytes", (double)r->film_bytes, failed);
+    base_json_number(memory, "film_bytes_per_pixel", (double)r->film_bytes / (double)r->film_pixels, failed);
+    base_json_number(memory, "scene_bytes", r->scene_bytes, failed);
     add_origin(root, r, failed);
     return root;
 }

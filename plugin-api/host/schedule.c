@@ -270,23 +270,19 @@ uint32_t lull_host_due(struct lull_host_frame *f, uint32_t *due, uint8_t *final)
     return active > 0 ? n : 0;
 }
 
-/* A renderer that never writes spp would be asked for samples for ever, but for the one check of UNIFORM. */
-static int32_t check_rendered(const struct lull_host_frame *f, struct lull_error *err)
+int32_t lull_host_check(struct lull_host_frame *f, const struct lull_host_view *view, struct lull_error *err)
 {
+    int32_t code = lull_host_given(err, "frame", f, NULL);
+    if (code != LULL_OK)
+        return code;
+    /* a renderer that never writes spp would be asked for samples for ever, but for the one check of UNIFORM */
     for (uint32_t i = 0; i < f->blocks.count && !(f->blocks.flags & LULL_HOST_UNIFORM); i++)
         if (f->blocks.list[i].reason == LULL_REASON_NONE && f->blocks.list[i].spp == 0)
             return lull_error_set(err, LULL_E_INVALID,
                                   "block %u: spp is 0 at its check, which stands at %llu: the renderer writes the samples "
                                   "that it has",
                                   i, (unsigned long long)f->blocks.list[i].next_spp);
-    return lull_host_check_samples(f, err);
-}
-
-int32_t lull_host_check(struct lull_host_frame *f, const struct lull_host_view *view, struct lull_error *err)
-{
-    int32_t code = lull_host_given(err, "frame", f, NULL);
-    if (code == LULL_OK)
-        code = check_rendered(f, err);
+    code = lull_host_check_samples(f, err);
     if (code != LULL_OK)
         return code;
     uint32_t n = lull_host_due(f, f->due, f->final);
