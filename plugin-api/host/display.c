@@ -50,7 +50,7 @@ struct lull_host_display {
     struct viewer_packet packet;
 };
 
-/* --- a connection to somebody who may be slow, hostile or gone ---------------------------------------------------------- */
+/* --- a connection to somebody who may be slow, hostile or gone -------------------------------------------------------- */
 
 /* Cuts "HOST", "HOST:PORT" or "[IPv6]:PORT" into host and port, which stays where none is named; an IPv6 address without
  * brackets has none. 0: that is no address. */

@@ -80,8 +80,8 @@ static const char *segments_fault(int fd, const ElfW(Ehdr) * h, uint64_t size)
     return NULL;
 }
 
-/* NULL if the file is an ELF shared object of this machine's class whose segments all lie within the file; else what is wrong
- * with it. */
+/* NULL if the file is an ELF shared object of this machine's class whose segments all lie within the file; else what is
+ * wrong with it. */
 static const char *find_fault(const char *path)
 {
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);

@@ -86,7 +86,7 @@ void lc_check_instances(struct lc *c)
     c->concurrent = 0;
 }
 
-/* --- floating point ----------------------------------------------------------------------------------------------------- */
+/* --- floating point --------------------------------------------------------------------------------------------------- */
 
 /* Every call already compares the control register; here with a host that flushes subnormals and traps nothing. */
 void lc_check_fp(struct lc *c)

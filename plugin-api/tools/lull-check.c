@@ -31,7 +31,7 @@ static const struct lc_check {
 } checks[] = {LC_CHECKS(ROW)};
 enum { CHECKS = sizeof checks / sizeof *checks };
 
-/* --- command line ------------------------------------------------------------------------------------------------------- */
+/* --- command line ----------------------------------------------------------------------------------------------------- */
 
 static int add_only(void *into, const char *name, struct base_err *err)
 {
@@ -86,7 +86,7 @@ static const struct base_options options = {
         "the library) or PATH:ID. Each check runs in a process of its own; the output is TAP.\n\n"
         "Exit status: 0 all checks passed, 1 one failed, 2 wrong usage or no such criterion."};
 
-/* --- finding ------------------------------------------------------------------------------------------------------------ */
+/* --- finding ---------------------------------------------------------------------------------------------------------- */
 
 /* In a child: reports the path and then the ids to check as notes; refuses what is no criterion. */
 static void find(struct lc *c, const void *arg)
@@ -172,7 +172,7 @@ static int prepare(struct lc *c)
     return LC_EXPECT(c, status == LULL_OK, "requirements failed (%d): %s", status, err.message) ? 0 : -1;
 }
 
-/* --- running ------------------------------------------------------------------------------------------------------------ */
+/* --- running ---------------------------------------------------------------------------------------------------------- */
 
 struct task {
     const char *id;
