@@ -90,20 +90,11 @@ static int32_t check_colour(const struct lull_host_config *g, struct lull_error 
     return LULL_OK;
 }
 
-static int32_t check_masks(const struct lull_host_config *g, struct lull_error *err)
+int32_t lull_host_check_config(const struct lull_host_config *g, const struct lull_host_criterion *c, struct lull_error *err)
 {
     const uint32_t flags = LULL_HOST_UNIFORM | LULL_HOST_HALF_KNOWN | LULL_HOST_OPEN_ENDED | LULL_FRAME_DETERMINISTIC |
                            LULL_FRAME_INDEPENDENT | LULL_FRAME_SHARED,
                    planes = LULL_PLANE_BIT(LULL_PLANE_COUNT) - 1;
-    if (g->flags & ~flags)
-        return lull_error_set(err, LULL_E_INVALID, "flags %#x: %#x is unknown", g->flags, g->flags & ~flags);
-    if (g->planes & ~planes)
-        return lull_error_set(err, LULL_E_INVALID, "planes %#x: %#x is unknown", g->planes, g->planes & ~planes);
-    return LULL_OK;
-}
-
-int32_t lull_host_check_config(const struct lull_host_config *g, const struct lull_host_criterion *c, struct lull_error *err)
-{
     if (g->struct_size < sizeof *g)
         return lull_error_set(err, LULL_E_VERSION, "the config is smaller than in version 1.0");
     if (!(1 <= g->spp_min && g->spp_min <= g->spp_max && g->spp_max <= LULL_HOST_MOST_SPP))
@@ -112,10 +103,12 @@ int32_t lull_host_check_config(const struct lull_host_config *g, const struct lu
     int32_t code = check_numbers(g, err);
     if (code == LULL_OK)
         code = check_colour(g, err);
-    if (code == LULL_OK)
-        code = check_masks(g, err);
     if (code != LULL_OK)
         return code;
+    if (g->flags & ~flags)
+        return lull_error_set(err, LULL_E_INVALID, "flags %#x: %#x is unknown", g->flags, g->flags & ~flags);
+    if (g->planes & ~planes)
+        return lull_error_set(err, LULL_E_INVALID, "planes %#x: %#x is unknown", g->planes, g->planes & ~planes);
     if (!c && !(g->flags & LULL_HOST_UNIFORM))
         return lull_error_set(err, LULL_E_INVALID,
                               "without a criterion every block gets the same samples: UNIFORM is missing");

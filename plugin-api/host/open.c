@@ -195,16 +195,6 @@ static int32_t create_instance(struct lull_host_criterion *c, uint32_t step, str
     return code;
 }
 
-static int32_t allocate_frame(struct lull_host_criterion *c, const struct lull_host_blocks *b, struct lull_error *err)
-{
-    release_frame(c);
-    c->block_count = b->count;
-    c->all = calloc(b->count, sizeof *c->all);
-    c->due = calloc(b->count, sizeof *c->due);
-    c->answers = calloc(b->count, sizeof *c->answers);
-    return c->all && c->due && c->answers ? LULL_OK : lull_host_no_memory(err, "blocks of the criterion");
-}
-
 static int32_t fits(const struct lull_host_criterion *c, const struct lull_host_blocks *b, struct lull_error *err)
 {
     const struct lull_requirements *n = &c->needs;
@@ -289,12 +279,18 @@ int32_t lull_host_join(const struct lull_host_frame *f, struct lull_host_criteri
         return code;
     if (c->open) /* what was said before a first frame belongs to it */
         c->message_count = 0;
-    code = fits(c, &f->blocks, err);
     c->frame = NULL;
-    if (code == LULL_OK)
-        code = allocate_frame(c, &f->blocks, err);
-    if (code == LULL_OK)
-        code = begin_instances(c, f, err);
+    code = fits(c, &f->blocks, err);
+    if (code != LULL_OK)
+        return code;
+    release_frame(c);
+    c->block_count = f->blocks.count;
+    c->all = calloc(c->block_count, sizeof *c->all);
+    c->due = calloc(c->block_count, sizeof *c->due);
+    c->answers = calloc(c->block_count, sizeof *c->answers);
+    if (!c->all || !c->due || !c->answers)
+        return lull_host_no_memory(err, "blocks of the criterion");
+    code = begin_instances(c, f, err);
     if (code != LULL_OK)
         return code;
     c->open = 1;
