@@ -200,13 +200,12 @@ static void print_help(const struct base_options *options, const char *program, 
     static char names[MAX_OPTIONS][96];
     int n = 0, group = 0;
     for (const struct base_option *o = options->list; o->name || o->help; o++, n++) {
+        const int key = o->key ? o->key : KEY_LONG + n;
         group += !o->name;
         rows[n] = (struct argp_option){.name = o->name,
                                        .doc = o->help,
                                        .group = group,
-                                       .key = !o->name ? 0
-                                              : o->key ? o->key
-                                                       : KEY_LONG + n,
+                                       .key = o->name ? key : 0,
                                        .arg = value_name(o, names[n], sizeof names[n]),
                                        .flags = (o->hidden ? OPTION_HIDDEN : 0) | (o->optional ? OPTION_ARG_OPTIONAL : 0)};
     }
