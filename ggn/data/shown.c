@@ -1,12 +1,152 @@
 #include "data/shown.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "base/files.h"
-#include "data/shown_source.h"
+#include "base/list.h"
+#include "data/shown_parts.h"
+#include "picture/png.h"
+
+const char *const ggn_shown_kind_names[GGN_SHOWN_KINDS + 1] = {"", "noisy", "denoised", "blend", NULL};
+
+void ggn_shown_release(struct ggn_shown *s)
+{
+    for (int v = 0; v < s->n_views && s->views; v++) {
+        for (int b = 0; b < s->views[v].n_blocks && s->views[v].blocks; b++)
+            free(s->views[v].blocks[b].levels);
+        free(s->views[v].blocks);
+    }
+    free(s->views);
+    free(s->conditions);
+    *s = (struct ggn_shown){0};
+}
+
+int ggn_shown_plain_name(const char *name)
+{
+    size_t n = strlen(name);
+    if (n == 0 || n >= GGN_SHOWN_NAME || name[0] == '.')
+        return 0;
+    return strspn(name, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-") == n;
+}
+
+/* --- sources ---------------------------------------------------------------------------------------------------------- */
+
+static int is_list(const char *at)
+{
+    unsigned long lo, hi;
+    do
+        at = base_list_next(at, &lo, &hi, NULL);
+    while (at && *at != '\0');
+    return at != NULL;
+}
+
+/* FOLDER or FOLDER:BLOCKS. */
+static int parse_source(const char *text, struct ggn_shown_source *s, struct base_err *err)
+{
+    const char *colon = strrchr(text, ':');
+    size_t n = strlen(text);
+    s->blocks = NULL;
+    if (colon && is_list(colon + 1)) {
+        s->blocks = colon + 1;
+        n = (size_t)(colon - text);
+    }
+    while (n > 1 && text[n - 1] == '/')
+        n--;
+    if (n >= sizeof s->folder)
+        return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", text);
+    memcpy(s->folder, text, n);
+    s->folder[n] = '\0';
+    return 0;
+}
+
+int ggn_shown_source_has(const struct ggn_shown_source *s, uint32_t id)
+{
+    unsigned long lo, hi;
+    for (const char *at = s->blocks; at && *at != '\0';)
+        if ((at = base_list_next(at, &lo, &hi, NULL)) && id >= lo && id <= hi)
+            return 1;
+    return !s->blocks;
+}
+
+static int has_block(const struct ggn_shown_view *view, unsigned long id)
+{
+    for (int i = 0; i < view->n_blocks; i++)
+        if (view->blocks[i].id == id)
+            return 1;
+    return 0;
+}
+
+int ggn_shown_source_check(const struct ggn_shown_source *s, const struct ggn_shown_view *view, struct base_err *err)
+{
+    unsigned long lo, hi;
+    for (const char *at = s->blocks; at && *at != '\0';)
+        if ((at = base_list_next(at, &lo, &hi, NULL)) && (!has_block(view, lo) || !has_block(view, hi)))
+            return base_fail(err, BASE_EINVAL, "%s: has no block %lu", s->folder, has_block(view, lo) ? hi : lo);
+    return 0;
+}
+
+/* --- pictures --------------------------------------------------------------------------------------------------------- */
+
+int ggn_shown_takes_level(const struct ggn_shown_request *q, const struct ggn_shown_block *b, double spp)
+{
+    double last = b->n_levels > 0 ? b->levels[b->n_levels - 1] : 0.0;
+    return spp >= q->spp_min && spp <= q->spp_max && b->n_levels < GGN_SHOWN_MAX_LEVELS &&
+           (last == 0.0 || log2(spp / last) >= 0.999 * q->spacing);
+}
+
+int ggn_shown_enough_levels(const char *dir, const struct ggn_shown_block *b, struct base_err *err)
+{
+    if (b->n_levels >= 3)
+        return 0;
+    return base_fail(err, BASE_EINVAL,
+                     "%s: block %u has %d levels to show; record more, or halves, or widen --spp-min and --spp-max", dir,
+                     b->id, b->n_levels);
+}
+
+int ggn_shown_write(const struct ggn_shown_request *q, int view, const struct ggn_shown_block *b, const char *what,
+                    int width, int height, const uint8_t *rgb, struct base_err *err)
+{
+    char path[4096], block[16] = "";
+    if (b)
+        snprintf(block, sizeof block, "b%u-", b->id);
+    int n = snprintf(path, sizeof path, "%s/v%d/%s%s.png", q->dir, view, block, what);
+    return n > 0 && n < (int)sizeof path ? pic_write_png(path, width, height, 3, rgb, err)
+                                         : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", q->dir);
+}
+
+/* Noise that nobody misses: uniform, up to 48 codes either way. A linear congruence does for noise that is only looked at
+ * (Numerical Recipes). */
+static void make_heavy(const uint8_t *rgb, size_t n, uint8_t *out)
+{
+    uint32_t state = 1;
+    for (size_t i = 0; i < n; i++) {
+        state = state * 1664525u + 1013904223u;
+        int v = rgb[i] + (int)(state >> 16) % 97 - 48;
+        out[i] = (uint8_t)(v < 0 ? 0 : v > 255 ? 255 : v);
+    }
+}
+
+int ggn_shown_write_reference(const struct ggn_shown_request *q, int view, const struct ggn_shown_block *b, int width,
+                              int height, const uint8_t *rgb, struct base_err *err)
+{
+    const size_t n = 3 * (size_t)width * (size_t)height;
+    int rc = ggn_shown_write(q, view, b, "reference", width, height, rgb, err);
+    if (rc)
+        return rc;
+    uint8_t *noisy = malloc(n);
+    if (!noisy)
+        return base_fail_nomem(err, "picture of a catch trial");
+    make_heavy(rgb, n, noisy);
+    rc = ggn_shown_write(q, view, b, "heavy", width, height, noisy, err);
+    free(noisy);
+    return rc;
+}
+
+/* --- views ------------------------------------------------------------------------------------------------------------ */
 
 static int is_named(const struct ggn_shown *s, int index)
 {
@@ -47,7 +187,7 @@ static int make_view(const struct ggn_shown_request *q, const char *text, int in
 {
     char manifest[4096];
     struct ggn_shown_source source;
-    int rc = ggn_shown_source_parse(text, &source, err);
+    int rc = parse_source(text, &source, err);
     if (!rc)
         rc = name_view(s, index, source.folder, err);
     if (!rc)

@@ -8,8 +8,7 @@
 
 #include "base/files.h"
 #include "picture/read.h"
-#include "data/shown_files.h"
-#include "data/shown_source.h"
+#include "data/shown_parts.h"
 
 enum { MAX_ROWS = 16384 }; /* of the picture of a clip: browsers take so many */
 
@@ -202,8 +201,8 @@ static int write_crops(const struct ggn_shown_request *q, int index, const struc
             return base_fail_nomem(err, view->name);
         for (size_t y = 0; y < h * frames; y++)
             memcpy(rgb + 3 * w * y, strip->frames[y / h].u8 + 3 * ((b->y0 + y % h) * view->width + b->x0), 3 * w);
-        rc = what ? ggn_shown_write_block(q->dir, index, b, what, strip->n, rgb, err)
-                  : ggn_shown_write_reference(q->dir, index, b, strip->n, rgb, err);
+        rc = what ? ggn_shown_write(q, index, b, what, (int)w, (int)(h * frames), rgb, err)
+                  : ggn_shown_write_reference(q, index, b, (int)w, (int)(h * frames), rgb, err);
         free(rgb);
     }
     return rc;
@@ -288,14 +287,8 @@ static int know_condition(struct ggn_shown *s, int index, const char *name, cons
 static int prepare_conditions(const struct ggn_shown_request *q, const char *folder, int index, const struct picture *list,
                               int n, const struct pic_image *reference, struct ggn_shown *s, struct base_err *err)
 {
-    const int width = reference->width, height = reference->height;
-    uint8_t *noisy = NULL;
-    int found = 0, rc = ggn_shown_write(q->dir, index, "reference", width, height, reference->u8, err);
-    if (!rc)
-        rc = ggn_shown_make_heavy(reference->u8, 3 * (size_t)width * (size_t)height, &noisy, err);
-    if (!rc)
-        rc = ggn_shown_write(q->dir, index, "heavy", width, height, noisy, err);
-    free(noisy);
+    int found = 0;
+    int rc = ggn_shown_write_reference(q, index, NULL, reference->width, reference->height, reference->u8, err);
     for (int i = 0; i < n && !rc; i++) {
         struct pic_image image;
         if (strcmp(list[i].stem, "reference") == 0 || strcmp(list[i].stem, "heavy") == 0 || list[i].is_clip)
@@ -305,7 +298,7 @@ static int prepare_conditions(const struct ggn_shown_request *q, const char *fol
             rc = read_picture(folder, list[i].name, GGN_SHOWN_AS_IS, &s->views[index], &image, err);
         if (rc)
             break;
-        rc = ggn_shown_write(q->dir, index, list[i].stem, image.width, image.height, image.u8, err);
+        rc = ggn_shown_write(q, index, NULL, list[i].stem, image.width, image.height, image.u8, err);
         pic_release(&image);
         found++;
     }

@@ -4,8 +4,7 @@
 #include <stdlib.h>
 
 #include "data/each.h"
-#include "data/shown_files.h"
-#include "data/shown_source.h"
+#include "data/shown_parts.h"
 #include "data/stimuli.h"
 #include "sequence/manifest.h"
 
@@ -21,8 +20,9 @@ struct work {
 static int make_levels(const struct work *w, struct ggn_shown_block *b, struct ggn_stimuli *s, uint8_t *rgb,
                        struct base_err *err)
 {
+    const int width = (int)(b->x1 - b->x0), height = (int)(b->y1 - b->y0);
     char what[32];
-    int rc = ggn_shown_write_reference(w->request->dir, w->view, b, 1, s->converged, err);
+    int rc = ggn_shown_write_reference(w->request, w->view, b, width, height, s->converged, err);
     b->levels = malloc((size_t)s->n * sizeof *b->levels);
     if (!b->levels)
         return base_fail_nomem(err, w->folder);
@@ -33,7 +33,7 @@ static int make_levels(const struct work *w, struct ggn_shown_block *b, struct g
         rc = ggn_stimuli_make(s, i, rgb, err);
         snprintf(what, sizeof what, "%.0f", spp);
         if (!rc)
-            rc = ggn_shown_write_block(w->request->dir, w->view, b, what, 1, rgb, err);
+            rc = ggn_shown_write(w->request, w->view, b, what, width, height, rgb, err);
         b->levels[b->n_levels++] = (uint32_t)spp;
     }
     return !rc ? ggn_shown_enough_levels(w->folder, b, err) : rc;
