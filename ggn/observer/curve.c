@@ -2,8 +2,9 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
-#include "model/visibility.h"
+#include "model/measure.h"
 #include "sequence/simulate.h"
 
 const char *const ggn_curve_sources[] = {"halves", "levels", NULL};
@@ -13,74 +14,55 @@ enum { SIMULATED = 49 };
 
 static double simulated_spp(int i) { return SEQ_SIMULATED_CAP * exp2(0.25 * (i - (SIMULATED - 1))); }
 
-struct planes {
+struct eye {
     const struct seq_block *block; /* borrows */
-    int width, height;
-    size_t pixels;
-    float *mean, *difference, *work; /* [3][P], linear; one allocation with the others, `mean` owns it */
-    float *lightness[2];             /* [P] */
-    double *texture, *scratch;       /* [patches]; one allocation, `texture` owns it */
+    float *mean, *difference;      /* [3][P], linear; one allocation, `mean` owns it */
+    struct ggn_meter meter;        /* owns */
 };
 
-static void planes_release(struct planes *p)
+static void eye_release(struct eye *e)
 {
-    free(p->mean);
-    free(p->texture);
-    *p = (struct planes){0};
+    free(e->mean);
+    ggn_meter_release(&e->meter);
 }
 
-static int planes_init(struct planes *p, const struct seq_block *block, struct base_err *err)
+/* The caller releases it, also after a failure. */
+static int eye_init(struct eye *e, const struct seq_block *block, struct base_err *err)
 {
-    const int width = (int)block->width, height = (int)block->height;
-    const size_t n = (size_t)block->width * block->height, patches = ggn_visible_patches(width, height);
-    *p = (struct planes){.block = block,
-                         .width = width,
-                         .height = height,
-                         .pixels = n,
-                         .mean = malloc(11 * n * sizeof *p->mean),
-                         .texture = malloc((patches + ggn_visibility_scratch(width)) * sizeof *p->texture)};
-    if (!p->mean || !p->texture) {
-        planes_release(p);
+    const size_t pixels = (size_t)block->width * block->height;
+    *e = (struct eye){.block = block, .mean = malloc(6 * pixels * sizeof *e->mean)};
+    if (!e->mean)
         return base_fail_nomem(err, "observer");
-    }
-    p->scratch = p->texture + patches;
-    p->difference = p->mean + 3 * n;
-    p->work = p->mean + 6 * n;
-    for (int i = 0; i < 2; i++)
-        p->lightness[i] = p->mean + (9 + (size_t)i) * n;
-    return 0;
+    e->difference = e->mean + 3 * pixels;
+    return ggn_meter_init(&e->meter, pixels, err);
 }
 
-/* L* of mean + scale * difference. */
-static void lightness_at(struct planes *p, double scale, float *lightness)
+/* Visible noise of the two pictures in the meter; split, keep_texture: see ggn_measure. */
+static double see(struct eye *e, double split, int keep_texture)
 {
-    seq_simulate(p->mean, p->difference, 3 * p->pixels, scale, p->work);
-    ggn_visible_lightness(p->work, p->pixels, lightness);
+    struct ggn_measure seen;
+    ggn_measure(&e->meter, (int)e->block->width, (int)e->block->height, split, keep_texture, &seen, NULL);
+    return seen.visible;
 }
 
-static void read_halves(struct planes *p, double scale)
+/* Puts mean + scale * difference into the meter. */
+static void simulate(struct eye *e, double scale, int picture)
 {
-    lightness_at(p, scale, p->lightness[0]);
-    lightness_at(p, -scale, p->lightness[1]);
+    seq_simulate(e->mean, e->difference, 3 * (size_t)e->block->width * e->block->height, scale, e->meter.rgb[picture]);
 }
 
-/* Visible noise of factor * (L*[0] - L*[1]), which ends up in place of L*[0]. */
-static double visible(struct planes *p, float factor)
+/* Of mean +- scale * difference. */
+static double see_halves(struct eye *e, double scale, int keep_texture)
 {
-    for (size_t i = 0; i < p->pixels; i++)
-        p->lightness[0][i] = factor * (p->lightness[0][i] - p->lightness[1][i]);
-    return ggn_visible_noise(p->lightness[0], p->width, p->height, p->texture, p->scratch, NULL);
-}
-
-static void see_texture(struct planes *p)
-{
-    ggn_visible_texture(p->lightness[0], p->lightness[1], p->width, p->height, p->scratch, p->texture);
+    simulate(e, scale, 0);
+    simulate(e, -scale, 1);
+    return see(e, 0.5, keep_texture);
 }
 
 /* Mean and half difference of the level at spp. */
-static int read_level(struct planes *p, uint32_t spp, struct base_err *err)
+static int read_level(struct eye *e, uint32_t spp, struct base_err *err)
 {
-    return seq_halves(p->block, seq_level(p->block, spp), p->mean, p->difference, err);
+    return seq_halves(e->block, seq_level(e->block, spp), e->mean, e->difference, err);
 }
 
 static void append(struct ggn_curve *c, double spp, double seen)
@@ -91,70 +73,64 @@ static void append(struct ggn_curve *c, double spp, double seen)
 
 /* Levels below the full one, each from its own halves: the full level's noise made stronger would be symmetric, where that
  * of few samples is skewed to bright. */
-static int add_recorded_halves(struct ggn_curve *c, struct planes *p, uint32_t full_spp, struct base_err *err)
+static int add_recorded_halves(struct ggn_curve *c, struct eye *e, uint32_t full_spp, struct base_err *err)
 {
-    for (uint32_t i = 0; i < p->block->n_levels; i++) {
-        const struct seq_record *r = &p->block->levels[i];
+    for (uint32_t i = 0; i < e->block->n_levels; i++) {
+        const struct seq_record *r = &e->block->levels[i];
         if (r->spp >= full_spp || !seq_has_halves(r))
             continue;
-        int rc = seq_halves(p->block, r, p->mean, p->difference, err);
+        int rc = read_level(e, r->spp, err);
         if (rc)
             return rc;
-        read_halves(p, 1.0);
-        append(c, r->spp, visible(p, 0.5f));
+        append(c, r->spp, see_halves(e, 1.0, 1));
     }
     return 0;
 }
 
 /* Appends what halves say: recorded levels of a curve that is empty, the full level, and those above it and `beyond` spp
- * that it stands for. */
-static int add_halves(struct ggn_curve *c, struct planes *p, double beyond, struct base_err *err)
+ * that it stands for. Texture is that of the full level, or what there was. */
+static int add_halves(struct ggn_curve *c, struct eye *e, double beyond, struct base_err *err)
 {
-    const uint32_t full = seq_full_level(p->block)->spp;
-    const int first = c->n == 0;
-    int rc = read_level(p, full, err);
-    if (!rc && first) {
-        read_halves(p, 1.0);
-        see_texture(p);
-        rc = add_recorded_halves(c, p, full, err);
+    const uint32_t full = seq_full_level(e->block)->spp;
+    int rc = read_level(e, full, err);
+    if (!rc && c->n == 0) {
+        const double seen = see_halves(e, 1.0, 0);
+        rc = add_recorded_halves(c, e, full, err);
         if (!rc)
-            rc = read_level(p, full, err);
-        read_halves(p, 1.0);
-        append(c, full, visible(p, 0.5f));
+            rc = read_level(e, full, err);
+        append(c, full, seen);
         c->recorded = c->n;
     }
     for (int i = 0; i < SIMULATED && !rc; i++) {
         double spp = simulated_spp(i);
-        if (spp <= full || spp <= beyond)
-            continue;
-        read_halves(p, seq_noise_scale(full, spp));
-        append(c, spp, visible(p, 0.5f));
+        if (spp > full && spp > beyond)
+            append(c, spp, see_halves(e, seq_noise_scale(full, spp), 1));
     }
     return rc;
 }
 
 /* The picture at each recorded level against the reference. */
-static int add_levels(struct ggn_curve *c, struct planes *p, int independent, struct base_err *err)
+static int add_levels(struct ggn_curve *c, struct eye *e, int independent, struct base_err *err)
 {
-    const struct seq_block *b = p->block;
+    const struct seq_block *b = e->block;
     const struct seq_record *last = &b->levels[b->n_levels - 1];
+    const size_t values = 3 * (size_t)b->width * b->height;
     double n_r = b->reference->spp;
-    int rc = seq_mean(b, b->reference, p->mean, err);
+    int rc = seq_mean(b, b->reference, e->mean, err);
     if (!rc)
-        rc = seq_mean(b, last, p->difference, err);
+        rc = seq_mean(b, independent ? last : b->reference, e->meter.rgb[0], err);
     if (rc)
         return rc;
-    ggn_visible_lightness(p->mean, p->pixels, p->lightness[1]);
-    ggn_visible_lightness(independent ? p->difference : p->mean, p->pixels, p->lightness[0]);
-    see_texture(p);
+    memcpy(e->meter.rgb[1], e->mean, values * sizeof *e->mean);
+    see(e, 1.0, 0);
     for (const struct seq_record *r = b->levels; r <= last; r++) {
-        rc = seq_mean(b, r, p->difference, err);
+        rc = seq_mean(b, r, e->difference, err);
         if (rc)
             return rc;
-        for (size_t i = 0; i < 3 * p->pixels; i++)
-            p->difference[i] -= p->mean[i];
-        lightness_at(p, independent ? seq_reference_scale(n_r, r->spp) : 1.0, p->lightness[0]);
-        append(c, r->spp, visible(p, 1.0f));
+        for (size_t i = 0; i < values; i++)
+            e->difference[i] -= e->mean[i];
+        simulate(e, independent ? seq_reference_scale(n_r, r->spp) : 1.0, 0);
+        append(c, r->spp, see(e, 1.0, 1));
     }
     c->recorded = c->n;
     return 0;
@@ -172,7 +148,7 @@ int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, 
                    struct ggn_curve *curve, struct base_err *err)
 {
     struct ggn_curve c;
-    struct planes p = {0};
+    struct eye e = {0};
     if (source == GGN_FROM_HALVES && !seq_full_level(block))
         return base_fail(err, BASE_EINVAL,
                          "block %u has no full level with a half-buffer difference: record one, or use --source levels",
@@ -181,12 +157,12 @@ int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, 
         return base_fail(err, BASE_EINVAL, "block %u has no reference: record one, or use --source halves", block->id);
     int rc = curve_init(&c, block, err);
     if (!rc)
-        rc = planes_init(&p, block, err);
+        rc = eye_init(&e, block, err);
     if (!rc && source == GGN_FROM_LEVELS)
-        rc = add_levels(&c, &p, reference_independent, err);
+        rc = add_levels(&c, &e, reference_independent, err);
     if (!rc && (source == GGN_FROM_HALVES || (reference_independent && seq_full_level(block))))
-        rc = add_halves(&c, &p, c.n > 0 ? 1.07 * c.spp[c.n - 1] : 0.0, err);
-    planes_release(&p);
+        rc = add_halves(&c, &e, c.n > 0 ? 1.07 * c.spp[c.n - 1] : 0.0, err);
+    eye_release(&e);
     if (rc)
         ggn_curve_release(&c);
     else
@@ -194,40 +170,32 @@ int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, 
     return rc;
 }
 
-/* What is seen of mean +- difference. */
-static double see_both(struct planes *p)
-{
-    read_halves(p, 1.0);
-    see_texture(p);
-    return visible(p, 0.5f);
-}
-
 int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible_out, struct base_err *err)
 {
-    struct planes p;
-    int rc = planes_init(&p, block, err);
+    struct eye e;
+    int rc = eye_init(&e, block, err);
     if (!rc)
-        rc = read_level(&p, level->spp, err);
+        rc = read_level(&e, level->spp, err);
     if (!rc)
-        *visible_out = see_both(&p);
-    planes_release(&p);
+        *visible_out = see_halves(&e, 1.0, 0);
+    eye_release(&e);
     return rc;
 }
 
 int ggn_curve_means(const struct seq_block *block, const struct seq_record *earlier, const struct seq_record *level,
                     double *visible_out, struct base_err *err)
 {
-    struct planes p;
-    int rc = planes_init(&p, block, err);
+    struct eye e;
+    int rc = eye_init(&e, block, err);
     if (!rc)
-        rc = seq_mean(block, earlier, p.difference, err);
+        rc = seq_mean(block, earlier, e.difference, err);
     if (!rc)
-        rc = seq_mean(block, level, p.mean, err);
-    for (size_t i = 0; i < 3 * p.pixels && !rc; i++)
-        p.difference[i] = (float)seq_means_scale(earlier->spp, level->spp) * (p.mean[i] - p.difference[i]);
+        rc = seq_mean(block, level, e.mean, err);
+    for (size_t i = 0; i < 3 * (size_t)block->width * block->height && !rc; i++)
+        e.difference[i] = (float)seq_means_scale(earlier->spp, level->spp) * (e.mean[i] - e.difference[i]);
     if (!rc)
-        *visible_out = see_both(&p);
-    planes_release(&p);
+        *visible_out = see_halves(&e, 1.0, 0);
+    eye_release(&e);
     return rc;
 }
 
