@@ -66,37 +66,20 @@ static int find_row(const char *csv, const char *name, const struct ggn_threshol
 
 /* --- labels --- */
 
-/* Of a recording: thresholds of the study, as samples at which no noise is seen at all. */
-static int study_labels(const struct options *o, const struct ggn_view *row, const struct ggn_dataset_view *v,
-                        struct ggn_labels *out, struct base_err *err)
+/* From thresholds of the study to samples at which no noise is seen at all. */
+static void convert_from_study(struct ggn_labels *l)
 {
-    const struct seq_manifest *m = &v->manifest;
-    if ((uint32_t)row->n != ggn_dataset_tiles(v))
-        return base_fail(err, BASE_EINVAL, "%s: '%s' has %d thresholds, %s has %u blocks", o->human, row->name, row->n,
-                         v->dir, ggn_dataset_tiles(v));
-    struct ggn_labels l = {.source = "human",
-                           .cap = SEQ_SIMULATED_CAP,
-                           .spread = GGN_LABELS_SPREAD,
-                           .labels = malloc(m->n_blocks * sizeof *l.labels)};
-    if (!l.labels)
-        return base_fail_nomem(err, v->dir);
-    int rc = 0;
-    for (uint32_t i = 0; i < m->n_blocks && !rc; i++) {
-        uint32_t id = m->blocks[i].id;
-        if (!(id < (uint32_t)row->n && row->spp[id] > 0))
-            rc = base_fail(err, BASE_EINVAL, "%s: block %u has no threshold in '%s'", v->dir, id, row->name);
-        else
-            l.labels[l.n++] = (struct ggn_label){id, ggn_observer_from_study(row->spp[id]), row->spp[id] >= SEQ_STUDY_CAP};
+    const size_t used = strlen(l->detail);
+    for (uint32_t i = 0; i < l->n; i++) {
+        struct ggn_label *label = &l->labels[i];
+        label->censored = label->threshold >= SEQ_STUDY_CAP;
+        label->threshold = ggn_observer_from_study(label->threshold);
     }
-    snprintf(l.detail, sizeof l.detail, "thresholds of '%.200s', as samples at which no noise is seen at all", row->name);
-    if (rc)
-        ggn_labels_release(&l);
-    else
-        *out = l;
-    return rc;
+    l->cap = SEQ_SIMULATED_CAP;
+    snprintf(l->detail + used, sizeof l->detail - used, ", as samples at which no noise is seen at all");
 }
 
-/* The thresholds that the import of pictures would attach, where the sequence is one. */
+/* Of imported pictures the thresholds that the import would attach; of a recording they are those of the study. */
 static int human_labels(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v,
                         struct ggn_labels *out, struct base_err *err)
 {
@@ -104,13 +87,19 @@ static int human_labels(const struct options *o, const struct ggn_thresholds *t,
     const struct ggn_view *row;
     struct base_err why = {0};
     int rc = find_row(o->human, o->view ? o->view : v->name, t, &row, err);
-    if (!rc && own_pictures && (rc = ggn_thresholds_label(row, &v->manifest, out, &why)) != 0)
-        return base_fail(err, why.code, "%s: %s", v->dir, why.text);
-    if (!rc && !own_pictures)
-        rc = study_labels(o, row, v, out, err);
-    if (!rc && o->spread > 0)
+    if (rc)
+        return rc;
+    if (!own_pictures && (uint32_t)row->n != ggn_dataset_tiles(v))
+        return base_fail(err, BASE_EINVAL, "%s: '%s' has %d thresholds, %s has %u blocks", o->human, row->name, row->n,
+                         v->dir, ggn_dataset_tiles(v));
+    rc = ggn_thresholds_label(row, &v->manifest, out, &why);
+    if (rc)
+        return base_fail(err, rc, "%s: %s", v->dir, why.text);
+    if (!own_pictures)
+        convert_from_study(out);
+    if (o->spread > 0)
         out->spread = o->spread;
-    return rc;
+    return 0;
 }
 
 /* --- checking labels from halves --- */

@@ -116,39 +116,32 @@ int ggn_thresholds_parse_csv(const char *path, char *text, struct ggn_thresholds
 }
 
 /* Reports name their blocks by id; ids may be any subset of the grid. */
-static int parse_json(const char *path, const char *text, size_t size, struct ggn_thresholds *out, struct base_err *err)
+static int list_json(const char *path, const cJSON *root, struct ggn_thresholds *t, struct base_err *err)
 {
-    struct ggn_thresholds t = {0};
-    cJSON *root = cJSON_ParseWithLength(text, size);
-    const cJSON *blocks = cJSON_GetObjectItemCaseSensitive(root, "blocks");
+    const cJSON *blocks = cJSON_GetObjectItemCaseSensitive(root, "blocks"), *block;
     const cJSON *scene = cJSON_GetObjectItemCaseSensitive(root, "scene");
-    int rc = 0, last = -1, columns = 0;
-    if (!cJSON_IsArray(blocks)) {
-        rc = base_fail(err, BASE_EINVAL, "%s: not a report: no list of blocks", path);
-        goto out;
-    }
-    const cJSON *block;
+    int last = -1, columns = 0;
+    if (!cJSON_IsArray(blocks))
+        return base_fail(err, BASE_EINVAL, "%s: not a report: no list of blocks", path);
     cJSON_ArrayForEach (block, blocks) {
         const cJSON *id = cJSON_GetObjectItemCaseSensitive(block, "id");
         const cJSON *y0 = cJSON_GetObjectItemCaseSensitive(block, "y0");
-        if (!cJSON_IsNumber(id) || !(id->valuedouble >= 0 && id->valuedouble < GGN_VIEW_BLOCKS)) {
-            rc = base_fail(err, BASE_EINVAL, "%s: a block without a usable id", path);
-            goto out;
-        }
+        if (!cJSON_IsNumber(id) || !(id->valuedouble >= 0 && id->valuedouble < GGN_VIEW_BLOCKS))
+            return base_fail(err, BASE_EINVAL, "%s: a block without a usable id", path);
         last = id->valueint > last ? id->valueint : last;
         columns += cJSON_IsNumber(y0) && y0->valuedouble == 0.0;
     }
+    if (last < 0)
+        return base_fail(err, BASE_EINVAL, "%s: no blocks in it", path);
     const char *name = cJSON_IsString(scene) ? scene->valuestring : path, *dot = strrchr(name, '.');
     char of_file[GGN_VIEW_NAME];
     if (dot && strcmp(dot, ".pbrt") == 0) { /* as the stop map of that render calls it */
         base_view_name(name, of_file, sizeof of_file);
         name = of_file;
     }
-    struct ggn_view *v = last < 0 ? NULL : add_view(&t, name, last + 1);
-    if (!v) {
-        rc = last < 0 ? base_fail(err, BASE_EINVAL, "%s: no blocks in it", path) : base_fail_nomem(err, path);
-        goto out;
-    }
+    struct ggn_view *v = add_view(t, name, last + 1);
+    if (!v)
+        return base_fail_nomem(err, path);
     v->columns = columns;
     v->unnamed = !cJSON_IsString(scene);
     cJSON_ArrayForEach (block, blocks) {
@@ -156,18 +149,11 @@ static int parse_json(const char *path, const char *text, size_t size, struct gg
         const cJSON *spp = cJSON_GetObjectItemCaseSensitive(block, "threshold");
         if (!spp)
             spp = cJSON_GetObjectItemCaseSensitive(block, "spp");
-        if (!cJSON_IsNumber(spp) || !(spp->valuedouble > 0.0 && spp->valuedouble < 1e12)) {
-            rc = base_fail(err, BASE_EINVAL, "%s: block %d has no positive spp", path, id->valueint);
-            goto out;
-        }
+        if (!cJSON_IsNumber(spp) || !(spp->valuedouble > 0.0 && spp->valuedouble < 1e12))
+            return base_fail(err, BASE_EINVAL, "%s: block %d has no positive spp", path, id->valueint);
         v->spp[id->valueint] = spp->valuedouble;
     }
-    *out = t;
-    t = (struct ggn_thresholds){0};
-out:
-    ggn_thresholds_release(&t);
-    cJSON_Delete(root);
-    return rc;
+    return 0;
 }
 
 /* Where the first pixel lies in its block: blocks are those of the whole picture, of which the file may hold a crop. */
@@ -180,62 +166,60 @@ static void find_corner(const char *path, const struct pic_image *image, int blo
 }
 
 /* One value per block: the largest in the block (a block is one value; the largest forgives borders that are filtered). */
-static int read_exr(const char *path, int block, struct ggn_thresholds *out, struct base_err *err)
+static int list_stop_map(const char *path, const struct pic_image *image, int block, struct ggn_thresholds *t,
+                         struct base_err *err)
 {
-    struct pic_image image;
-    struct ggn_thresholds t = {0};
-    int rc = pic_read_channel(path, "lull.spp.V", &image, err);
-    if (rc)
-        return rc;
     int left, top;
-    find_corner(path, &image, block, &left, &top);
-    long columns = (left + image.width + block - 1L) / block, rows = (top + image.height + block - 1L) / block;
-    if (columns * rows > GGN_VIEW_BLOCKS) {
-        rc = base_fail(err, BASE_EINVAL, "%s: %ld blocks of %d pixels", path, columns * rows, block);
-        goto out;
-    }
-    struct ggn_view *v = add_view(&t, base_file_name(path), (int)(columns * rows));
-    if (!v) {
-        rc = base_fail_nomem(err, path);
-        goto out;
-    }
+    find_corner(path, image, block, &left, &top);
+    long columns = (left + image->width + block - 1L) / block, rows = (top + image->height + block - 1L) / block;
+    if (columns * rows > GGN_VIEW_BLOCKS)
+        return base_fail(err, BASE_EINVAL, "%s: %ld blocks of %d pixels", path, columns * rows, block);
+    struct ggn_view *v = add_view(t, base_file_name(path), (int)(columns * rows));
+    if (!v)
+        return base_fail_nomem(err, path);
     v->columns = (int)columns;
     v->unnamed = 1;
-    for (int y = 0; y < image.height; y++)
-        for (int x = 0; x < image.width; x++) {
+    for (int y = 0; y < image->height; y++)
+        for (int x = 0; x < image->width; x++) {
             double *s = &v->spp[(top + y) / block * columns + (left + x) / block];
-            double value = (double)image.f32[(size_t)y * (size_t)image.width + (size_t)x];
+            double value = (double)image->f32[(size_t)y * (size_t)image->width + (size_t)x];
             if (!(*s >= value))
                 *s = value;
         }
-    for (int i = 0; i < v->n && !rc; i++)
+    for (int i = 0; i < v->n; i++)
         if (!(v->spp[i] > 0.0 && v->spp[i] < 1e12))
-            rc = base_fail(err, BASE_EINVAL, "%s: block %d has no positive spp", path, i);
-    if (!rc) {
-        *out = t;
-        t = (struct ggn_thresholds){0};
-    }
-out:
-    ggn_thresholds_release(&t);
-    pic_release(&image);
-    return rc;
+            return base_fail(err, BASE_EINVAL, "%s: block %d has no positive spp", path, i);
+    return 0;
 }
 
 int ggn_thresholds_read(const char *path, int block, struct ggn_thresholds *out, struct base_err *err)
 {
     const char *dot = strrchr(path, '.');
+    struct ggn_thresholds t = {0};
+    struct pic_image image = {0};
     char *text = NULL;
     size_t size;
-    if (dot && strcmp(dot, ".exr") == 0)
-        return read_exr(path, block, out, err);
-    int rc = base_file_read(path, MAX_TEXT, &text, &size, err);
+    int rc;
+    if (dot && strcmp(dot, ".exr") == 0) {
+        rc = pic_read_channel(path, "lull.spp.V", &image, err);
+        if (!rc)
+            rc = list_stop_map(path, &image, block, &t, err);
+        pic_release(&image);
+    } else {
+        rc = base_file_read(path, MAX_TEXT, &text, &size, err);
+        if (!rc && dot && strcmp(dot, ".json") == 0) {
+            cJSON *root = cJSON_ParseWithLength(text, size);
+            rc = list_json(path, root, &t, err);
+            cJSON_Delete(root);
+        } else if (!rc) {
+            rc = ggn_thresholds_parse_csv(path, text, &t, err);
+        }
+        free(text);
+    }
     if (rc)
-        return rc;
-    if (dot && strcmp(dot, ".json") == 0)
-        rc = parse_json(path, text, size, out, err);
+        ggn_thresholds_release(&t);
     else
-        rc = ggn_thresholds_parse_csv(path, text, out, err);
-    free(text);
+        *out = t;
     return rc;
 }
 
