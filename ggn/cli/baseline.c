@@ -82,7 +82,7 @@ static int train(const struct options *o, enum ggn_baseline_kind kind, struct gg
     return rc;
 }
 
-int ggn_cmd_baseline(int argc, char **argv)
+int ggn_cmd_baseline(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {
         .list = list,
@@ -97,22 +97,21 @@ int ggn_cmd_baseline(int argc, char **argv)
     struct options o = {.epochs = 30, .window = 6, .early = 0.05, .threads = base_threads_available()};
     struct ggn_eval_set set = {0};
     struct base_threads *threads = NULL;
-    struct base_err err = {0};
     enum ggn_baseline_kind kind = GGN_BASELINES;
     int skipped;
 
-    int rc = base_options_parse(&options, argc, argv, &o, &err);
+    int rc = base_options_parse(&options, argc, argv, &o, err);
     if (!rc)
-        rc = kind_of(o.name, &kind, &err);
-    if (!rc && !(threads = base_threads_create(o.threads, &err)))
-        rc = err.code;
+        rc = kind_of(o.name, &kind, err);
+    if (!rc && !(threads = base_threads_create(o.threads, err)))
+        rc = err->code;
     if (!rc)
         rc = ggn_eval_set_load(&set,
                                &(struct ggn_eval_options){.dir = o.data, .window = o.window, .ratio = o.ratio, .seed = 1},
-                               threads, &skipped, &err);
+                               threads, &skipped, err);
     if (!rc)
-        rc = train(&o, kind, &set, threads, &err);
+        rc = train(&o, kind, &set, threads, err);
     ggn_eval_set_release(&set);
     base_threads_destroy(threads);
-    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+    return rc;
 }

@@ -310,25 +310,24 @@ static void print_figures(const struct bench *b, const double figure[N_FIGURES])
     printf("}\n");
 }
 
-int ggn_cmd_bench(int argc, char **argv)
+int ggn_cmd_bench(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {.list = list, .doc = "Measures inference and training of the networks."};
     struct bench b = {.o = {.threads = base_threads_available(), .rounds = 9, .batch = 4}};
     double figure[N_FIGURES];
-    struct base_err err = {0};
 
-    int rc = base_options_parse(&options, argc, argv, &b.o, &err);
+    int rc = base_options_parse(&options, argc, argv, &b.o, err);
     if (!rc)
-        rc = setup(&b, &err);
+        rc = setup(&b, err);
     if (!rc && !b.o.json) {
         printf("instruction set %s, %d threads\n\n", base_isa_name(b.all[0]->kernels->isa), b.o.threads);
         for (int net = 0; net < GGN_NETS; net++)
             print_layers(&b, net);
     }
     if (!rc)
-        rc = measure(&b, figure, &err);
+        rc = measure(&b, figure, err);
     if (!rc)
         print_figures(&b, figure);
     release(&b);
-    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+    return rc;
 }

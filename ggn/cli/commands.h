@@ -1,9 +1,11 @@
 /*
- * The subcommands of `ggn`: one file each, ggn/cli/NAME.c, with `int ggn_cmd_NAME(int argc, char **argv)`.
+ * The subcommands of `ggn`: one file each, ggn/cli/NAME.c, with `int ggn_cmd_NAME(int argc, char **argv, struct base_err
+ * *err)`.
  *
- * A subcommand parses its own argv by a table of options (base/options.h; argv[0] is "ggn NAME" already) and returns the
- * exit status: 0 done, 1 failed (out of memory), 2 bad usage, bad input, or an output could not be written, 130 interrupted
- * (a command that takes long polls base_interrupted and leaves its outputs whole).
+ * A subcommand parses its own argv by a table of options (base/options.h; argv[0] is "ggn NAME" already). It returns 0, a
+ * negative code with the line that `ggn` says on standard error before it ends with 2 (bad usage, bad input, or an output
+ * could not be written) or 1 (out of memory), or GGN_EXIT_INTERRUPTED: a command that takes long polls base_interrupted and
+ * leaves its outputs whole.
  * To add one: write the file and add its line to GGN_COMMANDS. An underscore in the name is a hyphen on the command line.
  */
 #ifndef GGN_CLI_COMMANDS_H
@@ -36,16 +38,13 @@
     X(reconstruct, "the picture with each block at its threshold") \
     X(stimuli, "the pictures of recordings and renders that people are shown")
 
-#define GGN_DECLARE_COMMAND(name, help) int ggn_cmd_##name(int argc, char **argv);
+#define GGN_DECLARE_COMMAND(name, help) int ggn_cmd_##name(int argc, char **argv, struct base_err *err);
 GGN_COMMANDS(GGN_DECLARE_COMMAND)
 #undef GGN_DECLARE_COMMAND
 
-enum { GGN_EXIT_OK = 0, GGN_EXIT_FAILED = 1, GGN_EXIT_BAD_INPUT = 2, GGN_EXIT_INTERRUPTED = 130 };
+enum { GGN_EXIT_INTERRUPTED = 130 };
 
-/* Prints "COMMAND: text" on stderr and returns the exit status that err->code stands for (`command` is argv[0]). */
-int ggn_cmd_fail(const char *command, const struct base_err *err);
-
-/* Under mpirun the processes of the job, else NULL. What a process says with ggn_cmd_fail is said once, by rank 0. */
+/* Under mpirun the processes of the job, else NULL. An error is said once, by rank 0. */
 extern struct job *ggn_cmd_job;
 
 /* Reads the two pictures that a command compares, of equal size; says on stderr how many pixels of one could not be shown as

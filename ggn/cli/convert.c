@@ -12,7 +12,7 @@ struct options {
 static const struct base_option list[] = {
     {"type", 't', NULL, TO(type), .words = ggn_type_names, .help = "type of the stored weights (f16)"}, {0}};
 
-int ggn_cmd_convert(int argc, char **argv)
+int ggn_cmd_convert(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {
         .list = list,
@@ -26,15 +26,14 @@ int ggn_cmd_convert(int argc, char **argv)
                "`ggn evaluate -m MODEL -m OUT` says which."};
     struct options o = {.type = GGN_F16};
     struct ggn_model *model = NULL;
-    struct base_err err = {0};
 
-    int rc = base_options_parse(&options, argc, argv, &o, &err);
+    int rc = base_options_parse(&options, argc, argv, &o, err);
     if (!rc)
-        rc = base_file_check_kind(o.paths[1], &ggn_container_kind, &err);
+        rc = base_file_check_kind(o.paths[1], &ggn_container_kind, err);
     if (!rc)
-        rc = ggn_model_load(o.paths[0], &model, &err);
+        rc = ggn_model_load(o.paths[0], &model, err);
     if (!rc)
-        rc = ggn_model_save(model, o.paths[1], (enum ggn_type)o.type, &err);
+        rc = ggn_model_save(model, o.paths[1], (enum ggn_type)o.type, err);
     ggn_model_destroy(model);
-    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+    return rc;
 }

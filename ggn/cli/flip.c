@@ -33,7 +33,7 @@ static int write_map(const char *path, const float *map, int width, int height, 
     return rc;
 }
 
-int ggn_cmd_flip(int argc, char **argv)
+int ggn_cmd_flip(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {
         .list = list,
@@ -47,22 +47,21 @@ int ggn_cmd_flip(int argc, char **argv)
     struct options o = {.ppd = GGN_FLIP_PPD};
     struct pic_image images[2] = {{0}, {0}};
     struct ggn_flip_stats stats;
-    struct base_err err = {0};
     float *map = NULL;
 
-    int rc = base_options_parse(&options, argc, argv, &o, &err);
+    int rc = base_options_parse(&options, argc, argv, &o, err);
     if (!rc)
-        rc = ggn_cmd_read_pair(argv[0], o.paths, images, &err);
+        rc = ggn_cmd_read_pair(argv[0], o.paths, images, err);
     if (!rc && o.map_path && !(map = malloc((size_t)images[0].width * (size_t)images[0].height * sizeof *map)))
-        rc = base_fail_nomem(&err, "error map");
+        rc = base_fail_nomem(err, "error map");
     if (!rc)
-        rc = ggn_flip(images[0].u8, images[1].u8, images[0].width, images[0].height, o.ppd, map, &stats, &err);
+        rc = ggn_flip(images[0].u8, images[1].u8, images[0].width, images[0].height, o.ppd, map, &stats, err);
     if (!rc && map)
-        rc = write_map(o.map_path, map, images[0].width, images[0].height, &err);
+        rc = write_map(o.map_path, map, images[0].width, images[0].height, err);
     if (!rc)
         printf(o.json ? "{\"mean\": %.6f, \"max\": %.6f}\n" : "mean %.6f\nmax  %.6f\n", stats.mean, stats.max);
     free(map);
     pic_release(&images[0]);
     pic_release(&images[1]);
-    return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
+    return rc;
 }

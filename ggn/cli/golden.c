@@ -91,26 +91,24 @@ static cJSON *to_json(const struct ggn_golden *g, int train_step, int *failed)
     return j;
 }
 
-int ggn_cmd_golden(int argc, char **argv)
+int ggn_cmd_golden(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {
         .list = list, .doc = "Prints the golden values of the published networks as one JSON object."};
     struct options o = {.seeds = {{100, 300, 500}}, .threads = base_threads_available()};
     struct ggn_golden golden;
-    struct base_err err = {0};
 
     struct base_threads *threads =
-        base_options_parse(&options, argc, argv, &o, &err) ? NULL : base_threads_create(o.threads, &err);
+        base_options_parse(&options, argc, argv, &o, err) ? NULL : base_threads_create(o.threads, err);
     if (!threads)
-        return ggn_cmd_fail(argv[0], &err);
-    int rc = (o.single ? ggn_golden_run : ggn_golden_run_f64)(&o.seeds, o.train_step, threads, &golden, &err);
+        return err->code;
+    int rc = (o.single ? ggn_golden_run : ggn_golden_run_f64)(&o.seeds, o.train_step, threads, &golden, err);
     base_threads_destroy(threads);
     if (rc)
-        return ggn_cmd_fail(argv[0], &err);
-
+        return rc;
     int failed = 0;
     cJSON *json = to_json(&golden, o.train_step, &failed);
-    rc = base_json_write(NULL, json, failed, &err);
+    rc = base_json_write(NULL, json, failed, err);
     cJSON_Delete(json);
-    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+    return rc;
 }

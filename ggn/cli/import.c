@@ -76,7 +76,7 @@ static int import_all(const struct options *o, struct base_err *err)
     return rc;
 }
 
-int ggn_cmd_import(int argc, char **argv)
+int ggn_cmd_import(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {
         .list = list,
@@ -89,25 +89,22 @@ int ggn_cmd_import(int argc, char **argv)
                "(NAME_half_00020.exr …, or the layer half). Running it again continues where it stopped."};
     struct options o = {.how = {.block = 200, .progress = isatty(2) ? show_progress : NULL}};
     struct ggn_thresholds thresholds = {0};
-    struct base_err err = {0};
 
-    int rc = base_options_parse(&options, argc, argv, &o, &err);
+    int rc = base_options_parse(&options, argc, argv, &o, err);
     if (rc)
-        return ggn_cmd_fail(argv[0], &err);
+        return rc;
     base_interrupt_catch();
     if (o.thresholds) {
-        rc = ggn_thresholds_read(o.thresholds, o.how.block, &thresholds, &err);
+        rc = ggn_thresholds_read(o.thresholds, o.how.block, &thresholds, err);
         o.how.thresholds = &thresholds;
     }
     int made = 0;
     if (!rc)
-        rc = base_make_folder(o.out, &made, &err);
+        rc = base_make_folder(o.out, &made, err);
     if (!rc)
-        rc = ggn_import_is_view(o.dir) ? import_one(&o, o.dir, &err) : import_all(&o, &err);
+        rc = ggn_import_is_view(o.dir) ? import_one(&o, o.dir, err) : import_all(&o, err);
     ggn_thresholds_release(&thresholds);
     if (rc && made)
         rmdir(o.out); /* goes only if nothing was imported */
-    if (rc)
-        return ggn_cmd_fail(argv[0], &err);
-    return base_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
+    return !rc && base_interrupted ? GGN_EXIT_INTERRUPTED : rc;
 }

@@ -60,7 +60,7 @@ static int print_model(const struct ggn_model *m, const struct ggn_container *c,
     return 0;
 }
 
-int ggn_cmd_inspect(int argc, char **argv)
+int ggn_cmd_inspect(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {.list = list,
                                                 .args_doc = "FILE",
@@ -71,18 +71,17 @@ int ggn_cmd_inspect(int argc, char **argv)
     struct options o = {0};
     struct ggn_container c;
     struct ggn_model *model = NULL;
-    struct base_err err = {0};
 
-    if (base_options_parse(&options, argc, argv, &o, &err) || ggn_container_read(&c, o.path, &err))
-        return ggn_cmd_fail(argv[0], &err);
-    int rc = ggn_model_parse(&c, o.path, &model, &err);
+    if (base_options_parse(&options, argc, argv, &o, err) || ggn_container_read(&c, o.path, err))
+        return err->code;
+    int rc = ggn_model_parse(&c, o.path, &model, err);
     if (!rc && o.json)
         printf("%s\n", c.json);
     else if (!rc)
-        rc = print_model(model, &c, &err);
+        rc = print_model(model, &c, err);
     if (!rc && o.tensors)
         print_tensors(&c);
     ggn_model_destroy(model);
     ggn_container_release(&c);
-    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+    return rc;
 }

@@ -346,7 +346,7 @@ static int fit_trials(const struct options *o, struct base_err *err)
     return 0;
 }
 
-int ggn_cmd_label(int argc, char **argv)
+int ggn_cmd_label(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {.list = list,
                                                 .args_doc = "DATA...",
@@ -358,24 +358,21 @@ int ggn_cmd_label(int argc, char **argv)
                                                        "folder of them): those of people, or those of the "
                                                        "model observer, which are never called human."};
     struct options o = {.source = GGN_FROM_HALVES, .threads = job_threads(ggn_cmd_job)};
-    struct base_err err = {0};
-    int rc = base_options_parse(&options, argc, argv, &o, &err);
+    int rc = base_options_parse(&options, argc, argv, &o, err);
 
     if (rc)
-        return ggn_cmd_fail(argv[0], &err);
+        return rc;
     base_interrupt_catch();
     if (job_rank(ggn_cmd_job) > 0) /* rank 0 ends the job */
         base_interrupt_ignore();
     if ((o.trials || o.calibrate || o.check) && job_rank(ggn_cmd_job) > 0)
-        return GGN_EXIT_OK;
+        return 0;
     if (o.trials) {
-        rc = fit_trials(&o, &err);
+        rc = fit_trials(&o, err);
     } else {
-        struct base_threads *threads = base_threads_create(o.threads, &err);
-        rc = !threads ? err.code : o.calibrate ? calibrate(&o, threads, &err) : label(&o, threads, &err);
+        struct base_threads *threads = base_threads_create(o.threads, err);
+        rc = !threads ? err->code : o.calibrate ? calibrate(&o, threads, err) : label(&o, threads, err);
         base_threads_destroy(threads);
     }
-    if (rc)
-        return ggn_cmd_fail(argv[0], &err);
-    return base_interrupted ? GGN_EXIT_INTERRUPTED : GGN_EXIT_OK;
+    return !rc && base_interrupted ? GGN_EXIT_INTERRUPTED : rc;
 }

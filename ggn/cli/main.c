@@ -10,7 +10,7 @@
 
 struct command {
     const char *name;
-    int (*run)(int argc, char **argv);
+    int (*run)(int argc, char **argv, struct base_err *err);
     const char *help;
 };
 
@@ -18,7 +18,7 @@ struct command {
 static const struct command commands[] = {GGN_COMMANDS(COMMAND_ENTRY)};
 #undef COMMAND_ENTRY
 
-enum { N_COMMANDS = sizeof commands / sizeof commands[0] };
+enum { N_COMMANDS = sizeof commands / sizeof commands[0], FAILED = 1, BAD_INPUT = 2 };
 
 struct job *ggn_cmd_job;
 
@@ -61,13 +61,14 @@ uint8_t *ggn_cmd_magma(const float *map, double gain, size_t n)
     return rgb;
 }
 
-int ggn_cmd_fail(const char *command, const struct base_err *err)
+/* Says "COMMAND: text"; returns the exit status that err->code stands for. */
+static int fail(const char *command, const struct base_err *err)
 {
     if (job_rank(ggn_cmd_job) > 0)
         snprintf(last_words, sizeof last_words, "%s", err->text);
     else
         fprintf(stderr, "%s: %s\n", command, err->text);
-    return err->code == BASE_EINVAL || err->code == BASE_EIO ? GGN_EXIT_BAD_INPUT : GGN_EXIT_FAILED;
+    return err->code == BASE_EINVAL || err->code == BASE_EIO ? BAD_INPUT : FAILED;
 }
 
 static const struct command *find(const char *typed)
@@ -81,7 +82,7 @@ static const struct command *find(const char *typed)
 static int refuse(const char *text)
 {
     fprintf(stderr, "ggn: %s (ggn --help lists the commands)\n", text);
-    return GGN_EXIT_BAD_INPUT;
+    return BAD_INPUT;
 }
 
 /* `ggn` with options only. */
@@ -98,7 +99,7 @@ static int main_options(int argc, char **argv)
     struct base_options options = {.doc = doc, .args_doc = "COMMAND [OPTION...]", .list = none};
     struct base_err err = {0};
     if (base_options_parse(&options, argc, argv, NULL, &err))
-        return ggn_cmd_fail("ggn", &err);
+        return fail("ggn", &err);
     return refuse("a command is needed");
 }
 
@@ -118,13 +119,12 @@ static int run(const struct command *command, int argc, char **argv)
 {
     struct base_err err = {0};
     if (job_open(&ggn_cmd_job, &err))
-        return ggn_cmd_fail(argv[0], &err);
+        return fail(argv[0], &err);
     job_watch(ggn_cmd_job, 0, &base_interrupted);
-    if (ggn_cmd_job && command->run != ggn_cmd_label) { /* it shares out its work; others would do it once a process */
-        base_fail(&err, BASE_EINVAL, "works in one process: start it without mpirun");
-        return part(argv[0], ggn_cmd_fail(argv[0], &err));
-    }
-    return part(argv[0], command->run(argc, argv));
+    const int alone = ggn_cmd_job && command->run != ggn_cmd_label; /* label shares out its work; others would do it anew */
+    int rc = alone ? base_fail(&err, BASE_EINVAL, "works in one process: start it without mpirun")
+                   : command->run(argc, argv, &err);
+    return part(argv[0], rc < 0 ? fail(argv[0], &err) : rc);
 }
 
 int main(int argc, char **argv)
@@ -143,7 +143,7 @@ int main(int argc, char **argv)
     int status = run(command, argc - 1, argv + 1);
     if (fflush(stdout) || ferror(stdout)) {
         fprintf(stderr, "%s: cannot write standard output\n", name);
-        return status ? status : GGN_EXIT_BAD_INPUT;
+        return status ? status : BAD_INPUT;
     }
     return status;
 }

@@ -150,7 +150,7 @@ static int report(const struct options *o, const struct seq_manifest *m, const s
     return 0;
 }
 
-int ggn_cmd_reconstruct(int argc, char **argv)
+int ggn_cmd_reconstruct(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {.list = list,
                                                 .args_doc = "SEQUENCE",
@@ -165,31 +165,30 @@ int ggn_cmd_reconstruct(int argc, char **argv)
     struct ggn_labels labels = {0};
     struct ggn_thresholds stops = {0};
     struct picture p = {0};
-    struct base_err err = {0};
     const struct ggn_view *view = NULL;
 
-    int rc = base_options_parse(&options, argc, argv, &o, &err);
+    int rc = base_options_parse(&options, argc, argv, &o, err);
     if (!rc)
-        rc = seq_manifest_read(o.dir, &m, &err);
+        rc = seq_manifest_read(o.dir, &m, err);
     if (!rc && !o.stops)
-        rc = ggn_labels_read(o.dir, &labels, &err);
+        rc = ggn_labels_read(o.dir, &labels, err);
     if (!rc && o.stops) {
-        rc = ggn_thresholds_read(o.stops, (int)m.block, &stops, &err);
+        rc = ggn_thresholds_read(o.stops, (int)m.block, &stops, err);
         view = rc ? NULL : o.view ? ggn_thresholds_find(&stops, o.view) : stops.n == 1 ? &stops.views[0] : NULL;
         if (!rc && !view)
-            rc = base_fail(&err, BASE_EINVAL, "%s: %s", o.stops,
+            rc = base_fail(err, BASE_EINVAL, "%s: %s", o.stops,
                            o.view ? "no such view" : "several views: --view NAME chooses one");
     }
     if (!rc && o.reference && !m.reference_spp)
-        rc = base_fail(&err, BASE_EINVAL, "%s: it was recorded without a reference", o.dir);
+        rc = base_fail(err, BASE_EINVAL, "%s: it was recorded without a reference", o.dir);
     if (!rc)
-        rc = build(&o, &m, view, &labels, &p, &err);
+        rc = build(&o, &m, view, &labels, &p, err);
     if (!rc)
-        rc = report(&o, &m, &p, &err);
+        rc = report(&o, &m, &p, err);
     free(p.taken);
     free(p.reference);
     ggn_thresholds_release(&stops);
     ggn_labels_release(&labels);
     seq_manifest_release(&m);
-    return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
+    return rc;
 }

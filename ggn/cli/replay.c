@@ -352,7 +352,7 @@ static int print(const struct replay *r, struct base_err *err)
     return rc;
 }
 
-int ggn_cmd_replay(int argc, char **argv)
+int ggn_cmd_replay(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {
         .list = list,
@@ -361,18 +361,17 @@ int ggn_cmd_replay(int argc, char **argv)
                "cost` judge."};
     struct options o = {.threads = base_threads_available()};
     struct replay r = {.o = &o};
-    struct base_err err = {0};
-    int rc = base_options_parse(&options, argc, argv, &o, &err);
+    int rc = base_options_parse(&options, argc, argv, &o, err);
     if (!rc)
-        rc = load(&r, &err);
+        rc = load(&r, err);
     if (!rc)
-        rc = find_observers(&r, &err);
+        rc = find_observers(&r, err);
     if (!rc)
-        rc = print(&r, &err);
+        rc = print(&r, err);
     free(r.observers);
     ggn_eval_set_release(&r.set);
     for (int i = 0; i < o.n_models; i++)
         ggn_model_destroy(r.model[i]);
     base_threads_destroy(r.threads);
-    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+    return rc;
 }

@@ -100,7 +100,7 @@ static int make(struct options *o, struct ggn_shown *shown, struct base_err *err
     return rc;
 }
 
-int ggn_cmd_stimuli(int argc, char **argv)
+int ggn_cmd_stimuli(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {
         .list = list,
@@ -114,18 +114,17 @@ int ggn_cmd_stimuli(int argc, char **argv)
             "prints as JSON which views, blocks and levels there are. `lull-study init` runs it."};
     struct options *o = calloc(1, sizeof *o);
     struct ggn_shown shown = {0};
-    struct base_err err = {0};
-    int rc = o ? 0 : base_fail_nomem(&err, "options");
+    int rc = o ? 0 : base_fail_nomem(err, "options");
     if (!rc) {
         *o = (struct options){.task = GGN_SHOWN_TWO_INTERVAL,
                               .request = {.block = 200, .spp_min = 1, .spp_max = 1000000, .spacing = 0.15}};
-        rc = base_options_parse(&options, argc, argv, o, &err);
+        rc = base_options_parse(&options, argc, argv, o, err);
     }
     if (!rc)
-        rc = make(o, &shown, &err);
+        rc = make(o, &shown, err);
     if (!rc)
-        rc = print_shown(&shown, (enum ggn_shown_task)o->task, &err);
+        rc = print_shown(&shown, (enum ggn_shown_task)o->task, err);
     ggn_shown_release(&shown);
     free(o);
-    return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
+    return rc;
 }

@@ -31,7 +31,7 @@ static void put_file(const struct ggn_thresholds *t, cJSON *to, int *failed)
     }
 }
 
-int ggn_cmd_thresholds(int argc, char **argv)
+int ggn_cmd_thresholds(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {
         .list = list,
@@ -43,18 +43,17 @@ int ggn_cmd_thresholds(int argc, char **argv)
         .doc = "Prints the thresholds or stops of blocks as JSON: for each FILE a list of views. A file may be CSV "
                "(name;t0;...), a render's report JSON, labels.json, or an EXR with the channel lull.spp.V."};
     struct options o = {.block = 200};
-    struct base_err err = {0};
     cJSON *root = cJSON_CreateArray();
-    int failed = !root, rc = base_options_parse(&options, argc, argv, &o, &err);
+    int failed = !root, rc = base_options_parse(&options, argc, argv, &o, err);
     for (int i = 0; i < MAX_FILES && o.paths[i] && !rc; i++) {
         struct ggn_thresholds t = {0};
-        rc = ggn_thresholds_read(o.paths[i], o.block, &t, &err);
+        rc = ggn_thresholds_read(o.paths[i], o.block, &t, err);
         if (!rc)
             put_file(&t, base_json_array(root, NULL, &failed), &failed);
         ggn_thresholds_release(&t);
     }
     if (!rc)
-        rc = base_json_write(NULL, root, failed, &err);
+        rc = base_json_write(NULL, root, failed, err);
     cJSON_Delete(root);
-    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+    return rc;
 }

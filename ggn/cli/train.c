@@ -96,33 +96,32 @@ static int check_beside(const struct ggn_train_plan *plan, struct base_err *err)
     return rc;
 }
 
-int ggn_cmd_train(int argc, char **argv)
+int ggn_cmd_train(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {.list = list,
                                                 .doc = "Trains a stopping criterion on a data set of block sequences.\vThe "
                                                        "same data, options and seed give the same model bytes, also "
                                                        "after an interruption and --resume, with any number of threads."};
     struct settings s = {.preset = GGN_PRESET_LULL};
-    struct base_err err = {0};
 
     /* Twice: the preset decides the defaults that other options override, wherever it stands. */
-    int rc = base_options_parse(&options, argc, argv, &s, &err);
+    int rc = base_options_parse(&options, argc, argv, &s, err);
     s.plan = ggn_train_plan_default((enum ggn_preset)s.preset);
     if (!rc)
-        rc = base_options_parse(&options, argc, argv, &s, &err);
+        rc = base_options_parse(&options, argc, argv, &s, err);
     if (!rc)
-        rc = check_beside(&s.plan, &err);
+        rc = check_beside(&s.plan, err);
     if (rc)
-        return ggn_cmd_fail(argv[0], &err);
+        return rc;
     s.plan.progress = s.quiet ? NULL : stderr;
     s.plan.interrupted = &base_interrupted;
     base_interrupt_catch();
     base_options_identify(list, &s, &s.plan.identity);
-    rc = ggn_train(&s.plan, &err);
+    rc = ggn_train(&s.plan, err);
     base_identity_release(&s.plan.identity);
     if (rc == GGN_TRAIN_INTERRUPTED) {
         fprintf(stderr, "%s: interrupted; --resume continues from the last validation\n", argv[0]);
         return GGN_EXIT_INTERRUPTED;
     }
-    return rc ? ggn_cmd_fail(argv[0], &err) : GGN_EXIT_OK;
+    return rc;
 }

@@ -119,7 +119,7 @@ static int run(const struct options *o, const struct pic_image images[4], struct
     return rc;
 }
 
-int ggn_cmd_visible(int argc, char **argv)
+int ggn_cmd_visible(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {
         .list = list,
@@ -132,15 +132,14 @@ int ggn_cmd_visible(int argc, char **argv)
                "of each block, 1 where noise is just not seen, and the share of viewers who see it."};
     struct options o = {.block = 200};
     struct pic_image images[4] = {{0}}; /* reference, image; second reference, image */
-    struct base_err err = {0};
-    int rc = base_options_parse(&options, argc, argv, &o, &err);
+    int rc = base_options_parse(&options, argc, argv, &o, err);
     if (!rc)
-        rc = ggn_cmd_read_pair(argv[0], o.paths, images, &err);
+        rc = ggn_cmd_read_pair(argv[0], o.paths, images, err);
     if (!rc && o.second_path)
-        rc = ggn_cmd_read_pair(argv[0], (const char *const[]){o.second_path, o.paths[1]}, images + 2, &err);
+        rc = ggn_cmd_read_pair(argv[0], (const char *const[]){o.second_path, o.paths[1]}, images + 2, err);
     if (!rc)
-        rc = run(&o, images, &err);
+        rc = run(&o, images, err);
     for (int i = 0; i < 4; i++)
         pic_release(&images[i]);
-    return !rc ? GGN_EXIT_OK : ggn_cmd_fail(argv[0], &err);
+    return rc;
 }
