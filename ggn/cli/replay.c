@@ -254,7 +254,7 @@ static void put_block(const struct replay *r, const struct ggn_eval_block *b, cJ
     base_json_bool(to, "censored", b->label.censored, failed);
     base_json_number(to, "cap", b->cap, failed);
     base_json_bool(to, "simulated", series->simulated, failed);
-    base_json_bool(to, "reference", series->reference != NULL, failed);
+    base_json_bool(to, "reference", series->has_reference, failed);
     cJSON *noisy = base_json_array(to, "noisy", failed);
     for (size_t i = b->first; i < b->end; i++)
         base_json_number(noisy, NULL, s->noisy[i] >= 0 ? s->noisy[i] : (double)NAN, failed);

@@ -162,7 +162,7 @@ static int fill_series(const struct ggn_series_set *set, struct ggn_level_series
                        const struct ggn_series_set_options *o, struct base_err *err)
 {
     const size_t values = ggn_series_set_values(set);
-    const struct seq_record *reference = b->reference || !o->mean_for_reference ? b->reference : seq_full_level(b);
+    const struct seq_record *reference = b->reference ? b->reference : seq_full_level(b);
     const int wanted = set->meter.memory != NULL;
     float *memory = wanted ? malloc(2 * values * sizeof *memory) : NULL;
     const struct halves h = {memory, memory ? memory + values : NULL};
@@ -171,6 +171,7 @@ static int fill_series(const struct ggn_series_set *set, struct ggn_level_series
     if (!rc)
         rc = fill_levels(set, c, b, o->ratio, &h, err);
     free(memory);
+    c->has_reference = b->reference != NULL;
     if (rc || !reference)
         return rc;
     c->reference = malloc(values);

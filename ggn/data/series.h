@@ -24,7 +24,11 @@ struct ggn_level_series {
     double *spp;        /* [n_levels], rising */
     uint8_t *noisy;     /* [n_levels][3][H][W] display codes */
     uint16_t *denoised; /* the same, 16-bit fixed point; NULL until needed */
-    uint8_t *reference; /* [3][H][W] display codes; NULL without; a synthetic series shares its original's */
+    /* [3][H][W] display codes; NULL without; a synthetic series shares its original's. Where none was recorded
+     * (has_reference 0) the mean of the full level stands for it: as noisy as that many samples are, which levels recorded
+     * below it share */
+    uint8_t *reference;
+    int has_reference;
     /* with set->noise_maps: the noise maps (of the visible noise, model/measure.h),
      * [n_levels][H][W], and whether a level has one */
     uint8_t *noise_map, *has_noise_map;
@@ -55,10 +59,7 @@ struct ggn_series_set_options {
     int noise_maps;    /* with measures: also keep the noise maps */
     int measures;      /* also measure every level (model/measure.h) */
     int keep_recorded; /* ggn_series_set_extend makes what it simulates further series */
-    /* where there is no reference, the mean of the full level stands for it: as noisy as that many samples are, which
-     * levels recorded below it share */
-    int mean_for_reference;
-    int with_test; /* read the pixels of the test scenes and of the people's views too; else some must be for training */
+    int with_test;     /* read the pixels of the test scenes and of the people's views too; else some must be for training */
 };
 
 /* Reads and checks everything. BASE_EINVAL names the file that does not fit. */

@@ -6,8 +6,6 @@
 #ifndef GGN_DATA_WINDOWS_H
 #define GGN_DATA_WINDOWS_H
 
-#include "base/threads.h"
-#include "model/networks.h"
 #include "data/series.h"
 
 struct ggn_window {

@@ -2,7 +2,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "data/each.h"
 #include "nn/ssim.h"
@@ -125,54 +124,29 @@ static void interleave(const uint8_t *planar, size_t pixels, uint8_t *rgb)
             rgb[3 * i + c] = planar[c * pixels + i];
 }
 
-/* Planar codes of what a block is compared with: its reference; without one the mean of its full level, from which its
- * simulated levels were made. *known 0: neither is there. */
-static int comparison(const struct ggn_eval_set *s, const struct ggn_eval_block *block, uint8_t *codes, int *known,
-                      struct base_err *err)
-{
-    const struct ggn_dataset_view *v = &s->images.data.views[block->view];
-    const struct ggn_level_series *c = &s->images.series[block->series];
-    struct seq_block p;
-    *known = c->reference != NULL;
-    if (c->reference) {
-        memcpy(codes, c->reference, ggn_series_set_values(&s->images));
-        return 0;
-    }
-    int rc = seq_manifest_read_block(v->dir, &v->manifest, block->index, &p, err);
-    if (rc)
-        return rc;
-    const struct seq_record *full = seq_full_level(&p);
-    *known = full != NULL;
-    if (full)
-        rc = seq_display_planar(&p, full, codes, err);
-    seq_block_release(&p);
-    return rc;
-}
-
+/* Against the reference, or what stands for it: without one simulated levels were made from the full level's mean. */
 static int measure_quality(struct ggn_eval_set *s, const struct ggn_eval_block *block, int with_ssim, struct base_err *err)
 {
     const struct ggn_level_series *c = &s->images.series[block->series];
-    int w = s->images.width, h = s->images.height, rc = 0, known = 0;
-    size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
-    uint8_t *rgb = malloc(3 * values), *against = rgb ? rgb + 2 * values : NULL;
+    const int w = s->images.width, h = s->images.height;
+    const size_t pixels = (size_t)w * (size_t)h, values = 3 * pixels;
+    if (!c->reference)
+        return 0;
+    uint8_t *rgb = malloc(2 * values);
     float *work = malloc(2 * values * sizeof *work);
     struct ggn_ssim *ssim = ggn_ssim_create(h, w, NULL, err);
-    if (!rgb || !work || !ssim) {
-        rc = base_fail_nomem(err, "quality");
-        goto out;
-    }
-    rc = comparison(s, block, against, &known, err);
-    interleave(against, pixels, rgb);
-    for (size_t i = block->first; i < block->end && known && !rc; i++) {
+    int rc = rgb && work && ssim ? 0 : base_fail_nomem(err, "quality");
+    if (!rc)
+        interleave(c->reference, pixels, rgb);
+    for (size_t i = block->first; i < block->end && !rc; i++) {
         const uint8_t *level = c->noisy + (i - block->first + (size_t)s->window - 1) * values;
         struct ggn_flip_stats flip;
         interleave(level, pixels, rgb + values);
         rc = ggn_flip(rgb, rgb + values, w, h, GGN_FLIP_PPD, NULL, &flip, err);
         s->flip[i] = flip.mean;
         if (with_ssim)
-            s->ssim[i] = ssim_of(ssim, level, against, pixels, w, work);
+            s->ssim[i] = ssim_of(ssim, level, c->reference, pixels, w, work);
     }
-out:
     ggn_ssim_destroy(ssim);
     free(work);
     free(rgb);

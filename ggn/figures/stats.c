@@ -2,7 +2,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 double ggn_stats_mean(const double *x, size_t n)
 {

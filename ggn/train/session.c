@@ -87,7 +87,6 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     data.noise_maps = p->noise_map > 0;
     data.measures = data.keep_recorded = p->reach > 0;
     s->scale = ggn_observer_slope(&ggn_observer_default);
-    data.mean_for_reference = 1;
     int rc = s->threads ? ggn_series_set_load(&s->set, &data, err) : BASE_ENOMEM;
 
     /* After loading, since a small block is smaller than the usual crop. */

@@ -51,7 +51,7 @@ static void chains_are_as_they_were(void **state)
 {
     static const struct ggn_series_set_options options[] = {
         {.dir = "tests/data/recorded", .with_test = 1, .noise_maps = 1, .measures = 1},
-        {.dir = "tests/data/recorded", .ratio = 2, .mean_for_reference = 1},
+        {.dir = "tests/data/recorded", .ratio = 2},
         {.dir = "tests/data/recorded", .split = {.validation = "one", .test = "two,three"}, .with_test = 1},
         {.dir = "tests/data/recorded", .split = {.validation = "one,two", .test = "three"}},
         {.dir = "tests/data/recorded", .split = {.validation = "two,one", .test = "three,one"}},
