@@ -110,7 +110,7 @@ static void warn_of_learned(const struct replay *r)
 {
     const struct ggn_dataset *d = &r->set.images.data;
     for (int i = 0; i < d->n; i++)
-        for (int k = 0; k < r->o->n_models && ggn_dataset_first(d, i) == i; k++) {
+        for (int k = 0; k < r->o->n_models && d->views[i].first == i; k++) {
             const struct ggn_dataset_view *v = &d->views[i];
             const enum ggn_split own = ggn_split_learned(r->learned[k], v->manifest.scene);
             if (own < v->split && v->split != GGN_SPLIT_NONE && v->split != GGN_SPLIT_PEOPLE)
@@ -195,13 +195,6 @@ static int find_observers(struct replay *r, struct base_err *err)
 
 /* --- output --- */
 
-static void put_values(cJSON *to, const char *key, const double *values, size_t n, int *failed)
-{
-    cJSON *array = base_json_array(to, key, failed);
-    for (size_t i = 0; i < n; i++)
-        base_json_number(array, NULL, values[i], failed);
-}
-
 static void put_views(const struct replay *r, cJSON *to, int *failed)
 {
     const struct ggn_dataset *d = &r->set.images.data;
@@ -259,7 +252,7 @@ static void put_block(const struct replay *r, const struct ggn_eval_block *b, cJ
     for (size_t i = b->first; i < b->end; i++)
         base_json_number(noisy, NULL, s->noisy[i] >= 0 ? s->noisy[i] : (double)NAN, failed);
     for (size_t c = 0; c < sizeof columns / sizeof columns[0]; c++)
-        put_values(to, columns[c].key, columns[c].values + b->first, b->end - b->first, failed);
+        base_json_numbers(to, columns[c].key, columns[c].values + b->first, (int)(b->end - b->first), failed);
     put_errors(r, b, "error", s->visible, to, failed);
     put_errors(r, b, "error_means", s->visible_means, to, failed);
 }
@@ -277,9 +270,10 @@ static void put_method(const struct replay *r, const char *kind, const char *nam
     cJSON *corrections = m->correction ? base_json_array(to, "corrections", failed) : NULL;
     for (int i = 0; i < r->set.n_blocks; i++) {
         const struct ggn_eval_block *b = &r->set.blocks[i];
-        put_values(scores, NULL, m->score + b->first, b->end - b->first, failed);
+        const int cases = (int)(b->end - b->first);
+        base_json_numbers(scores, NULL, m->score + b->first, cases, failed);
         if (corrections)
-            put_values(corrections, NULL, m->correction + b->first, b->end - b->first, failed);
+            base_json_numbers(corrections, NULL, m->correction + b->first, cases, failed);
     }
 }
 

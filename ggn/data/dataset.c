@@ -170,34 +170,16 @@ int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct base_err
         return rc;
     }
     qsort(d.views, (size_t)d.n, sizeof *d.views, compare_views);
-    for (int i = 0; i < d.n; i++)
-        d.views[i].name = base_file_name(d.views[i].dir);
+    for (int i = 0; i < d.n; i++) {
+        struct ggn_dataset_view *v = &d.views[i];
+        v->name = base_file_name(v->dir);
+        while (strcmp(d.views[v->first].manifest.scene, v->manifest.scene) != 0)
+            v->first++;
+        v->scene = v->first == i ? d.n_scenes++ : d.views[v->first].scene;
+    }
     *data = d;
     return 0;
 }
-
-int ggn_dataset_first(const struct ggn_dataset *data, int view)
-{
-    int i = 0;
-    while (strcmp(data->views[i].manifest.scene, data->views[view].manifest.scene) != 0)
-        i++;
-    return i;
-}
-
-static int scenes_before(const struct ggn_dataset *data, int view)
-{
-    int n = 0;
-    for (int i = 0; i < view; i++)
-        n += ggn_dataset_first(data, i) == i;
-    return n;
-}
-
-int ggn_dataset_scene(const struct ggn_dataset *data, int view)
-{
-    return scenes_before(data, ggn_dataset_first(data, view));
-}
-
-int ggn_dataset_scenes(const struct ggn_dataset *data) { return scenes_before(data, data->n); }
 
 uint32_t ggn_dataset_tiles(const struct ggn_dataset_view *view)
 {

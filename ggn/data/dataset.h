@@ -19,6 +19,7 @@ extern const char *const ggn_split_names[GGN_SPLITS]; /* "train", "validation", 
 struct ggn_dataset_view {
     char dir[4096];
     const char *name; /* borrows from dir: its last component */
+    int scene, first; /* number of its scene, in order of first appearance; the first view of that */
     struct seq_manifest manifest;
     int has_labels;
     struct ggn_labels labels;
@@ -26,7 +27,7 @@ struct ggn_dataset_view {
 };
 
 struct ggn_dataset {
-    int n;
+    int n, n_scenes;
     struct ggn_dataset_view *views; /* owns; in order of name */
 };
 
@@ -34,11 +35,6 @@ struct ggn_dataset {
 int ggn_dataset_open(const char *path, struct ggn_dataset *data, struct base_err *err);
 void ggn_dataset_release(struct ggn_dataset *data);
 
-/* The first view of this view's scene: the same index for all views of a scene. */
-int ggn_dataset_first(const struct ggn_dataset *data, int view);
-/* How many scenes there are, and the number of the view's one, in order of first appearance. */
-int ggn_dataset_scenes(const struct ggn_dataset *data);
-int ggn_dataset_scene(const struct ggn_dataset *data, int view);
 /* How many blocks the view has when it is whole: thresholds for it are as many. */
 uint32_t ggn_dataset_tiles(const struct ggn_dataset_view *view);
 

@@ -203,7 +203,7 @@ static int load_block(struct ggn_series_set *set, int view, uint32_t index, cons
     if (!rc) {
         const struct ggn_label *label = v->has_labels ? ggn_labels_find(&v->labels, b.id) : NULL;
         c->view = view;
-        c->scene = ggn_dataset_scene(&set->data, view);
+        c->scene = v->scene;
         c->split = v->split;
         c->block = b.id;
         c->has_label = label != NULL;
@@ -279,7 +279,6 @@ int ggn_series_set_load(struct ggn_series_set *set, const struct ggn_series_set_
 
     if (rc)
         return rc;
-    made.n_scenes = ggn_dataset_scenes(&made.data);
     rc = ggn_split_choose(&made.data, &o->split, &made.split_source, err);
     if (!rc && !o->with_test)
         rc = check_training(&made.data, o->dir, err);

@@ -44,7 +44,7 @@ struct ggn_series_set {
     int noise_maps;          /* series have noise maps */
     int keep_recorded;       /* see ggn_series_set_options */
     struct ggn_meter meter;  /* with memory: series have measures */
-    int n, n_scenes;
+    int n;
     enum ggn_split_source split_source;
     struct ggn_level_series *series;
     double first_spp, ratio, step_spp; /* how real levels are spaced: ratio, or (ratio 0) a constant step */

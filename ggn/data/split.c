@@ -103,7 +103,7 @@ static enum ggn_split_source source_of(const struct ggn_dataset *data, const str
 int ggn_split_choose(struct ggn_dataset *data, const struct ggn_split_options *o, enum ggn_split_source *source,
                      struct base_err *err)
 {
-    const int fifth = ggn_dataset_scenes(data) < 3 ? 1 : 2;
+    const int fifth = data->n_scenes < 3 ? 1 : 2;
     int rc = check_lists(data, o, err);
 
     if (rc)
@@ -114,7 +114,7 @@ int ggn_split_choose(struct ggn_dataset *data, const struct ggn_split_options *o
         if (*source == GGN_SPLIT_BY_MODELS)
             v->split = by_models(o, v->manifest.scene);
         else
-            v->split = ggn_dataset_scene(data, i) % 5 == fifth && !o->validation ? GGN_SPLIT_VALIDATION : GGN_SPLIT_TRAIN;
+            v->split = v->scene % 5 == fifth && !o->validation ? GGN_SPLIT_VALIDATION : GGN_SPLIT_TRAIN;
     }
     if (o->validation)
         rc = apply_list(data, "--validation", o->validation, GGN_SPLIT_VALIDATION, err);

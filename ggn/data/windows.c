@@ -72,7 +72,7 @@ static int nth_scene(const struct ggn_windows *w, int k)
 {
     int n = 0;
 
-    for (int s = 0; s < w->set->n_scenes; s++)
+    for (int s = 0; s < w->set->data.n_scenes; s++)
         for (int i = 0; i < w->set->n; i++)
             if (w->set->series[i].scene == s && w->first[i + 1] > w->first[i]) {
                 if (n++ == k)

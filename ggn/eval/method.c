@@ -102,11 +102,11 @@ int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn
     return 0;
 }
 
-/* Whether the split has a block of the scene whose first view this is. */
-static int has_scene(const struct ggn_eval_set *s, enum ggn_split split, int first)
+/* Whether the split has a block of the scene. */
+static int has_scene(const struct ggn_eval_set *s, enum ggn_split split, int scene)
 {
     for (int b = 0; b < s->n_blocks; b++)
-        if (s->blocks[b].split == split && s->blocks[b].scene == first)
+        if (s->blocks[b].split == split && s->images.data.views[s->blocks[b].view].scene == scene)
             return 1;
     return 0;
 }
@@ -118,8 +118,8 @@ int ggn_method_measure(const struct ggn_method *m, const struct ggn_eval_set *s,
     unsigned char *label = malloc(s->n > 0 ? s->n : 1);
     int rc = !score || !label ? base_fail_nomem(err, m->name) : 0;
     *out = (struct ggn_method_figures){.blocks = ggn_eval_count(s, split)};
-    for (int v = 0; v < s->images.data.n; v++)
-        out->scenes += has_scene(s, split, v);
+    for (int scene = 0; scene < s->images.data.n_scenes; scene++)
+        out->scenes += has_scene(s, split, scene);
     if (!rc) {
         out->windows = scores_of(m, s, split, score, label);
         rc = ggn_stats_auc(score, label, out->windows, &out->auc, err);

@@ -40,7 +40,6 @@ static int list_blocks(struct ggn_eval_set *s, int *skipped, struct base_err *er
         size_t cases = (size_t)(c->n_levels - s->window + 1);
         struct ggn_eval_block b = {.series = i,
                                    .view = c->view,
-                                   .scene = ggn_dataset_first(d, c->view),
                                    .index = seq_manifest_find(&view->manifest, c->block),
                                    .split = view->split,
                                    .label = c->label,

@@ -11,7 +11,6 @@
 struct ggn_eval_block {
     int series;     /* index into images.series */
     int view;       /* index into images.data.views */
-    int scene;      /* the first view of its scene */
     uint32_t index; /* in the view's manifest */
     enum ggn_split split;
     struct ggn_label label; /* thresholds beyond the last level are censored there */

@@ -51,7 +51,7 @@ static cJSON *describe_data(const struct ggn_session *s, int *failed)
     for (int split = 0; split < GGN_SPLIT_NONE; split++) {
         cJSON *list = base_json_array(o, ggn_split_names[split], failed);
         for (int i = 0; i < s->set.data.n; i++) {
-            if (s->set.data.views[i].split == (enum ggn_split)split && ggn_dataset_first(&s->set.data, i) == i)
+            if (s->set.data.views[i].split == (enum ggn_split)split && s->set.data.views[i].first == i)
                 base_json_text(list, NULL, s->set.data.views[i].manifest.scene, failed);
         }
     }

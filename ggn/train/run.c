@@ -48,7 +48,7 @@ static void announce(const struct ggn_session *s)
     fprintf(s->plan->progress,
             "%d scenes; blocks: %d training (+ %d synthetic), %d validation; windows: %d training, %d validation; levels "
             "from %g, %s %g%s\n",
-            s->set.n_scenes, ggn_series_set_count(&s->set, GGN_SPLIT_TRAIN, 1),
+            s->set.data.n_scenes, ggn_series_set_count(&s->set, GGN_SPLIT_TRAIN, 1),
             ggn_series_set_count(&s->set, GGN_SPLIT_TRAIN, 0) - ggn_series_set_count(&s->set, GGN_SPLIT_TRAIN, 1),
             ggn_series_set_count(&s->set, GGN_SPLIT_VALIDATION, 1), s->train.n, s->validation.n, s->set.first_spp,
             s->set.ratio > 0 ? "ratio" : "step", s->set.ratio > 0 ? s->set.ratio : s->set.step_spp,

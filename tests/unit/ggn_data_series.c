@@ -27,7 +27,7 @@ static void print_codes(FILE *f, const char *what, const uint8_t *codes, size_t 
 static void print_series(FILE *f, const struct ggn_series_set *set)
 {
     const size_t values = ggn_series_set_values(set);
-    fprintf(f, "%d chains of %d scenes, %dx%d, first %g, ratio %.9g, step %g; %d %d to train\n", set->n, set->n_scenes,
+    fprintf(f, "%d chains of %d scenes, %dx%d, first %g, ratio %.9g, step %g; %d %d to train\n", set->n, set->data.n_scenes,
             set->width, set->height, set->first_spp, set->ratio, set->step_spp,
             ggn_series_set_count(set, GGN_SPLIT_TRAIN, 0), ggn_series_set_count(set, GGN_SPLIT_TRAIN, 1));
     for (int i = 0; i < set->n; i++) {

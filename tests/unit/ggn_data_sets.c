@@ -176,7 +176,7 @@ static void scenes_are_held_out(void **state)
                  dir, n, n - n / 6, dir, n);
         assert_int_equal(system(command), 0);
         assert_int_equal(ggn_series_set_load(&set, &o, NULL), 0);
-        fprintf(f, "%d scenes:", set.n_scenes);
+        fprintf(f, "%d scenes:", set.data.n_scenes);
         for (int i = 0; i < set.data.n; i++)
             fprintf(f, " %s %s", set.data.views[i].manifest.scene, ggn_split_names[set.data.views[i].split]);
         fputs("; of chains:", f);
@@ -206,7 +206,7 @@ static void models_bring_their_split(void **state)
     for (int how = 0; how < 4; how++) {
         const struct ggn_split_options o = {how == 2 ? "s5" : NULL, how == 2 ? "s1" : NULL, (const cJSON *const *)learned,
                                             how ? 2 : 1};
-        struct ggn_dataset d = {5, views};
+        struct ggn_dataset d = {.n = 5, .views = views};
         enum ggn_split_source source;
         for (int i = 0; i < 5; i++) {
             views[i] = (struct ggn_dataset_view){.split = how == 3 && i == 0 ? GGN_SPLIT_PEOPLE : GGN_SPLIT_NONE};

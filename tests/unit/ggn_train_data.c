@@ -25,7 +25,7 @@ static void splits_and_levels(void **state)
     assert_int_equal(set.n, 12);
     assert_int_equal(ggn_series_set_count(&set, GGN_SPLIT_TRAIN, 1), 9);
     assert_int_equal(ggn_series_set_count(&set, GGN_SPLIT_VALIDATION, 1), 3);
-    assert_int_equal(set.n_scenes, 4);
+    assert_int_equal(set.data.n_scenes, 4);
     assert_int_equal(set.series[0].n_levels, 14);
     assert_true(fabs(set.ratio - 1.35) < 0.02);
     seqgen_load(&thin, 1.7);
