@@ -45,25 +45,27 @@ static float hard_sigmoid(float x)
     return y < 0.0f ? 0.0f : y > 1.0f ? 1.0f : y;
 }
 
-/* Glorot uniform; forget gates start open (bias 1), as the published code's library has it. */
+/* Glorot & Bengio 2010, of n weights between so many inputs and outputs. */
+static void draw_weights(float *p, size_t n, int inputs, int outputs, uint32_t seed)
+{
+    const float limit = sqrtf(6.0f / (float)(inputs + outputs));
+    for (size_t i = 0; i < n; i++)
+        p[i] = limit * (2.0f * uniform((uint32_t)i, seed) - 1.0f);
+}
+
+/* Forget gates start open (bias 1), as the published code's library has it. */
 static void init_weights(struct ggn_lstm *l, uint32_t seed)
 {
     float *p = l->owned;
     memset(p, 0, 4 * l->n * sizeof *p);
     for (int k = 0; k < LAYERS; k++) {
         const struct layer *y = &l->layers[k];
-        size_t nw = 4 * (size_t)y->out * (size_t)y->in, nu = 4 * (size_t)y->out * (size_t)y->out;
-        float limit_w = sqrtf(6.0f / (float)(y->in + 4 * y->out)), limit_u = sqrtf(6.0f / (float)(5 * y->out));
-        for (size_t i = 0; i < nw; i++)
-            p[y->w + i] = limit_w * (2.0f * uniform((uint32_t)i, seed + 10 * (uint32_t)k) - 1.0f);
-        for (size_t i = 0; i < nu; i++)
-            p[y->u + i] = limit_u * (2.0f * uniform((uint32_t)i, seed + 10 * (uint32_t)k + 1) - 1.0f);
+        draw_weights(p + y->w, y->u - y->w, y->in, 4 * y->out, seed + 10 * (uint32_t)k);
+        draw_weights(p + y->u, y->b - y->u, y->out, 4 * y->out, seed + 10 * (uint32_t)k + 1);
         for (int i = 0; i < y->out; i++)
             p[y->b + (size_t)(y->out + i)] = 1.0f;
     }
-    float limit = sqrtf(6.0f / (float)(widths[LAYERS - 1] + 1));
-    for (int i = 0; i < widths[LAYERS - 1]; i++)
-        p[l->dense + (size_t)i] = limit * (2.0f * uniform((uint32_t)i, seed + 99) - 1.0f);
+    draw_weights(p + l->dense, (size_t)widths[LAYERS - 1], widths[LAYERS - 1], 1, seed + 99);
 }
 
 void ggn_lstm_destroy(struct ggn_lstm *l)

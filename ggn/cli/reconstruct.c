@@ -46,36 +46,35 @@ static const struct seq_record *level_at(const struct seq_block *b, double spp, 
     return &b->levels[b->n_levels - 1];
 }
 
-static void paste(uint8_t *image, const struct seq_manifest *m, const struct seq_block *b, const uint8_t *rgb)
+/* rgb: room for the block's pixels, which are pasted into the image. */
+static int paste(uint8_t *image, const struct seq_manifest *m, const struct seq_block *b, const struct seq_record *r,
+                 uint8_t *rgb, struct base_err *err)
 {
-    for (uint32_t y = 0; y < b->height; y++)
+    int rc = seq_display(b, r, rgb, err);
+    for (uint32_t y = 0; y < b->height && !rc; y++)
         memcpy(image + 3 * (((size_t)b->y0 + y) * m->width + (size_t)b->x0), rgb + 3 * (size_t)y * b->width,
                3 * (size_t)b->width);
+    return rc;
 }
 
 static int take_block(struct picture *p, const struct seq_manifest *m, const struct seq_block *b, double spp,
                       struct base_err *err)
 {
-    size_t pixels = (size_t)b->width * b->height;
-    uint8_t *rgb = malloc(6 * pixels);
-    struct ggn_flip_stats flip;
+    size_t values = 3 * (size_t)b->width * b->height;
+    uint8_t *rgb = malloc(2 * values);
+    struct ggn_flip_stats flip = {0};
     if (!rgb)
         return base_fail_nomem(err, "picture");
     const struct seq_record *r = level_at(b, spp, &p->beyond);
-    int rc = seq_display(b, r, rgb, err);
-    if (!rc)
-        paste(p->taken, m, b, rgb);
+    int rc = paste(p->taken, m, b, r, rgb, err);
     if (!rc && b->reference) {
-        rc = seq_display(b, b->reference, rgb + 3 * pixels, err);
+        rc = paste(p->reference, m, b, b->reference, rgb + values, err);
         if (!rc)
-            rc = ggn_flip(rgb + 3 * pixels, rgb, (int)b->width, (int)b->height, GGN_FLIP_PPD, NULL, &flip, err);
-        if (!rc) {
-            paste(p->reference, m, b, rgb + 3 * pixels);
-            if (flip.mean > p->worst_flip) {
-                p->worst_flip = flip.mean;
-                p->worst_block = b->id;
-            }
-        }
+            rc = ggn_flip(rgb + values, rgb, (int)b->width, (int)b->height, GGN_FLIP_PPD, NULL, &flip, err);
+    }
+    if (!rc && flip.mean > p->worst_flip) {
+        p->worst_flip = flip.mean;
+        p->worst_block = b->id;
     }
     free(rgb);
     p->samples += (double)r->spp;

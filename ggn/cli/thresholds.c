@@ -25,9 +25,7 @@ static void put_file(const struct ggn_thresholds *t, cJSON *to, int *failed)
         base_json_text(view, "name", v->name, failed);
         base_json_bool(view, "unnamed", v->unnamed, failed);
         base_json_number(view, "columns", v->columns, failed);
-        cJSON *spp = base_json_array(view, "spp", failed);
-        for (int b = 0; b < v->n; b++)
-            base_json_number(spp, NULL, v->spp[b], failed);
+        base_json_numbers(view, "spp", v->spp, v->n, failed);
     }
 }
 
