@@ -70,12 +70,12 @@ void ggn_series_set_release(struct ggn_series_set *set);
  * The same seed gives the same series. */
 int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uint32_t seed, struct base_err *err);
 
-/* Continues recorded series of all splits that end near or before their threshold, up to 0.7 of the reference's samples
- * beyond the last level: the reference's samples go on where the recording stopped, their running mean simulated from the
+/* Continues recorded series of all splits that end near or before their threshold (all: every labelled one, also where
+ * training has no use for it), up to 0.7 of the reference's samples beyond the last level: the reference's samples go on where the recording stopped, their running mean simulated from the
  * half buffers. Where there is no reference but a full level, the whole series is made anew, up to SEQ_SIMULATED_CAP: its
  * mean stands for the converged image. With set->keep_recorded that is a further, synthetic series, and the recorded one
  * stays: its levels have noise of their own. */
-int ggn_series_set_extend(struct ggn_series_set *set, uint32_t seed, struct base_err *err);
+int ggn_series_set_extend(struct ggn_series_set *set, int all, uint32_t seed, struct base_err *err);
 
 /* Makes every labelled series that has a full level anew, its levels `ratio` > 1 apart and up to SEQ_SIMULATED_CAP: from
  * the two halves alone, so that series with and without a reference are made alike. The same seed gives the same series. */

@@ -224,7 +224,7 @@ static int simulate_series(const struct ggn_series_set *set, struct ggn_level_se
     return rc;
 }
 
-int ggn_series_set_extend(struct ggn_series_set *set, uint32_t seed, struct base_err *err)
+int ggn_series_set_extend(struct ggn_series_set *set, int all, uint32_t seed, struct base_err *err)
 {
     const double ratio = set->ratio > 1.01 && set->ratio < 2 ? set->ratio : 1.2565; /* a third of an octave */
     struct source s = {0};
@@ -234,9 +234,9 @@ int ggn_series_set_extend(struct ggn_series_set *set, uint32_t seed, struct base
         struct ggn_level_series *c = &set->series[i];
         int usable = 0;
         double last = c->n_levels ? c->spp[c->n_levels - 1] : 0;
-        /* not where a clean end is recorded already, nor where nothing is known beyond it */
-        if (c->synthetic || !c->has_label || c->label.threshold < CLEAN_END * last ||
-            (c->label.censored && c->label.threshold <= last))
+        /* a clean end is recorded already, or nothing is known beyond it */
+        const int done = c->label.threshold < CLEAN_END * last || (c->label.censored && c->label.threshold <= last);
+        if (c->synthetic || !c->has_label || (done && !all))
             continue;
         rc = read_source(set, c, 1, &s, &usable, err);
         if (rc || !usable)

@@ -321,27 +321,16 @@ static int fill_block(void *data, long index, int worker, struct base_err *err)
     return !rc && f->quality ? measure_quality(f->set, block, !f->no_ssim, err) : rc;
 }
 
-/* Continues every labelled series, also those that training has no use for: a method that does not stop in time must be seen
- * to. */
+/* Continues every labelled series: a method that does not stop in time must be seen to. */
 static int extend(struct ggn_series_set *set, double cadence, uint32_t seed, struct base_err *err)
 {
-    struct ggn_label *labels = malloc((size_t)(set->n > 0 ? set->n : 1) * sizeof *labels);
-    if (!labels)
-        return base_fail_nomem(err, "evaluation");
+    int rc = cadence > 1.0 ? ggn_series_set_simulate(set, cadence, seed, err) : ggn_series_set_extend(set, 1, seed, err);
     for (int i = 0; i < set->n; i++) {
-        labels[i] = set->series[i].label;
-        set->series[i].label = (struct ggn_label){labels[i].id, INFINITY, 0};
-    }
-    int rc = cadence > 1.0 ? ggn_series_set_simulate(set, cadence, seed, err) : ggn_series_set_extend(set, seed, err);
-    for (int i = 0; i < set->n; i++) {
-        const struct ggn_level_series *c = &set->series[i];
-        set->series[i].label = labels[i];
+        struct ggn_level_series *c = &set->series[i];
         /* A threshold that is only known to lie beyond the recording stays there. */
-        if (labels[i].censored)
-            for (int k = c->n_levels - 1; k > 0 && c->spp[k] > labels[i].threshold; k--)
-                set->series[i].n_levels = k;
+        while (c->label.censored && c->n_levels > 1 && c->spp[c->n_levels - 1] > c->label.threshold)
+            c->n_levels--;
     }
-    free(labels);
     return rc;
 }
 

@@ -69,29 +69,15 @@ int ggn_view_label(const struct ggn_observer *observer, const struct ggn_dataset
     return rc;
 }
 
-/* Visible noise falls as 1/sqrt(spp): twice the logarithm of the ratio is a shift in octaves of samples. */
-static double curve_shift(const struct ggn_curve *recorded, const struct ggn_curve *halves, double *room)
+/* Visible noise falls as 1/sqrt(spp): twice the logarithm of the ratio is a shift in octaves of samples. Shifts take the
+ * place of what is recorded. */
+static double curve_shift(struct ggn_curve *recorded, const struct ggn_curve *halves)
 {
     size_t n = 0;
     for (int i = 0; i < recorded->recorded; i++)
         if (recorded->visible[i] > 0.0)
-            room[n++] = 2.0 * log2(ggn_curve_at(halves, recorded->spp[i]) / recorded->visible[i]);
-    return ggn_stats_quantile(room, n, 0.5);
-}
-
-static int check_block(const struct ggn_observer *o, struct ggn_curve *recorded, const struct ggn_curve *halves,
-                       struct ggn_check *out, struct base_err *err)
-{
-    int censored;
-    double *room = malloc((size_t)recorded->n * sizeof *room);
-    if (!room)
-        return base_fail_nomem(err, "check");
-    out->halves = ggn_curve_threshold(halves, o->level, &censored);
-    recorded->n = recorded->recorded;
-    out->recorded = ggn_curve_threshold(recorded, o->level, &out->beyond);
-    out->curve = curve_shift(recorded, halves, room);
-    free(room);
-    return 0;
+            recorded->visible[n++] = 2.0 * log2(ggn_curve_at(halves, recorded->spp[i]) / recorded->visible[i]);
+    return ggn_stats_quantile(recorded->visible, n, 0.5);
 }
 
 int ggn_view_check(const struct ggn_observer *observer, const struct ggn_dataset_view *view, struct base_threads *threads,
@@ -103,8 +89,13 @@ int ggn_view_check(const struct ggn_observer *observer, const struct ggn_dataset
     if (!rc)
         rc = ggn_view_curves(view, GGN_FROM_HALVES, threads, halves, err);
     for (uint32_t i = 0; i < n && !rc; i++) {
-        checks[i].id = view->manifest.blocks[i].id;
-        rc = check_block(observer, &recorded[i], &halves[i], &checks[i], err);
+        struct ggn_check *c = &checks[i];
+        int censored;
+        c->id = view->manifest.blocks[i].id;
+        c->halves = ggn_curve_threshold(&halves[i], observer->level, &censored);
+        recorded[i].n = recorded[i].recorded;
+        c->recorded = ggn_curve_threshold(&recorded[i], observer->level, &c->beyond);
+        c->curve = curve_shift(&recorded[i], &halves[i]);
     }
     for (uint32_t i = 0; recorded && i < 2 * n; i++)
         ggn_curve_release(&recorded[i]);

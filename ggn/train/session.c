@@ -94,7 +94,7 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     if (!rc && p->synthetic > 0)
         rc = ggn_series_set_add_synthetic(&s->set, p->synthetic, p->seed, err);
     if (!rc && p->extend)
-        rc = ggn_series_set_extend(&s->set, p->seed, err);
+        rc = ggn_series_set_extend(&s->set, 0, p->seed, err);
     if (rc)
         return rc;
     struct ggn_window_options train = {

@@ -87,7 +87,7 @@ static void chains_are_as_they_were(void **state)
         if (how == 0 || how == 3)
             assert_int_equal(ggn_series_set_add_synthetic(&set, 2, 5, NULL), 0);
         else if (how == 1)
-            assert_int_equal(ggn_series_set_extend(&set, 6, NULL), 0);
+            assert_int_equal(ggn_series_set_extend(&set, 0, 6, NULL), 0);
         else
             assert_int_equal(ggn_series_set_simulate(&set, 1.9, 7, NULL), 0);
         print_series(f, &set);

@@ -80,7 +80,7 @@ static void extended_levels_continue_the_recording(void **state)
     size_t values = ggn_series_set_values(&set);
     for (int i = 0; i < set.n; i++)
         set.series[i].label.threshold = i ? 400 : 30;
-    assert_int_equal(ggn_series_set_extend(&set, 3, &err), 0);
+    assert_int_equal(ggn_series_set_extend(&set, 0, 3, &err), 0);
     assert_int_equal(set.series[0].n_levels, 14);
     for (int i = 1; i < set.n; i++) {
         const struct ggn_level_series *c = &set.series[i];
@@ -214,7 +214,7 @@ static void measures_are_the_law(void **state)
     const int recorded = set.n;
     for (int i = 0; i < recorded; i++)
         set.series[i].label.threshold = 400;
-    assert_int_equal(ggn_series_set_extend(&set, 3, &err), 0);
+    assert_int_equal(ggn_series_set_extend(&set, 0, 3, &err), 0);
     assert_int_equal(set.n, 2 * recorded);
     for (int i = 0; i < set.n; i++) {
         const struct ggn_level_series *c = &set.series[i];
