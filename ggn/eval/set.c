@@ -194,75 +194,60 @@ static const struct seq_record *earlier_look(const struct seq_block *p, uint32_t
     return 2 * p->levels[from].spp <= p->levels[k].spp ? &p->levels[from] : NULL;
 }
 
-/* What the observer sees of each recorded level, from its own halves and without them; NaN: no telling. */
-struct seen {
-    double *halves, *means; /* [n_levels] */
-};
-
-static int see_levels(const struct seq_block *p, const struct seen *seen, struct base_err *err)
+/* Of each recorded level what the observer sees from its own halves, and how many times that without them; NaN: no telling. */
+static int see_levels(const struct seq_block *p, double *halves, double *ratio, struct base_err *err)
 {
     int rc = 0;
     for (uint32_t k = 0; k < p->n_levels && !rc; k++) {
         const struct seq_record *r = &p->levels[k], *earlier = earlier_look(p, k);
-        seen->halves[k] = seen->means[k] = (double)NAN;
-        if (seq_has_halves(r))
-            rc = ggn_curve_level(p, r, &seen->halves[k], err);
-        if (!rc && seq_has_halves(r) && earlier)
-            rc = ggn_curve_means(p, earlier, r, &seen->means[k], err);
+        double means;
+        halves[k] = ratio[k] = (double)NAN;
+        if (!seq_has_halves(r))
+            continue;
+        rc = ggn_curve_level(p, r, &halves[k], err);
+        if (rc || !earlier)
+            continue;
+        rc = ggn_curve_means(p, earlier, r, &means, err);
+        if (!rc)
+            ratio[k] = halves[k] > 0.0 ? means / halves[k] : 1.0;
     }
     return rc;
 }
 
-/* At recorded levels from their own halves, at all others from the two of the full level. */
-static int fill_visible(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
-                        const struct seen *seen, struct base_err *err)
+/* With halves: at recorded levels from their own, at all others from the two of the full level. Without: in the same ratio
+ * to that as at the nearest recorded level that knows it, at or below, or else at the first. */
+static void fill_visible(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
+                         const double *halves, const double *ratio, const struct ggn_curve *curve)
 {
-    int simulated = s->images.series[block->series].simulated, rc = 0, known = seq_full_level(p) != NULL;
-    struct ggn_curve curve = {0};
-    if (known)
-        rc = ggn_curve_make(p, GGN_FROM_HALVES, 1, &curve, err);
-    for (size_t i = block->first; i < block->end && !rc; i++) {
+    const int simulated = s->images.series[block->series].simulated;
+    uint32_t k = 0;
+    double now = (double)NAN;
+    while (k < p->n_levels && isnan(now))
+        now = ratio[k++];
+    for (size_t i = block->first; i < block->end; i++) {
         const struct seq_record *r = simulated ? NULL : seq_level(p, (uint32_t)s->spp[i]);
         if (r && seq_has_halves(r))
-            s->visible[i] = seen->halves[r - p->levels];
-        else if (known && !r)
-            s->visible[i] = ggn_curve_at(&curve, s->spp[i]);
+            s->visible[i] = halves[r - p->levels];
+        else if (!r && curve->n > 0)
+            s->visible[i] = ggn_curve_at(curve, s->spp[i]);
+        for (; k < p->n_levels && p->levels[k].spp <= s->spp[i]; k++)
+            now = isnan(ratio[k]) ? now : ratio[k];
+        s->visible_means[i] = now * s->visible[i];
     }
-    ggn_curve_release(&curve);
-    return rc;
-}
-
-/* Without halves: in the same ratio to what is seen with them as at the nearest recorded level that knows it, at or below,
- * or else at the first. */
-static void fill_visible_means(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
-                               const struct seen *seen)
-{
-    size_t i = block->first;
-    double ratio = (double)NAN;
-    for (uint32_t k = 0; k < p->n_levels; k++) {
-        if (isnan(seen->means[k]))
-            continue;
-        for (; !isnan(ratio) && i < block->end && s->spp[i] < p->levels[k].spp; i++)
-            s->visible_means[i] = ratio * s->visible[i];
-        ratio = seen->halves[k] > 0.0 ? seen->means[k] / seen->halves[k] : 1.0;
-    }
-    for (; i < block->end; i++)
-        s->visible_means[i] = ratio * s->visible[i];
 }
 
 static int fill_observed(struct ggn_eval_set *s, const struct ggn_eval_block *block, const struct seq_block *p,
                          struct base_err *err)
 {
-    double *memory = malloc(2 * p->n_levels * sizeof *memory);
-    if (!memory)
-        return base_fail_nomem(err, "evaluation");
-    const struct seen seen = {memory, memory + p->n_levels};
-    int rc = see_levels(p, &seen, err);
+    struct ggn_curve curve = {0};
+    double *halves = malloc(2 * p->n_levels * sizeof *halves), *ratio = halves ? halves + p->n_levels : NULL;
+    int rc = halves ? see_levels(p, halves, ratio, err) : base_fail_nomem(err, "evaluation");
+    if (!rc && seq_full_level(p))
+        rc = ggn_curve_make(p, GGN_FROM_HALVES, 1, &curve, err);
     if (!rc)
-        rc = fill_visible(s, block, p, &seen, err);
-    if (!rc)
-        fill_visible_means(s, block, p, &seen);
-    free(memory);
+        fill_visible(s, block, p, halves, ratio, &curve);
+    ggn_curve_release(&curve);
+    free(halves);
     return rc;
 }
 
