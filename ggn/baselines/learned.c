@@ -9,58 +9,63 @@
 #include "data/replay.h"
 #include "train/fit_policy.h"
 
-/* --- features --- */
-
-void ggn_feature_set_release(struct ggn_feature_set *t)
-{
-    free(t->first);
-    free(t->x);
-    *t = (struct ggn_feature_set){0};
-}
-
-/* A baseline at work on the blocks of a set. */
+/* A baseline at work on the blocks of a set, and its features of all their levels. */
 struct work {
     const struct ggn_eval_set *set;
-    const struct ggn_baseline *baseline;
-    const struct ggn_feature_set *features;
-    struct ggn_method *method; /* gets the scores, once there are features */
+    struct ggn_baseline *baseline;
+    struct ggn_method *method; /* gets the scores */
+    size_t size;               /* numbers per level */
+    size_t *first;             /* owns; [blocks]: row of the block's level 0 */
+    double *x;                 /* owns; [rows][size] */
 };
+
+/* --- features --- */
+
+static void work_release(struct work *w)
+{
+    free(w->first);
+    free(w->x);
+}
 
 static int extract_block(void *data, long index, int worker, struct base_err *err)
 {
-    const struct work *j = data;
-    const struct ggn_level_series *c = &j->set->images.series[j->set->blocks[index].series];
-    int w = j->set->images.width, h = j->set->images.height;
-    struct ggn_baseline_reader *r = ggn_baseline_reader_create(j->baseline, err);
+    const struct work *w = data;
+    const struct ggn_series_set *images = &w->set->images;
+    const struct ggn_level_series *c = &images->series[w->set->blocks[index].series];
+    struct ggn_baseline_reader *r = ggn_baseline_reader_create(w->baseline, err);
     (void)worker;
     if (!r)
         return err->code;
-    for (int i = 0; i < c->n_levels; i++)
-        ggn_baseline_extract(r, c->noisy + ggn_series_set_values(&j->set->images) * (size_t)i, w, h,
-                             j->features->x + (j->features->first[index] + (size_t)i) * j->features->size);
+    for (size_t i = 0; i < (size_t)c->n_levels; i++)
+        ggn_baseline_extract(r, c->noisy + ggn_series_set_values(images) * i, images->width, images->height,
+                             w->x + (w->first[index] + i) * w->size);
     ggn_baseline_reader_destroy(r);
     return 0;
 }
 
-int ggn_feature_set_make(struct ggn_feature_set *t, const struct ggn_baseline *b, const struct ggn_eval_set *s,
-                         struct base_threads *threads, struct base_err *err)
+/* Fills in the features of w->baseline; the caller releases them, also after a failure. */
+static int extract(struct work *w, struct base_threads *threads, struct base_err *err)
 {
-    struct work j = {s, b, t, NULL};
+    const struct ggn_eval_set *s = w->set;
     size_t rows = 0;
-    *t = (struct ggn_feature_set){.size = ggn_baseline_feature_count(b, s->images.width, s->images.height),
-                                  .first = malloc(((size_t)s->n_blocks + 1) * sizeof *t->first)};
-    for (int k = 0; k < s->n_blocks && t->first; k++) {
-        t->first[k] = rows;
+    w->size = ggn_baseline_feature_count(w->baseline, s->images.width, s->images.height);
+    w->first = malloc((size_t)s->n_blocks * sizeof *w->first);
+    for (int k = 0; k < s->n_blocks && w->first; k++) {
+        w->first[k] = rows;
         rows += (size_t)s->images.series[s->blocks[k].series].n_levels;
     }
-    if (t->first)
-        t->first[s->n_blocks] = rows;
-    t->x = malloc(rows * t->size * sizeof *t->x);
-    int rc = !t->first || !t->x ? base_fail_nomem(err, "baseline")
-                                : ggn_each(threads, s->n_blocks, extract_block, &j, "evaluation", err);
-    if (rc)
-        ggn_feature_set_release(t);
-    return rc;
+    w->x = malloc(rows * w->size * sizeof *w->x);
+    return !w->first || !w->x ? base_fail_nomem(err, "baseline")
+                              : ggn_each(threads, s->n_blocks, extract_block, w, "evaluation", err);
+}
+
+/* Of a window whose levels, or (NULL) rows one after the other, begin at x. */
+static double logit_of(const struct work *w, struct ggn_baseline_reader *r, const double *x, const int *levels)
+{
+    const double *features[GGN_WINDOW_MAX];
+    for (int k = 0; k < w->baseline->window; k++)
+        features[k] = x + (size_t)(levels ? levels[k] : k) * w->size;
+    return ggn_baseline_logit(r, features, w->set->images.width, w->set->images.height);
 }
 
 /* --- training --- */
@@ -78,10 +83,10 @@ static void cases_release(struct cases *c)
     free(c->label);
 }
 
-static int list_cases(struct cases *c, const struct ggn_baseline *b, const struct ggn_feature_set *t,
-                      const struct ggn_eval_set *s, enum ggn_split split, struct base_err *err)
+static int list_cases(struct cases *c, const struct work *w, enum ggn_split split, struct base_err *err)
 {
-    size_t room = s->n > 0 ? s->n : 1, skipped = (size_t)(s->window - b->window);
+    const struct ggn_eval_set *s = w->set;
+    size_t room = s->n > 0 ? s->n : 1, skipped = (size_t)(s->window - w->baseline->window);
     *c = (struct cases){.window = malloc(room * sizeof *c->window), .label = malloc(room)};
     if (!c->window || !c->label) {
         cases_release(c);
@@ -90,7 +95,7 @@ static int list_cases(struct cases *c, const struct ggn_baseline *b, const struc
     for (int k = 0; k < s->n_blocks; k++)
         for (size_t i = s->blocks[k].first; i < s->blocks[k].end; i++)
             if (s->blocks[k].split == split && s->noisy[i] >= 0) {
-                c->window[c->n] = t->x + (t->first[k] + (i - s->blocks[k].first) + skipped) * t->size;
+                c->window[c->n] = w->x + (w->first[k] + (i - s->blocks[k].first) + skipped) * w->size;
                 c->label[c->n++] = s->noisy[i] == 1;
             }
     return 0;
@@ -124,30 +129,24 @@ static int train_svm(struct ggn_baseline *b, const struct cases *c, size_t size,
     return rc;
 }
 
-static int calibrate(struct ggn_baseline *b, const struct ggn_feature_set *t, const struct ggn_eval_set *s,
-                     enum ggn_split split, struct base_err *err)
+static int calibrate(const struct work *w, enum ggn_split split, struct base_err *err)
 {
     struct cases c;
-    enum ggn_split on = ggn_eval_count(s, GGN_SPLIT_VALIDATION) > 0 ? GGN_SPLIT_VALIDATION : split;
-    int rc = list_cases(&c, b, t, s, on, err);
+    enum ggn_split on = ggn_eval_count(w->set, GGN_SPLIT_VALIDATION) > 0 ? GGN_SPLIT_VALIDATION : split;
+    int rc = list_cases(&c, w, on, err);
     if (rc)
         return rc;
     double *logit = malloc((c.n + 1) * sizeof *logit), *label = malloc((c.n + 1) * sizeof *label);
-    struct ggn_baseline_reader *r = ggn_baseline_reader_create(b, err);
+    struct ggn_baseline_reader *r = ggn_baseline_reader_create(w->baseline, err);
     rc = !r ? err->code : !logit || !label ? base_fail_nomem(err, "baseline") : 0;
     int n = 0;
     for (size_t i = 0; i < c.n && !rc; i++) {
-        const double *features[GGN_WINDOW_MAX];
-        for (int k = 0; k < b->window; k++)
-            features[k] = c.window[i] + (size_t)k * t->size;
-        double l = ggn_baseline_logit(r, features, s->images.width, s->images.height);
-        if (isfinite(l)) {
-            logit[n] = l;
-            label[n++] = c.label[i];
-        }
+        logit[n] = logit_of(w, r, c.window[i], NULL);
+        label[n] = c.label[i];
+        n += isfinite(logit[n]) != 0;
     }
     if (!rc)
-        ggn_calibrate_platt(logit, label, n, &b->policy);
+        ggn_calibrate_platt(logit, label, n, &w->baseline->policy);
     ggn_baseline_reader_destroy(r);
     free(label);
     free(logit);
@@ -163,12 +162,13 @@ static void set_cadence(struct ggn_baseline *b, const struct ggn_eval_set *s)
         b->policy.first_spp = ggn_policy_next(&b->policy, b->policy.first_spp);
 }
 
-int ggn_baseline_train(struct ggn_baseline *b, const struct ggn_feature_set *t, const struct ggn_eval_set *s,
-                       enum ggn_split split, int epochs, struct base_err *err)
+/* All but the threshold, which stays at 0.5. */
+static int train(const struct work *w, enum ggn_split split, int epochs, struct base_err *err)
 {
+    struct ggn_baseline *b = w->baseline;
     struct cases c;
     size_t positive = 0;
-    int rc = list_cases(&c, b, t, s, split, err);
+    int rc = list_cases(&c, w, split, err);
     if (rc)
         return rc;
     for (size_t i = 0; i < c.n; i++)
@@ -177,16 +177,16 @@ int ggn_baseline_train(struct ggn_baseline *b, const struct ggn_feature_set *t, 
         rc = base_fail(err, BASE_EINVAL, "%s: the split '%s' lacks one of the classes", ggn_baseline_titles[b->kind],
                        ggn_split_names[split]);
     if (!rc)
-        rc = b->kind == GGN_SVD_ENTROPY ? train_lstm(b, &c, epochs, err) : train_svm(b, &c, t->size, err);
+        rc = b->kind == GGN_SVD_ENTROPY ? train_lstm(b, &c, epochs, err) : train_svm(b, &c, w->size, err);
     cases_release(&c);
-    set_cadence(b, s);
-    return rc ? rc : calibrate(b, t, s, split, err);
+    set_cadence(b, w->set);
+    return rc ? rc : calibrate(w, split, err);
 }
 
 /* --- judging --- */
 
 struct one_block {
-    const struct work *j;
+    const struct work *work;
     struct ggn_baseline_reader *reader;
     const double *first; /* features of its level 0 */
 };
@@ -194,44 +194,50 @@ struct one_block {
 static double window_logit(void *data, const int *levels)
 {
     const struct one_block *o = data;
-    const double *features[GGN_WINDOW_MAX];
-    for (int k = 0; k < o->j->baseline->window; k++)
-        features[k] = o->first + (size_t)levels[k] * o->j->features->size;
-    return ggn_baseline_logit(o->reader, features, o->j->set->images.width, o->j->set->images.height);
+    return logit_of(o->work, o->reader, o->first, levels);
 }
 
 static int judge_block(void *data, long index, int worker, struct base_err *err)
 {
-    const struct work *j = data;
-    const struct ggn_eval_block *b = &j->set->blocks[index];
-    const struct ggn_level_series *c = &j->set->images.series[b->series];
-    const struct ggn_stop_rule rule = {.policy = j->baseline->policy, .window = j->baseline->window};
-    struct one_block one = {j, ggn_baseline_reader_create(j->baseline, err),
-                            j->features->x + j->features->first[index] * j->features->size};
+    const struct work *w = data;
+    const struct ggn_eval_block *b = &w->set->blocks[index];
+    const struct ggn_level_series *c = &w->set->images.series[b->series];
+    const struct ggn_stop_rule rule = {.policy = w->baseline->policy, .window = w->baseline->window};
+    struct one_block one = {w, ggn_baseline_reader_create(w->baseline, err), w->x + w->first[index] * w->size};
     struct ggn_seen *seen = malloc((size_t)c->n_levels * sizeof *seen);
-    int rc = !one.reader ? err->code : !seen ? base_fail_nomem(err, j->method->name) : 0;
+    int rc = !one.reader ? err->code : !seen ? base_fail_nomem(err, w->method->name) : 0;
     (void)worker;
     if (!rc)
         ggn_replay(c, &rule, window_logit, &one, NULL, seen);
     for (size_t i = b->first; i < b->end && !rc; i++)
-        j->method->score[i] = seen[i - b->first + (size_t)j->set->window - 1].p;
+        w->method->score[i] = seen[i - b->first + (size_t)w->set->window - 1].p;
     free(seen);
     ggn_baseline_reader_destroy(one.reader);
     return rc;
 }
 
-int ggn_method_baseline(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_baseline *b,
-                        const struct ggn_feature_set *features, struct base_threads *threads, struct base_err *err)
+/* On failure *w->method is empty. */
+static int judge(struct work *w, struct base_threads *threads, struct base_err *err)
 {
-    struct work j = {s, b, features, m};
-    int rc = ggn_method_init(m, s, ggn_baseline_titles[b->kind], 0, err);
+    int rc = ggn_method_init(w->method, w->set, ggn_baseline_titles[w->baseline->kind], 0, err);
     if (rc)
         return rc;
-    m->cut = b->policy.threshold;
-    m->passes = b->policy.passes;
-    rc = ggn_each(threads, s->n_blocks, judge_block, &j, "evaluation", err);
+    w->method->cut = w->baseline->policy.threshold;
+    w->method->passes = w->baseline->policy.passes;
+    rc = ggn_each(threads, w->set->n_blocks, judge_block, w, "evaluation", err);
     if (rc)
-        ggn_method_release(m);
+        ggn_method_release(w->method);
+    return rc;
+}
+
+int ggn_method_baseline(struct ggn_method *m, const struct ggn_eval_set *s, struct ggn_baseline *b,
+                        struct base_threads *threads, struct base_err *err)
+{
+    struct work w = {.set = s, .baseline = b, .method = m};
+    int rc = extract(&w, threads, err);
+    if (!rc)
+        rc = judge(&w, threads, err);
+    work_release(&w);
     return rc;
 }
 
@@ -239,21 +245,24 @@ int ggn_method_learned(struct ggn_method *m, struct ggn_baseline *b, const struc
                        enum ggn_baseline_kind kind, enum ggn_split split, double early, int epochs,
                        struct base_threads *threads, struct base_err *err)
 {
-    struct ggn_feature_set features = {0};
+    struct work w = {.set = s, .baseline = b, .method = m};
+    *m = (struct ggn_method){0};
     *b = (struct ggn_baseline){0};
-    int rc = ggn_baseline_init(b, kind, s->images.width, s->images.height, s->window, err), made = 0;
+    int rc = ggn_baseline_init(b, kind, s->images.width, s->images.height, s->window, err);
     if (!rc)
-        rc = ggn_feature_set_make(&features, b, s, threads, err);
+        rc = extract(&w, threads, err);
     if (!rc)
-        rc = ggn_baseline_train(b, &features, s, split, epochs, err);
+        rc = train(&w, split, epochs, err);
     if (!rc)
-        made = !(rc = ggn_method_baseline(m, s, b, &features, threads, err));
-    if (!rc && !(rc = ggn_method_tune(m, s, split, early, err)))
+        rc = judge(&w, threads, err);
+    if (!rc)
+        rc = ggn_method_tune(m, s, split, early, err);
+    if (!rc)
         b->policy.threshold = fmin(m->cut, 1);
-    ggn_feature_set_release(&features);
-    if (rc && made)
+    work_release(&w);
+    if (rc) {
         ggn_method_release(m);
-    if (rc)
         ggn_baseline_release(b);
+    }
     return rc;
 }

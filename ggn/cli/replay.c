@@ -299,7 +299,6 @@ static int replay_model(const struct replay *r, int index, cJSON *to, int *faile
 static int replay_baseline(const struct replay *r, int index, cJSON *to, int *failed, struct base_err *err)
 {
     const char *path = r->o->baselines[index];
-    struct ggn_feature_set features = {0};
     struct ggn_baseline b;
     struct ggn_method m;
     int rc = ggn_baseline_load(&b, path, GGN_BASELINES, err);
@@ -309,13 +308,10 @@ static int replay_baseline(const struct replay *r, int index, cJSON *to, int *fa
     if (b.window > r->set.window)
         rc = base_fail(err, BASE_EINVAL, "%s: it judges %d images, windows here have %d (ggn evaluate --window)", path,
                        b.window, r->set.window);
-    if (!rc)
-        rc = ggn_feature_set_make(&features, &b, &r->set, r->threads, err);
-    if (!rc && !(rc = ggn_method_baseline(&m, &r->set, &b, &features, r->threads, err))) {
+    if (!rc && !(rc = ggn_method_baseline(&m, &r->set, &b, r->threads, err))) {
         put_method(r, "baseline", ggn_baseline_names[b.kind], &m, &b.policy, to, failed);
         ggn_method_release(&m);
     }
-    ggn_feature_set_release(&features);
     ggn_baseline_release(&b);
     return rc;
 }
