@@ -11,13 +11,14 @@
 #include "model/container.h"
 
 struct options {
-    const char *name, *data, *out;
-    int type, epochs, window, threads;
-    double early, ratio;
+    const char *name, *out;
+    struct ggn_eval_options set;
+    int type, epochs, threads;
+    double early;
 };
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
-    {"data", 'd', "DATA", TO(data), .input = BASE_FOLDER, .needed = 1,
+    {"data", 'd', "DATA", TO(set.data.dir), .input = BASE_FOLDER, .needed = 1,
      .help = "labelled data set: a folder of sequences with split.json (needed)"},
     {"output", 'o', "FILE", TO(out), .needed = 1, .output = BASE_FILE, .kind = &ggn_container_kind,
      .help = "the model, for -p model=FILE (needed)"},
@@ -25,8 +26,8 @@ static const struct base_option list[] = {
     {"early", 0, "RATE", TO(early), 0, 1,
      .help = "early-stop rate that the threshold is tuned for on the training scenes "
              "(0.05)"},
-    {"ratio", 0, "R", TO(ratio), 1, 16, .help = "thin the levels to this ratio of samples; else keep all"},
-    {"window", 'w', "S", TO(window), 2, 16, .help = "images that svd-entropy judges together (6)"},
+    {"ratio", 0, "R", TO(set.data.ratio), 1, 16, .help = "thin the levels to this ratio of samples; else keep all"},
+    {"window", 'w', "S", TO(set.window), 2, 16, .help = "images that svd-entropy judges together (6)"},
     {"type", 't', NULL, TO(type), .words = ggn_type_names, .help = "type of the stored weights (f32)"},
     {"threads", 0, "N", TO(threads), 1, 1024, .help = "worker threads (all processors)"},
     {0}};
@@ -94,7 +95,7 @@ int ggn_cmd_baseline(int argc, char **argv, struct base_err *err)
         .doc = "Trains svd-entropy, attributes or noise-mask, the published models before the network, on the training "
                "scenes of a data set (calibrated on its validation scenes). The file is what the criterion of that name and "
                "`ggn evaluate --baseline` judge by."};
-    struct options o = {.epochs = 30, .window = 6, .early = 0.05, .threads = base_threads_available()};
+    struct options o = {.epochs = 30, .set = {.window = 6, .seed = 1}, .early = 0.05, .threads = base_threads_available()};
     struct ggn_eval_set set = {0};
     struct base_threads *threads = NULL;
     enum ggn_baseline_kind kind = GGN_BASELINES;
@@ -106,9 +107,7 @@ int ggn_cmd_baseline(int argc, char **argv, struct base_err *err)
     if (!rc && !(threads = base_threads_create(o.threads, err)))
         rc = err->code;
     if (!rc)
-        rc = ggn_eval_set_load(&set,
-                               &(struct ggn_eval_options){.dir = o.data, .window = o.window, .ratio = o.ratio, .seed = 1},
-                               threads, &skipped, err);
+        rc = ggn_eval_set_load(&set, &o.set, threads, &skipped, err);
     if (!rc)
         rc = train(&o, kind, &set, threads, err);
     ggn_eval_set_release(&set);

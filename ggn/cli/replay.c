@@ -51,11 +51,11 @@ static const char *const precisions[] = {"f32", "f64", NULL}; /* enum ggn_precis
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
     {.help = "What is replayed:"},
-    {"data", 'd', "DATA", TO(set.dir), .input = BASE_FOLDER, .needed = 1,
+    {"data", 'd', "DATA", TO(set.data.dir), .input = BASE_FOLDER, .needed = 1,
      .help = "labelled data set: a folder of sequences (needed)"},
-    {"validation", 'V', "SCENE,...", TO(set.split.validation),
+    {"validation", 'V', "SCENE,...", TO(set.data.split.validation),
      .help = "validation scenes, over the split of the data set or the models"},
-    {"test", 'T', "SCENE,...", TO(set.split.test), .help = "test scenes, likewise"},
+    {"test", 'T', "SCENE,...", TO(set.data.split.test), .help = "test scenes, likewise"},
     {"model", 'm', "FILE", BASE_TO_LIST(struct options, models, n_models, "models"), .input = BASE_FILE,
      .help = "trained model (.ggn); may be repeated"},
     {"baseline", 0, "FILE", BASE_TO_LIST(struct options, baselines, n_baselines, "baselines"), .input = BASE_FILE,
@@ -69,7 +69,7 @@ static const struct base_option list[] = {
     {"param", 'p', "KEY=NUMBER", .set = add_adjusted,
      .help = "judge as the criterion does with this parameter: visible, passes, first-spp"},
     {"cadence", 0, "R", TO(set.cadence), 1.02, 16, .help = "simulate all levels, this far apart, and ask as often"},
-    {"ratio", 0, "R", TO(set.ratio), 1, 16,
+    {"ratio", 0, "R", TO(set.data.ratio), 1, 16,
      .help = "thin the levels, and the checks, to this ratio of samples; else keep all"},
     {"recorded", 0, NULL, TO(set.recorded),
      .help = "recorded levels only, instead of going on with the samples of the reference"},
@@ -153,8 +153,8 @@ static int load_models(struct replay *r, struct ggn_eval_options *eo, struct bas
         const struct ggn_hyper *h = &r->model[i]->hyper;
         r->learned[i] = cJSON_GetObjectItemCaseSensitive(r->model[i]->provenance, "data");
         eo->window = h->window > eo->window ? h->window : eo->window;
-        eo->noise_maps |= h->noise_map && h->reach > 0;
-        eo->measures |= h->reach > 0;
+        eo->data.noise_maps |= h->noise_map && h->reach > 0;
+        eo->data.measures |= h->reach > 0;
     }
     return 0;
 }
@@ -164,8 +164,8 @@ static int load(struct replay *r, struct base_err *err)
     struct ggn_eval_options eo = r->o->set;
     eo.quality = !r->o->no_quality;
     eo.seed = 1;
-    eo.split.learned = r->learned;
-    eo.split.n_learned = r->o->n_models;
+    eo.data.split.learned = r->learned;
+    eo.data.split.n_learned = r->o->n_models;
     r->threads = base_threads_create(r->o->threads, err);
     int rc = r->threads ? load_models(r, &eo, err) : err->code;
     if (rc)

@@ -323,14 +323,10 @@ int ggn_eval_set_load(struct ggn_eval_set *out, const struct ggn_eval_options *o
                       struct base_err *err)
 {
     struct ggn_eval_set s = {.window = o->window};
-    struct ggn_series_set_options co = {.dir = o->dir,
-                                        .split = o->split,
-                                        .ratio = o->ratio,
-                                        .with_test = 1,
-                                        .noise_maps = o->noise_maps,
-                                        .measures = o->measures};
+    struct ggn_series_set_options data = o->data;
     struct fill f = {&s, o->quality, o->no_ssim};
-    int rc = ggn_series_set_load(&s.images, &co, err);
+    data.with_test = 1;
+    int rc = ggn_series_set_load(&s.images, &data, err);
     if (rc)
         return rc;
     if (!o->recorded)

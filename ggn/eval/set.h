@@ -35,18 +35,14 @@ struct ggn_eval_set {
 };
 
 struct ggn_eval_options {
-    const char *dir; /* data set */
-    struct ggn_split_options split;
+    struct ggn_series_set_options data;
     int window;         /* S */
     int quality;        /* also compute FLIP and SSIM of every case ... */
     int no_ssim;        /* ... but SSIM, which takes longer */
     int recorded;       /* only recorded levels; else each block goes on as ggn_series_set_extend says */
-    double ratio;       /* thin the levels to at least this ratio; 0: keep all */
     double cadence;     /* > 1: simulate all levels, this far apart (ggn_series_set_simulate); 0: no */
     uint32_t seed;      /* of the continuation */
-    int noise_maps;     /* also make the noise maps (data/series.h) */
     int without_halves; /* residual models judge as in a host without half buffers */
-    int measures;       /* also measure the levels (data/series.h) */
 };
 
 /* Blocks without a label are left out; *skipped counts the views without any. BASE_EINVAL if nothing is left. Errors of the

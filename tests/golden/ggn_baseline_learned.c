@@ -68,7 +68,7 @@ static void learned_from_scenes(void **state)
     FILE *f = fopen(path, "w");
     fputs("{\"train\": [\"a\", \"c\"], \"validation\": [\"b\"], \"test\": []}", f);
     fclose(f);
-    const struct ggn_eval_options o = {.dir = root, .window = 3, .recorded = 1};
+    const struct ggn_eval_options o = {.data = {.dir = root}, .window = 3, .recorded = 1};
     if (ggn_eval_set_load(&set, &o, threads, &skipped, &err))
         fail_msg("%s", err.text);
     for (int kind = 0; kind < GGN_BASELINES; kind++)

@@ -54,7 +54,7 @@ static int setup(void **state)
     fputs("{\"train\": [\"a\"], \"validation\": [\"b\"], \"test\": [\"c\"]}", f);
     fclose(f);
     threads = base_threads_create(2, &err);
-    struct ggn_eval_options o = {.dir = root, .window = WINDOW, .quality = 1, .recorded = 1};
+    struct ggn_eval_options o = {.data = {.dir = root}, .window = WINDOW, .quality = 1, .recorded = 1};
     if (!threads || ggn_eval_set_load(&set, &o, threads, &skipped, &err) != 0)
         fail_msg("%s", err.text);
     return 0;
@@ -100,7 +100,7 @@ static int made_up(struct ggn_method *m, const double *score)
 static void continued(void **state)
 {
     (void)state;
-    struct ggn_eval_options o = {.dir = root, .window = WINDOW, .quality = 1, .seed = 3};
+    struct ggn_eval_options o = {.data = {.dir = root}, .window = WINDOW, .quality = 1, .seed = 3};
     struct ggn_eval_set more, again;
     struct base_err err = {0};
     int skipped;
@@ -247,7 +247,7 @@ static void area(void **state)
 static void refused(void **state)
 {
     (void)state;
-    struct ggn_eval_options o = {.dir = root, .window = LEVELS + 1, .recorded = 1};
+    struct ggn_eval_options o = {.data = {.dir = root}, .window = LEVELS + 1, .recorded = 1};
     struct base_err err = {0};
     struct ggn_eval_set none;
     struct ggn_method m;
@@ -271,7 +271,7 @@ static void beyond_the_recording(void **state)
     snprintf(view, sizeof view, "%s/view", dir);
     assert_int_equal(mkdir(dir, 0777), 0);
     ggn_noise_view(view, "view", &n, sigma, 2, 40.0);
-    struct ggn_eval_options o = {.dir = dir, .window = WINDOW, .seed = 3};
+    struct ggn_eval_options o = {.data = {.dir = dir}, .window = WINDOW, .seed = 3};
     struct ggn_eval_set more;
     struct base_err err = {0};
     int skipped;
