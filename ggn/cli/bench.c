@@ -59,19 +59,6 @@ static const char *const figure_name[N_FIGURES] = {
     "blocks_16_alone_ms",  "denoiser_train_ms",    "generator_train_ms",       "train_sample_ms", "sgemm_gflops",
 };
 
-/* The published sizes or those of a model; both presets are measured as the mended one, whose steps are simpler. */
-static int sizes(const struct bench *b, struct ggn_hyper *hyper, struct base_err *err)
-{
-    struct ggn_model *model = NULL;
-    int rc = b->o.model ? ggn_model_load(b->o.model, &model, err) : 0;
-
-    if (!rc)
-        *hyper = model ? model->hyper : ggn_hyper_default(GGN_PRESET_LULL);
-    hyper->preset = GGN_PRESET_LULL;
-    ggn_model_destroy(model);
-    return rc;
-}
-
 /* The three networks, whose input is the first picture. */
 static int create_networks(const struct bench *b, struct ggn_exec *e[GGN_NETS], struct base_threads *threads,
                            struct base_err *err)
@@ -89,12 +76,16 @@ static int create_networks(const struct bench *b, struct ggn_exec *e[GGN_NETS], 
 
 static int setup(struct bench *b, struct base_err *err)
 {
-    struct ggn_hyper hyper;
     struct ggn_train_options options = ggn_train_options_default(GGN_PRESET_LULL);
-    int rc = sizes(b, &hyper, err);
+    struct ggn_model *model = NULL;
+    int rc = b->o.model ? ggn_model_load(b->o.model, &model, err) : 0;
 
     if (rc)
         return rc;
+    /* The published sizes or those of a model; both presets are measured as the mended one, whose steps are simpler. */
+    struct ggn_hyper hyper = model ? model->hyper : ggn_hyper_default(GGN_PRESET_LULL);
+    hyper.preset = GGN_PRESET_LULL;
+    ggn_model_destroy(model);
     const int area = hyper.width * hyper.height, window = 3 * hyper.window, planes = window + 3;
     options.batch = b->o.batch;
     b->threads = base_threads_create(b->o.threads, err);

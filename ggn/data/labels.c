@@ -120,25 +120,6 @@ int ggn_labels_read(const char *dir, struct ggn_labels *labels, struct base_err 
     return rc;
 }
 
-static cJSON *to_json(const struct ggn_labels *labels, int *failed)
-{
-    cJSON *root = cJSON_CreateObject();
-    base_json_text(root, "format", "lull-labels", failed);
-    base_json_number(root, "version", 1, failed);
-    base_json_text(root, "source", labels->source, failed);
-    base_json_text(root, "detail", labels->detail, failed);
-    base_json_number(root, "cap", labels->cap, failed);
-    base_json_number(root, "spread", labels->spread, failed);
-    cJSON *blocks = base_json_array(root, "blocks", failed);
-    for (uint32_t i = 0; i < labels->n; i++) {
-        cJSON *o = base_json_object(blocks, NULL, failed);
-        base_json_number(o, "id", labels->labels[i].id, failed);
-        base_json_number(o, "threshold", labels->labels[i].threshold, failed);
-        base_json_bool(o, "censored", labels->labels[i].censored, failed);
-    }
-    return root;
-}
-
 static int is_same(const struct ggn_labels *a, const struct ggn_labels *b)
 {
     int same = strcmp(a->source, b->source) == 0 && a->n == b->n;
@@ -175,7 +156,20 @@ int ggn_labels_write(const char *dir, const struct ggn_labels *labels, int repla
     if (rc)
         return rc;
     int failed = 0;
-    cJSON *root = to_json(labels, &failed);
+    cJSON *root = cJSON_CreateObject();
+    base_json_text(root, "format", "lull-labels", &failed);
+    base_json_number(root, "version", 1, &failed);
+    base_json_text(root, "source", labels->source, &failed);
+    base_json_text(root, "detail", labels->detail, &failed);
+    base_json_number(root, "cap", labels->cap, &failed);
+    base_json_number(root, "spread", labels->spread, &failed);
+    cJSON *blocks = base_json_array(root, "blocks", &failed);
+    for (uint32_t i = 0; i < labels->n; i++) {
+        cJSON *o = base_json_object(blocks, NULL, &failed);
+        base_json_number(o, "id", labels->labels[i].id, &failed);
+        base_json_number(o, "threshold", labels->labels[i].threshold, &failed);
+        base_json_bool(o, "censored", labels->labels[i].censored, &failed);
+    }
     rc = base_json_write(path, root, failed, err);
     cJSON_Delete(root);
     return rc;

@@ -113,16 +113,6 @@ static struct ggn_level_series *append_copy(struct ggn_series_set *set, int of, 
     return c;
 }
 
-static int make_series(const struct ggn_series_set *set, struct ggn_level_series *c, const struct source *s, uint32_t seed,
-                       struct base_err *err)
-{
-    double spp[MAX_LEVELS];
-    const double ratio = set->ratio > 1.01 ? set->ratio : 1.15;
-    int n = choose_levels(spp, 0, set->first_spp, ratio, HIGHEST_SHARE * s->n_reference, 1, seed);
-
-    return make_levels(set, c, s, spp, n, seed, err);
-}
-
 /* with_reference 0: as if none had been recorded. */
 static int read_source(const struct ggn_series_set *set, const struct ggn_level_series *c, int with_reference,
                        struct source *s, int *usable, struct base_err *err)
@@ -167,7 +157,9 @@ static int source_init(struct source *s, const struct ggn_series_set *set, struc
 
 int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uint32_t seed, struct base_err *err)
 {
+    const double ratio = set->ratio > 1.01 ? set->ratio : 1.15;
     struct source s = {0};
+    double spp[MAX_LEVELS];
     int rc = source_init(&s, set, err), recorded = set->n;
 
     for (int i = 0; !rc && i < recorded; i++) {
@@ -176,8 +168,10 @@ int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uin
             continue;
         rc = read_source(set, &set->series[i], 1, &s, &usable, err);
         for (int k = 0; !rc && usable && isfinite(s.n_reference) && k < per_series; k++) {
+            const uint32_t own_seed = ggn_hash((uint32_t)(i * 64 + k), seed);
+            const int n = choose_levels(spp, 0, set->first_spp, ratio, HIGHEST_SHARE * s.n_reference, 1, own_seed);
             struct ggn_level_series *c = append_copy(set, i, err);
-            rc = c ? make_series(set, c, &s, ggn_hash((uint32_t)(i * 64 + k), seed), err) : BASE_ENOMEM;
+            rc = c ? make_levels(set, c, &s, spp, n, own_seed, err) : BASE_ENOMEM;
         }
     }
     free(s.base);

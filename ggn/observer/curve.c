@@ -59,12 +59,6 @@ static double see_halves(struct eye *e, double scale, int keep_texture)
     return see(e, 0.5, keep_texture);
 }
 
-/* Mean and half difference of the level at spp. */
-static int read_level(struct eye *e, uint32_t spp, struct base_err *err)
-{
-    return seq_halves(e->block, seq_level(e->block, spp), e->mean, e->difference, err);
-}
-
 static void append(struct ggn_curve *c, double spp, double seen)
 {
     c->spp[c->n] = spp;
@@ -73,13 +67,13 @@ static void append(struct ggn_curve *c, double spp, double seen)
 
 /* Levels below the full one, each from its own halves: the full level's noise made stronger would be symmetric, where that
  * of few samples is skewed to bright. */
-static int add_recorded_halves(struct ggn_curve *c, struct eye *e, uint32_t full_spp, struct base_err *err)
+static int add_recorded_halves(struct ggn_curve *c, struct eye *e, const struct seq_record *full, struct base_err *err)
 {
     for (uint32_t i = 0; i < e->block->n_levels; i++) {
         const struct seq_record *r = &e->block->levels[i];
-        if (r->spp >= full_spp || !seq_has_halves(r))
+        if (r->spp >= full->spp || !seq_has_halves(r))
             continue;
-        int rc = read_level(e, r->spp, err);
+        int rc = seq_halves(e->block, r, e->mean, e->difference, err);
         if (rc)
             return rc;
         append(c, r->spp, see_halves(e, 1.0, 1));
@@ -91,20 +85,20 @@ static int add_recorded_halves(struct ggn_curve *c, struct eye *e, uint32_t full
  * that it stands for. Texture is that of the full level, or what there was. */
 static int add_halves(struct ggn_curve *c, struct eye *e, double beyond, struct base_err *err)
 {
-    const uint32_t full = seq_full_level(e->block)->spp;
-    int rc = read_level(e, full, err);
+    const struct seq_record *full = seq_full_level(e->block);
+    int rc = seq_halves(e->block, full, e->mean, e->difference, err);
     if (!rc && c->n == 0) {
         const double seen = see_halves(e, 1.0, 0);
         rc = add_recorded_halves(c, e, full, err);
         if (!rc)
-            rc = read_level(e, full, err);
-        append(c, full, seen);
+            rc = seq_halves(e->block, full, e->mean, e->difference, err);
+        append(c, full->spp, seen);
         c->recorded = c->n;
     }
     for (int i = 0; i < SIMULATED && !rc; i++) {
         double spp = simulated_spp(i);
-        if (spp > full && spp > beyond)
-            append(c, spp, see_halves(e, seq_noise_scale(full, spp), 1));
+        if (spp > full->spp && spp > beyond)
+            append(c, spp, see_halves(e, seq_noise_scale(full->spp, spp), 1));
     }
     return rc;
 }
@@ -136,18 +130,10 @@ static int add_levels(struct ggn_curve *c, struct eye *e, int independent, struc
     return 0;
 }
 
-/* Room for every level that a curve of this block can have. */
-static int curve_init(struct ggn_curve *c, const struct seq_block *block, struct base_err *err)
-{
-    size_t room = SIMULATED + 1 + block->n_levels;
-    *c = (struct ggn_curve){.spp = malloc(room * sizeof *c->spp), .visible = malloc(room * sizeof *c->visible)};
-    return c->spp && c->visible ? 0 : base_fail_nomem(err, "observer");
-}
-
 int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, int reference_independent,
                    struct ggn_curve *curve, struct base_err *err)
 {
-    struct ggn_curve c;
+    const size_t room = SIMULATED + 1 + block->n_levels; /* for every level that a curve of this block can have */
     struct eye e = {0};
     if (source == GGN_FROM_HALVES && !seq_full_level(block))
         return base_fail(err, BASE_EINVAL,
@@ -155,9 +141,8 @@ int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, 
                          block->id);
     if (source == GGN_FROM_LEVELS && !block->reference)
         return base_fail(err, BASE_EINVAL, "block %u has no reference: record one, or use --source halves", block->id);
-    int rc = curve_init(&c, block, err);
-    if (!rc)
-        rc = eye_init(&e, block, err);
+    struct ggn_curve c = {.spp = malloc(room * sizeof *c.spp), .visible = malloc(room * sizeof *c.visible)};
+    int rc = c.spp && c.visible ? eye_init(&e, block, err) : base_fail_nomem(err, "observer");
     if (!rc && source == GGN_FROM_LEVELS)
         rc = add_levels(&c, &e, reference_independent, err);
     if (!rc && (source == GGN_FROM_HALVES || (reference_independent && seq_full_level(block))))
@@ -175,7 +160,7 @@ int ggn_curve_level(const struct seq_block *block, const struct seq_record *leve
     struct eye e;
     int rc = eye_init(&e, block, err);
     if (!rc)
-        rc = read_level(&e, level->spp, err);
+        rc = seq_halves(block, level, e.mean, e.difference, err);
     if (!rc)
         *visible_out = see_halves(&e, 1.0, 0);
     eye_release(&e);
