@@ -32,15 +32,6 @@ static const struct base_option list[] = {
     {"threads", 0, "N", TO(threads), 1, 1024, .help = "worker threads (all processors)"},
     {0}};
 
-static int kind_of(const char *name, enum ggn_baseline_kind *kind, struct base_err *err)
-{
-    const int k = base_word_index(ggn_baseline_names, name, strlen(name));
-    if (k < 0)
-        return base_fail(err, BASE_EINVAL, "'%.80s' is none of svd-entropy, attributes, noise-mask", name);
-    *kind = (enum ggn_baseline_kind)k;
-    return 0;
-}
-
 static int save(const struct options *o, const struct ggn_baseline *b, const struct ggn_eval_set *s,
                 const struct ggn_method_figures *m, struct base_err *err)
 {
@@ -98,18 +89,17 @@ int ggn_cmd_baseline(int argc, char **argv, struct base_err *err)
     struct options o = {.epochs = 30, .set = {.window = 6, .seed = 1}, .early = 0.05, .threads = base_threads_available()};
     struct ggn_eval_set set = {0};
     struct base_threads *threads = NULL;
-    enum ggn_baseline_kind kind = GGN_BASELINES;
-    int skipped;
+    int skipped, kind = 0;
 
     int rc = base_options_parse(&options, argc, argv, &o, err);
-    if (!rc)
-        rc = kind_of(o.name, &kind, err);
+    if (!rc && (kind = base_word_index(ggn_baseline_names, o.name, strlen(o.name))) < 0)
+        rc = base_fail(err, BASE_EINVAL, "'%.80s' is none of svd-entropy, attributes, noise-mask", o.name);
     if (!rc && !(threads = base_threads_create(o.threads, err)))
         rc = err->code;
     if (!rc)
         rc = ggn_eval_set_load(&set, &o.set, threads, &skipped, err);
     if (!rc)
-        rc = train(&o, kind, &set, threads, err);
+        rc = train(&o, (enum ggn_baseline_kind)kind, &set, threads, err);
     ggn_eval_set_release(&set);
     base_threads_destroy(threads);
     return rc;

@@ -23,16 +23,6 @@ static const struct base_option list[] = {
     {"ppd", 'p', "N", TO(ppd), 1, 1000, .help = "pixels per degree of the viewer (67.02)"},
     {0}};
 
-static int write_map(const char *path, const float *map, int width, int height, struct base_err *err)
-{
-    uint8_t *rgb = ggn_cmd_magma(map, 1.0, (size_t)width * (size_t)height);
-    if (!rgb)
-        return base_fail_nomem(err, path);
-    int rc = pic_write_png(path, width, height, 3, rgb, err);
-    free(rgb);
-    return rc;
-}
-
 int ggn_cmd_flip(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {
@@ -56,8 +46,12 @@ int ggn_cmd_flip(int argc, char **argv, struct base_err *err)
         rc = base_fail_nomem(err, "error map");
     if (!rc)
         rc = ggn_flip(images[0].u8, images[1].u8, images[0].width, images[0].height, o.ppd, map, &stats, err);
-    if (!rc && map)
-        rc = write_map(o.map_path, map, images[0].width, images[0].height, err);
+    if (!rc && map) {
+        uint8_t *rgb = ggn_cmd_magma(map, 1.0, (size_t)images[0].width * (size_t)images[0].height);
+        rc = rgb ? pic_write_png(o.map_path, images[0].width, images[0].height, 3, rgb, err)
+                 : base_fail_nomem(err, o.map_path);
+        free(rgb);
+    }
     if (!rc)
         printf(o.json ? "{\"mean\": %.6f, \"max\": %.6f}\n" : "mean %.6f\nmax  %.6f\n", stats.mean, stats.max);
     free(map);

@@ -285,20 +285,6 @@ static void print_calibration(const struct ggn_calibration *c)
     printf("%s\n", text);
 }
 
-/* The views of all data sets, each with its thresholds. */
-static int collect(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset *sets,
-                   struct ggn_calibration_input *inputs, int *n, struct base_err *err)
-{
-    int rc = 0;
-    for (int s = 0; s < o->n_inputs; s++)
-        for (int i = 0; i < sets[s].n && !rc; i++) {
-            struct ggn_calibration_input *in = &inputs[(*n)++];
-            in->view = &sets[s].views[i];
-            rc = find_row(o->calibrate, in->view->name, t, &in->human, err);
-        }
-    return rc;
-}
-
 static int calibrate(const struct options *o, struct base_threads *threads, struct base_err *err)
 {
     struct ggn_dataset sets[MAX_INPUTS] = {{0}};
@@ -311,8 +297,13 @@ static int calibrate(const struct options *o, struct base_threads *threads, stru
         room += rc ? 0 : (size_t)sets[s].n;
     }
     struct ggn_calibration_input *inputs = malloc(room * sizeof *inputs);
-    if (!rc)
-        rc = !inputs ? base_fail_nomem(err, "calibration") : collect(o, &t, sets, inputs, &n, err);
+    if (!rc && !inputs)
+        rc = base_fail_nomem(err, "calibration");
+    for (int s = 0; s < o->n_inputs && !rc; s++)
+        for (int i = 0; i < sets[s].n && !rc; i++, n++) {
+            inputs[n].view = &sets[s].views[i];
+            rc = find_row(o->calibrate, inputs[n].view->name, &t, &inputs[n].human, err);
+        }
     if (!rc)
         rc = ggn_calibrate(inputs, n, (enum ggn_curve_source)o->source, threads, &c, err);
     if (!rc && o->spread > 0)

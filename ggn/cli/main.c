@@ -103,28 +103,22 @@ static int main_options(int argc, char **argv)
     return refuse("a command is needed");
 }
 
-/* The worst status is that of the job, and the first failure of another process is told. */
-static int part(const char *command, int status)
-{
-    struct base_err err = {0};
-    int all = job_close(ggn_cmd_job, status, last_words, &err);
-
-    ggn_cmd_job = NULL;
-    if (all != status && err.code)
-        fprintf(stderr, "%s: %s\n", command, err.text);
-    return all;
-}
-
 static int run(const struct command *command, int argc, char **argv)
 {
-    struct base_err err = {0};
+    struct base_err err = {0}, other = {0};
     if (job_open(&ggn_cmd_job, &err))
         return fail(argv[0], &err);
     job_watch(ggn_cmd_job, 0, &base_interrupted);
     const int alone = ggn_cmd_job && command->run != ggn_cmd_label; /* label shares out its work; others would do it anew */
     int rc = alone ? base_fail(&err, BASE_EINVAL, "works in one process: start it without mpirun")
                    : command->run(argc, argv, &err);
-    return part(argv[0], rc < 0 ? fail(argv[0], &err) : rc);
+    const int status = rc < 0 ? fail(argv[0], &err) : rc;
+    /* The worst status is that of the job, and the first failure of another process is told. */
+    const int all = job_close(ggn_cmd_job, status, last_words, &other);
+    ggn_cmd_job = NULL;
+    if (all != status && other.code)
+        fprintf(stderr, "%s: %s\n", argv[0], other.text);
+    return all;
 }
 
 int main(int argc, char **argv)

@@ -144,21 +144,6 @@ static void warn_of_setting(const struct replay *r, int index, const struct ggn_
 
 /* --- loading --- */
 
-static int load_models(struct replay *r, struct ggn_eval_options *eo, struct base_err *err)
-{
-    for (int i = 0; i < r->o->n_models; i++) {
-        int rc = ggn_model_load(r->o->models[i], &r->model[i], err);
-        if (rc)
-            return rc;
-        const struct ggn_hyper *h = &r->model[i]->hyper;
-        r->learned[i] = cJSON_GetObjectItemCaseSensitive(r->model[i]->provenance, "data");
-        eo->window = h->window > eo->window ? h->window : eo->window;
-        eo->data.noise_maps |= h->noise_map && h->reach > 0;
-        eo->data.measures |= h->reach > 0;
-    }
-    return 0;
-}
-
 static int load(struct replay *r, struct base_err *err)
 {
     struct ggn_eval_options eo = r->o->set;
@@ -167,11 +152,20 @@ static int load(struct replay *r, struct base_err *err)
     eo.data.split.learned = r->learned;
     eo.data.split.n_learned = r->o->n_models;
     r->threads = base_threads_create(r->o->threads, err);
-    int rc = r->threads ? load_models(r, &eo, err) : err->code;
-    if (rc)
-        return rc;
+    int rc = r->threads ? 0 : err->code;
+    for (int i = 0; i < r->o->n_models && !rc; i++) {
+        rc = ggn_model_load(r->o->models[i], &r->model[i], err);
+        if (rc)
+            break;
+        const struct ggn_hyper *h = &r->model[i]->hyper;
+        r->learned[i] = cJSON_GetObjectItemCaseSensitive(r->model[i]->provenance, "data");
+        eo.window = h->window > eo.window ? h->window : eo.window;
+        eo.data.noise_maps |= h->noise_map && h->reach > 0;
+        eo.data.measures |= h->reach > 0;
+    }
     eo.window = eo.window > 0 ? eo.window : USUAL_WINDOW;
-    rc = ggn_eval_set_load(&r->set, &eo, r->threads, &r->skipped, err);
+    if (!rc)
+        rc = ggn_eval_set_load(&r->set, &eo, r->threads, &r->skipped, err);
     if (!rc)
         warn_of_learned(r);
     return rc;
