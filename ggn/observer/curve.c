@@ -65,22 +65,6 @@ static void append(struct ggn_curve *c, double spp, double seen)
     c->visible[c->n++] = seen;
 }
 
-/* Levels below the full one, each from its own halves: the full level's noise made stronger would be symmetric, where that
- * of few samples is skewed to bright. */
-static int add_recorded_halves(struct ggn_curve *c, struct eye *e, const struct seq_record *full, struct base_err *err)
-{
-    for (uint32_t i = 0; i < e->block->n_levels; i++) {
-        const struct seq_record *r = &e->block->levels[i];
-        if (r->spp >= full->spp || !seq_has_halves(r))
-            continue;
-        int rc = seq_halves(e->block, r, e->mean, e->difference, err);
-        if (rc)
-            return rc;
-        append(c, r->spp, see_halves(e, 1.0, 1));
-    }
-    return 0;
-}
-
 /* Appends what halves say: recorded levels of a curve that is empty, the full level, and those above it and `beyond` spp
  * that it stands for. Texture is that of the full level, or what there was. */
 static int add_halves(struct ggn_curve *c, struct eye *e, double beyond, struct base_err *err)
@@ -89,7 +73,11 @@ static int add_halves(struct ggn_curve *c, struct eye *e, double beyond, struct 
     int rc = seq_halves(e->block, full, e->mean, e->difference, err);
     if (!rc && c->n == 0) {
         const double seen = see_halves(e, 1.0, 0);
-        rc = add_recorded_halves(c, e, full, err);
+        /* Levels below, each from its own halves: the full level's noise made stronger would be symmetric, where that of few
+         * samples is skewed to bright. */
+        for (const struct seq_record *r = e->block->levels; r < full && !rc; r++)
+            if (seq_has_halves(r) && !(rc = seq_halves(e->block, r, e->mean, e->difference, err)))
+                append(c, r->spp, see_halves(e, 1.0, 1));
         if (!rc)
             rc = seq_halves(e->block, full, e->mean, e->difference, err);
         append(c, full->spp, seen);

@@ -6,27 +6,10 @@
 #include "base/colour.h"
 #include "model/visibility.h"
 
-struct workspace {             /* for one block */
-    double *texture, *scratch; /* `texture` owns all, one allocation */
+struct workspace { /* for one block */
+    double *texture, *scratch;
     float *rgb, *image, *reference[2], *seen[2];
 };
-
-/* Empty without memory. */
-static struct workspace make_room(int width, int height)
-{
-    const size_t n = (size_t)width * (size_t)height, patches = ggn_visible_patches(width, height);
-    const size_t doubles = patches + ggn_visibility_scratch(width);
-    double *memory = malloc(doubles * sizeof *memory + 8 * n * sizeof(float));
-    if (!memory)
-        return (struct workspace){0};
-    float *at = (float *)(memory + doubles);
-    return (struct workspace){.texture = memory,
-                              .scratch = memory + patches,
-                              .rgb = at,
-                              .image = at + 3 * n,
-                              .reference = {at + 4 * n, at + 5 * n},
-                              .seen = {at + 6 * n, at + 7 * n}};
-}
 
 static void lightness_of(const struct pic_image *image, const struct ggn_remaining *b, float *rgb, float *lightness)
 {
@@ -92,10 +75,19 @@ int ggn_remaining_count(int width, int height, int block) { return ((width - 1) 
 int ggn_remaining(const struct ggn_observer *observer, const struct pic_image *const references[2],
                   const struct pic_image *image, int block, struct ggn_remaining *blocks, float *map, struct base_err *err)
 {
-    struct workspace w =
-        make_room(block < image->width ? block : image->width, block < image->height ? block : image->height);
-    if (!w.texture)
+    const int width = block < image->width ? block : image->width, height = block < image->height ? block : image->height;
+    const size_t n = (size_t)width * (size_t)height, patches = ggn_visible_patches(width, height);
+    const size_t doubles = patches + ggn_visibility_scratch(width);
+    double *memory = malloc(doubles * sizeof *memory + 8 * n * sizeof(float));
+    if (!memory)
         return base_fail_nomem(err, "blocks of an image");
+    float *at = (float *)(memory + doubles);
+    struct workspace w = {.texture = memory,
+                          .scratch = memory + patches,
+                          .rgb = at,
+                          .image = at + 3 * n,
+                          .reference = {at + 4 * n, at + 5 * n},
+                          .seen = {at + 6 * n, at + 7 * n}};
     for (int y = 0; y < image->height; y += block)
         for (int x = 0; x < image->width; x += block, blocks++) {
             int right = image->width - x, below = image->height - y;
@@ -105,6 +97,6 @@ int ggn_remaining(const struct ggn_observer *observer, const struct pic_image *c
             lightness_of(image, blocks, w.rgb, w.image);
             measure(observer, blocks, references[1] != NULL, &w, map, image->width);
         }
-    free(w.texture);
+    free(memory);
     return 0;
 }
