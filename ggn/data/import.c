@@ -281,23 +281,14 @@ static void cut_block(const struct row *row, const struct pair *p, int x0, uint3
             }
 }
 
-/* What is known without the samples' squares: errors by the half buffer, its tail. */
-static uint32_t fill_stats(const struct row *row, uint32_t spp, struct seq_stat stats[SEQ_STATISTICS])
-{
-    static const int known[] = {SEQ_DAMMERTZ, SEQ_HALF_UNSETTLED, SEQ_TAIL999, SEQ_GINI};
-    struct seq_stat all[SEQ_STATISTICS];
-    seq_statistics(row->mean, row->first, row->half, row->none, (size_t)row->block * (size_t)row->block, spp, row->scratch,
-                   all);
-    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
-        stats[i] = all[known[i]];
-    return sizeof known / sizeof known[0];
-}
-
 static int add_picture(struct row *row, const struct pair *p, uint32_t spp, int full, int is_reference, struct base_err *err)
 {
+    /* what is known without the samples' squares: errors by the half buffer, its tail */
+    static const int known[] = {SEQ_DAMMERTZ, SEQ_HALF_UNSETTLED, SEQ_TAIL999, SEQ_GINI};
+    enum { KNOWN = sizeof known / sizeof known[0] };
+    struct seq_stat all[SEQ_STATISTICS], stats[KNOWN];
     int rc = 0;
     for (int c = 0; c < row->columns && !rc; c++) {
-        struct seq_stat stats[SEQ_STATISTICS];
         cut_block(row, p, c * row->block, spp);
         struct seq_frame f = {.spp = spp, .is_reference = is_reference, .display = row->display};
         f.mean = p->all.f32 || p->has_half ? row->mean : NULL;
@@ -305,27 +296,24 @@ static int add_picture(struct row *row, const struct pair *p, uint32_t spp, int 
             f.half = row->half;
             f.half_spp = spp / 2;
             f.full = full;
+            seq_statistics(row->mean, row->first, row->half, row->none, (size_t)row->block * (size_t)row->block, spp,
+                           row->scratch, all);
+            for (int i = 0; i < KNOWN; i++)
+                stats[i] = all[known[i]];
             f.stats = stats;
-            f.n_stats = fill_stats(row, spp, stats);
+            f.n_stats = KNOWN;
         }
         rc = seq_builder_add(&row->builders[c], &f, err);
     }
     return rc;
 }
 
-/* The level from which others are simulated. */
-static int full_level(const struct view *v)
-{
-    int i = 0;
-    while (i + 1 < v->n && v->levels[i].spp < 320)
-        i++;
-    return i;
-}
-
 static int fill_row(const struct view *v, const struct seq_manifest *m, struct row *row, const struct ggn_import_options *o,
                     int base, struct base_err *err)
 {
-    int rc = 0;
+    int rc = 0, full = 0; /* full: the level from which others are simulated */
+    while (full + 1 < v->n && v->levels[full].spp < 320)
+        full++;
     for (int i = 0; i < v->n && !rc; i++) {
         struct pair p = {0};
         rc = read_pair(v, &v->levels[i], &p, err);
@@ -335,7 +323,7 @@ static int fill_row(const struct view *v, const struct seq_manifest *m, struct r
             rc = base_fail(err, BASE_EINVAL, "%s/%s: %dx%d, the other levels are %ux%u", v->dir, v->levels[i].file,
                            p.all.width, p.all.height, m->width, m->height);
         if (!rc)
-            rc = add_picture(row, &p, v->levels[i].spp, i == full_level(v), 0, err);
+            rc = add_picture(row, &p, v->levels[i].spp, i == full, 0, err);
         if (!rc && i + 1 == v->n && m->reference_spp)
             rc = add_picture(row, &p, v->levels[i].spp, 0, 1, err);
         pair_release(&p);

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <zlib.h>
 
+#include "figures/stats.h"
 #include "sequence/simulate.h"
 
 enum { MAX_CHAINS = 1 << 16 };
@@ -216,20 +217,13 @@ static int load_block(struct ggn_series_set *set, int view, uint32_t index, cons
     return rc;
 }
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-
-    return (x > y) - (x < y);
-}
-
 /* The spacing of the longest series: equal steps when its first step is its last, else the median ratio of its upper half,
  * where rounding to whole samples matters least. */
 static void find_spacing(struct ggn_series_set *set)
 {
     const struct ggn_level_series *longest = &set->series[0];
     double ratio[SEQ_MAX_RECORDS];
-    int n = 0;
+    size_t n = 0;
 
     for (int i = 1; i < set->n; i++)
         if (set->series[i].n_levels > longest->n_levels)
@@ -245,7 +239,7 @@ static void find_spacing(struct ggn_series_set *set)
     }
     for (int i = count / 2 > 0 ? count / 2 : 1; i < count; i++)
         ratio[n++] = spp[i] / spp[i - 1];
-    qsort(ratio, (size_t)n, sizeof ratio[0], by_value);
+    ggn_stats_sort(ratio, n);
     set->ratio = ratio[n / 2];
     struct ggn_policy pace = {0};
     ggn_series_set_pace(set, &pace);
@@ -263,25 +257,19 @@ void ggn_series_set_pace(const struct ggn_series_set *set, struct ggn_policy *p)
     memcpy(p->level, set->level, sizeof p->level);
 }
 
-static int check_training(const struct ggn_dataset *data, const char *dir, struct base_err *err)
-{
-    for (int i = 0; i < data->n; i++)
-        if (data->views[i].split == GGN_SPLIT_TRAIN)
-            return 0;
-    return base_fail(err, BASE_EINVAL,
-                     "%s: no scene is left to train on: all are for validation, for test or not in the split", dir);
-}
-
 int ggn_series_set_load(struct ggn_series_set *set, const struct ggn_series_set_options *o, struct base_err *err)
 {
     struct ggn_series_set made = {.noise_maps = o->measures && o->noise_maps, .keep_recorded = o->keep_recorded};
-    int rc = ggn_dataset_open(o->dir, &made.data, err);
+    int rc = ggn_dataset_open(o->dir, &made.data, err), training = 0;
 
     if (rc)
         return rc;
     rc = ggn_split_choose(&made.data, &o->split, &made.split_source, err);
-    if (!rc && !o->with_test)
-        rc = check_training(&made.data, o->dir, err);
+    for (int i = 0; i < made.data.n; i++)
+        training += made.data.views[i].split == GGN_SPLIT_TRAIN;
+    if (!rc && !training && !o->with_test)
+        rc = base_fail(err, BASE_EINVAL,
+                       "%s: no scene is left to train on: all are for validation, for test or not in the split", o->dir);
     for (int i = 0; !rc && i < made.data.n; i++) {
         const struct ggn_dataset_view *v = &made.data.views[i];
         int apart = v->split == GGN_SPLIT_TEST || v->split == GGN_SPLIT_PEOPLE;

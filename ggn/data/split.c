@@ -70,14 +70,6 @@ enum ggn_split ggn_split_learned(const cJSON *learned, const char *scene)
     return GGN_SPLIT_NONE;
 }
 
-static int tells_split(const struct ggn_split_options *o)
-{
-    for (int i = 0; i < o->n_learned; i++)
-        if (cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(o->learned[i], ggn_split_names[GGN_SPLIT_TRAIN])) > 0)
-            return 1;
-    return 0;
-}
-
 /* The side nearest to training of all models. */
 static enum ggn_split by_models(const struct ggn_split_options *o, const char *scene)
 {
@@ -97,7 +89,10 @@ static enum ggn_split_source source_of(const struct ggn_dataset *data, const str
     for (int i = 0; i < data->n; i++)
         if (data->views[i].split != GGN_SPLIT_NONE)
             return GGN_SPLIT_BY_DATA;
-    return tells_split(o) ? GGN_SPLIT_BY_MODELS : GGN_SPLIT_BY_FIFTHS;
+    for (int i = 0; i < o->n_learned; i++)
+        if (cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(o->learned[i], ggn_split_names[GGN_SPLIT_TRAIN])) > 0)
+            return GGN_SPLIT_BY_MODELS;
+    return GGN_SPLIT_BY_FIFTHS;
 }
 
 int ggn_split_choose(struct ggn_dataset *data, const struct ggn_split_options *o, enum ggn_split_source *source,
