@@ -166,20 +166,14 @@ static int load(struct replay *r, struct base_err *err)
     eo.window = eo.window > 0 ? eo.window : USUAL_WINDOW;
     if (!rc)
         rc = ggn_eval_set_load(&r->set, &eo, r->threads, &r->skipped, err);
-    if (!rc)
-        warn_of_learned(r);
-    return rc;
-}
-
-/* Where a view had a part in the fit, the observer is the one without it. */
-static int find_observers(struct replay *r, struct base_err *err)
-{
+    if (rc)
+        return rc;
+    warn_of_learned(r);
     const struct ggn_dataset *d = &r->set.images.data;
-    int rc = 0;
     r->observers = malloc((size_t)d->n * sizeof *r->observers);
     if (!r->observers)
         return base_fail_nomem(err, "observers");
-    for (int i = 0; i < d->n && !rc; i++) {
+    for (int i = 0; i < d->n && !rc; i++) { /* where a view had a part in the fit, the observer is the one without it */
         r->observers[i] = ggn_observer_default;
         if (r->o->observer)
             rc = ggn_observer_read(r->o->observer, d->views[i].name, &r->observers[i], err);
@@ -348,8 +342,6 @@ int ggn_cmd_replay(int argc, char **argv, struct base_err *err)
     int rc = base_options_parse(&options, argc, argv, &o, err);
     if (!rc)
         rc = load(&r, err);
-    if (!rc)
-        rc = find_observers(&r, err);
     if (!rc)
         rc = print(&r, err);
     free(r.observers);

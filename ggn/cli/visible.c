@@ -81,19 +81,6 @@ static void frame(uint8_t *rgb, int stride, const struct ggn_remaining *b)
                     rgb[3 * ((size_t)(b->y + y) * (size_t)stride + (size_t)(b->x + x)) + (size_t)c] = 255;
 }
 
-static int write_map(const char *path, const float *map, int width, int height, const struct result *r, struct base_err *err)
-{
-    uint8_t *rgb = ggn_cmd_magma(map, 0.5, (size_t)width * (size_t)height);
-    if (!rgb)
-        return base_fail_nomem(err, path);
-    for (int i = 0; i < r->count; i++)
-        if (r->blocks[i].error > 1.0)
-            frame(rgb, width, r->blocks + i);
-    int rc = pic_write_png(path, width, height, 3, rgb, err);
-    free(rgb);
-    return rc;
-}
-
 static int run(const struct options *o, const struct pic_image images[4], struct base_err *err)
 {
     int width = images[1].width, height = images[1].height, count = ggn_remaining_count(width, height, o->block);
@@ -110,8 +97,14 @@ static int run(const struct options *o, const struct pic_image images[4], struct
     if (!rc)
         rc = ggn_remaining(&observer, references, &images[1], o->block, blocks, map, err);
     struct result result = {blocks, count, &observer};
-    if (!rc && map)
-        rc = write_map(o->map_path, map, width, height, &result, err);
+    if (!rc && map) {
+        uint8_t *rgb = ggn_cmd_magma(map, 0.5, (size_t)width * (size_t)height);
+        for (int i = 0; rgb && i < count; i++)
+            if (blocks[i].error > 1.0)
+                frame(rgb, width, blocks + i);
+        rc = rgb ? pic_write_png(o->map_path, width, height, 3, rgb, err) : base_fail_nomem(err, o->map_path);
+        free(rgb);
+    }
     if (!rc)
         (o->json ? print_json : print_text)(&result);
     free(map);

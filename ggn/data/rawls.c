@@ -22,21 +22,6 @@ static const char *find_data(const char *p, const char *end)
     return NULL;
 }
 
-static int read_rows(const char *path, const char *p, uint32_t width, uint32_t height, uint32_t channels, float *out,
-                     struct base_err *err)
-{
-    for (uint32_t y = 0; y < height; y++, p++)
-        for (uint32_t x = 0; x < width; x++) {
-            for (uint32_t c = 0; c < 3; c++) {
-                *out = base_f32_of_bits(base_get_u32((const uint8_t *)(p + 4 * (channels == 3 ? c : 0))));
-                if (!isfinite(*out++))
-                    return base_fail(err, BASE_EINVAL, "%s: pixel %u,%u is not finite", path, x, y);
-            }
-            p += 4 * channels;
-        }
-    return 0;
-}
-
 int ggn_rawls_parse(const char *path, const char *data, size_t size, struct pic_image *image, struct base_err *err)
 {
     static const char head[] = "IHDR\n12\n", comments[] = "\nCOMMENTS\n";
@@ -56,11 +41,17 @@ int ggn_rawls_parse(const char *path, const char *data, size_t size, struct pic_
     float *out = malloc((size_t)width * height * 3 * sizeof *out);
     if (!out)
         return base_fail_nomem(err, path);
-    int rc = read_rows(path, p + 1, width, height, channels, out, err);
-    if (rc) {
-        free(out);
-        return rc;
-    }
+    float *to = out;
+    p++;
+    for (uint32_t y = 0; y < height; y++, p++)
+        for (uint32_t x = 0; x < width; x++, p += 4 * channels)
+            for (uint32_t c = 0; c < 3; c++) {
+                *to = base_f32_of_bits(base_get_u32((const uint8_t *)(p + 4 * (channels == 3 ? c : 0))));
+                if (!isfinite(*to++)) {
+                    free(out);
+                    return base_fail(err, BASE_EINVAL, "%s: pixel %u,%u is not finite", path, x, y);
+                }
+            }
     *image = (struct pic_image){.width = (int)width, .height = (int)height, .channels = 3, .is_float_file = 1, .f32 = out};
     return 0;
 }

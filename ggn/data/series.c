@@ -123,22 +123,6 @@ struct halves {
     float *mean, *d;
 };
 
-/* From the level's own halves: what the criterion sees there. */
-static int recorded_measure(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const struct seq_block *b,
-                            const struct seq_record *r, const struct halves *h, struct base_err *err)
-{
-    c->has_noise_map[k] = 0;
-    if (!set->meter.memory)
-        return 0;
-    c->measure[k] = (struct ggn_measure){.visible = (double)NAN};
-    if (!seq_has_halves(r))
-        return 0;
-    int rc = seq_halves(b, r, h->mean, h->d, err);
-    if (!rc)
-        ggn_series_measure(set, c, k, h->mean, h->d, seq_half_scale(r->spp, r->half_spp), 0);
-    return rc;
-}
-
 static int fill_levels(const struct ggn_series_set *set, struct ggn_level_series *c, const struct seq_block *b, double ratio,
                        const struct halves *h, struct base_err *err)
 {
@@ -150,11 +134,18 @@ static int fill_levels(const struct ggn_series_set *set, struct ggn_level_series
         if (ratio > 1 && c->n_levels && r->spp < wanted - 0.5)
             continue;
         wanted = 0.999 * ratio * r->spp; /* recorded levels are rounded to whole samples */
-        c->spp[c->n_levels] = r->spp;
-        rc = seq_display_planar(b, r, c->noisy + (size_t)c->n_levels * ggn_series_set_values(set), err);
+        const int k = c->n_levels++;
+        c->spp[k] = r->spp;
+        c->has_noise_map[k] = 0;
+        rc = seq_display_planar(b, r, c->noisy + (size_t)k * ggn_series_set_values(set), err);
+        if (rc || !set->meter.memory)
+            continue;
+        c->measure[k] = (struct ggn_measure){.visible = (double)NAN};
+        if (!seq_has_halves(r))
+            continue;
+        rc = seq_halves(b, r, h->mean, h->d, err); /* its own: what the criterion sees there */
         if (!rc)
-            rc = recorded_measure(set, c, c->n_levels, b, r, h, err);
-        c->n_levels++;
+            ggn_series_measure(set, c, k, h->mean, h->d, seq_half_scale(r->spp, r->half_spp), 0);
     }
     return rc;
 }

@@ -168,30 +168,23 @@ static int name_view(struct ggn_shown *s, int index, const char *folder, struct 
     return 0;
 }
 
-/* The folder of a view's pictures. A view must not be one of those that are made. */
-static int make_folder(const struct ggn_shown_request *q, const struct ggn_shown_source *source, int index,
-                       struct base_err *err)
-{
-    char path[4096], folder[32];
-    int rc = base_file_join(path, source->folder, "reference.png", err);
-    if (!rc && base_file_is_inside(path, q->dir))
-        rc = base_fail(err, BASE_EINVAL, "%s: lies among the pictures that the study shows", path);
-    snprintf(folder, sizeof folder, "v%d", index);
-    if (!rc)
-        rc = base_file_join(path, q->dir, folder, err);
-    return !rc ? base_make_folder(path, NULL, err) : rc;
-}
-
 static int make_view(const struct ggn_shown_request *q, const char *text, int index, struct ggn_shown *s,
                      struct base_threads *threads, struct base_err *err)
 {
-    char manifest[4096];
+    char path[4096], manifest[4096], folder[32];
     struct ggn_shown_source source;
     int rc = parse_source(text, &source, err);
     if (!rc)
         rc = name_view(s, index, source.folder, err);
     if (!rc)
-        rc = make_folder(q, &source, index, err);
+        rc = base_file_join(path, source.folder, "reference.png", err);
+    if (!rc && base_file_is_inside(path, q->dir))
+        rc = base_fail(err, BASE_EINVAL, "%s: lies among the pictures that the study shows", path);
+    snprintf(folder, sizeof folder, "v%d", index);
+    if (!rc)
+        rc = base_file_join(path, q->dir, folder, err);
+    if (!rc)
+        rc = base_make_folder(path, NULL, err);
     if (!rc)
         rc = base_file_join(manifest, source.folder, "manifest.json", err);
     if (rc)

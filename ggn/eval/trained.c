@@ -84,19 +84,6 @@ static uint16_t *denoised(struct viewer *v, int level, const int *window)
     return out;
 }
 
-/* The scalars of a window for a residual model. */
-static void fill_scalars(const struct viewer *v, const int *levels, float scalars[GGN_SCALARS])
-{
-    struct ggn_measure window[GGN_WINDOW_MAX];
-    double spp[GGN_WINDOW_MAX];
-
-    for (int i = 0; i < v->window; i++) {
-        window[i] = v->series->measure[levels[i]];
-        spp[i] = v->series->spp[levels[i]];
-    }
-    ggn_measure_scalars(window, spp, v->window, v->law[levels[v->window - 1]], scalars);
-}
-
 /* Of the window of these levels, noisiest first. */
 static double window_logit(void *data, const int *levels)
 {
@@ -104,17 +91,22 @@ static double window_logit(void *data, const int *levels)
     const size_t values = ggn_series_set_values(v->set);
     const uint8_t *noisy[GGN_WINDOW_MAX];
     const uint16_t *clean[GGN_WINDOW_MAX];
+    struct ggn_measure measures[GGN_WINDOW_MAX];
+    double spp[GGN_WINDOW_MAX];
     float scalars[GGN_SCALARS] = {0};
 
     for (int i = 0; i < v->window; i++) {
         noisy[i] = v->series->noisy + values * (size_t)levels[i];
         clean[i] = denoised(v, levels[i], levels);
+        if (v->law)
+            measures[i] = v->series->measure[levels[i]];
+        spp[i] = v->series->spp[levels[i]];
     }
     const int last = levels[v->window - 1];
     const uint8_t *noise_map =
         v->noise_maps && v->series->has_noise_map[last] ? v->series->noise_map + values / 3 * (size_t)last : NULL;
     if (v->law)
-        fill_scalars(v, levels, scalars);
+        ggn_measure_scalars(measures, spp, v->window, v->law[last], scalars);
     return (v->precision == GGN_PRECISION_F64 ? ggn_inference_logit_f64 : ggn_inference_logit)(
         v->inference, noisy, clean, noise_map, scalars, v->set->width, v->set->height);
 }

@@ -53,18 +53,6 @@ static int fit(const struct evidence *e, int skip, struct ggn_observer *o, struc
     return 0;
 }
 
-/* answers: [n] gets what the observer says itself. */
-static void predict(const struct evidence *e, int view, const struct ggn_observer *o, struct ggn_calibration_block *blocks,
-                    double *answers)
-{
-    for (int i = 0; i < e->n; i++)
-        if (blocks[i].view == view) {
-            int censored;
-            answers[i] = ggn_curve_threshold(&e->curves[i], o->level, &censored);
-            blocks[i].predicted = ggn_observer_to_study(answers[i]);
-        }
-}
-
 /* Half the way from the 16th to the 84th percentile of log2(answer / threshold) in samples of the observer, of the blocks
  * whose threshold is known. answers is overwritten. */
 static double spread_of(const struct evidence *e, double *answers)
@@ -111,10 +99,11 @@ static int leave_each_out(struct evidence *e, const struct ggn_calibration_input
         if (rc)
             break;
         *row = (struct ggn_calibration_row){.name = inputs[v].view->name, .level = o.level};
-        predict(e, v, &o, c->blocks, e->answers);
-        int to = from;
-        while (to < e->n && e->blocks[to].view == v)
-            to++;
+        int to = from, censored;
+        for (; to < e->n && e->blocks[to].view == v; to++) {
+            e->answers[to] = ggn_curve_threshold(&e->curves[to], o.level, &censored);
+            c->blocks[to].predicted = ggn_observer_to_study(e->answers[to]);
+        }
         rc = summarise(e, from, to, row, err);
         from = to;
     }
