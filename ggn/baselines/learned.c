@@ -154,14 +154,6 @@ static int calibrate(const struct work *w, enum ggn_split split, struct base_err
     return rc;
 }
 
-/* The first window of the LSTM begins at the first level; an SVM answers from where that window ends. */
-static void set_cadence(struct ggn_baseline *b, const struct ggn_eval_set *s)
-{
-    ggn_series_set_pace(&s->images, &b->policy);
-    for (int k = b->window; k < s->window; k++)
-        b->policy.first_spp = ggn_policy_next(&b->policy, b->policy.first_spp);
-}
-
 /* All but the threshold, which stays at 0.5. */
 static int train(const struct work *w, enum ggn_split split, int epochs, struct base_err *err)
 {
@@ -179,7 +171,9 @@ static int train(const struct work *w, enum ggn_split split, int epochs, struct 
     if (!rc)
         rc = b->kind == GGN_SVD_ENTROPY ? train_lstm(b, &c, epochs, err) : train_svm(b, &c, w->size, err);
     cases_release(&c);
-    set_cadence(b, w->set);
+    ggn_series_set_pace(&w->set->images, &b->policy);
+    for (int k = b->window; k < w->set->window; k++) /* an SVM answers from where the LSTM's first window ends */
+        b->policy.first_spp = ggn_policy_next(&b->policy, b->policy.first_spp);
     return rc ? rc : calibrate(w, split, err);
 }
 

@@ -53,21 +53,6 @@ static void draw_weights(float *p, size_t n, int inputs, int outputs, uint32_t s
         p[i] = limit * (2.0f * uniform((uint32_t)i, seed) - 1.0f);
 }
 
-/* Forget gates start open (bias 1), as the published code's library has it. */
-static void init_weights(struct ggn_lstm *l, uint32_t seed)
-{
-    float *p = l->owned;
-    memset(p, 0, 4 * l->n * sizeof *p);
-    for (int k = 0; k < LAYERS; k++) {
-        const struct layer *y = &l->layers[k];
-        draw_weights(p + y->w, y->u - y->w, y->in, 4 * y->out, seed + 10 * (uint32_t)k);
-        draw_weights(p + y->u, y->b - y->u, y->out, 4 * y->out, seed + 10 * (uint32_t)k + 1);
-        for (int i = 0; i < y->out; i++)
-            p[y->b + (size_t)(y->out + i)] = 1.0f;
-    }
-    draw_weights(p + l->dense, (size_t)widths[LAYERS - 1], widths[LAYERS - 1], 1, seed + 99);
-}
-
 void ggn_lstm_destroy(struct ggn_lstm *l)
 {
     if (!l)
@@ -161,8 +146,17 @@ struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct ba
     struct ggn_lstm *l = create(inputs, steps, BATCH, NULL, err);
     if (!l)
         return NULL;
+    float *p = l->owned;
     l->seed = seed;
-    init_weights(l, seed);
+    memset(p, 0, 4 * l->n * sizeof *p);
+    for (int k = 0; k < LAYERS; k++) {
+        const struct layer *y = &l->layers[k];
+        draw_weights(p + y->w, y->u - y->w, y->in, 4 * y->out, seed + 10 * (uint32_t)k);
+        draw_weights(p + y->u, y->b - y->u, y->out, 4 * y->out, seed + 10 * (uint32_t)k + 1);
+        for (int i = 0; i < y->out; i++) /* forget gates start open, as the published code's library has it */
+            p[y->b + (size_t)(y->out + i)] = 1.0f;
+    }
+    draw_weights(p + l->dense, (size_t)widths[LAYERS - 1], widths[LAYERS - 1], 1, seed + 99);
     return l;
 }
 

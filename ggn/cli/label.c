@@ -104,24 +104,6 @@ static int human_labels(const struct options *o, const struct ggn_thresholds *t,
 
 /* --- checking labels from halves --- */
 
-/* curves: room for the view's blocks from *count on. */
-static int check_view(const struct ggn_observer *observer, struct base_threads *threads, const struct ggn_dataset_view *v,
-                      double *curves, size_t *count, struct base_err *err)
-{
-    uint32_t n = v->manifest.n_blocks;
-    struct ggn_check *checks = malloc(n * sizeof *checks);
-    int rc = !checks ? base_fail_nomem(err, v->dir) : ggn_view_check(observer, v, threads, checks, err);
-    for (uint32_t i = 0; i < n && !rc; i++) {
-        const struct ggn_check *c = &checks[i];
-        printf("%-24.24s %5u %9.0f%s %9.0f %8.3f %8.3f\n", v->name, c->id, c->recorded, c->beyond ? "+" : " ", c->halves,
-               log2(c->halves / c->recorded), c->curve);
-        if (!isnan(c->curve))
-            curves[(*count)++] = fabs(c->curve);
-    }
-    free(checks);
-    return rc;
-}
-
 static int has_blocks(const struct ggn_dataset_view *v)
 {
     if (v->manifest.n_blocks == 0)
@@ -140,9 +122,21 @@ static int check_labels(const struct ggn_dataset *d, const struct ggn_observer *
     if (!curves)
         return base_fail_nomem(err, "check");
     printf("%-24s %5s %10s %9s %8s %8s\n", "view", "block", "recorded", "halves", "log2", "curve");
-    for (int i = 0; i < d->n && !rc && !base_interrupted; i++)
-        if (has_blocks(&d->views[i]))
-            rc = check_view(observer, threads, &d->views[i], curves, &count, err);
+    for (int i = 0; i < d->n && !rc && !base_interrupted; i++) {
+        const struct ggn_dataset_view *v = &d->views[i];
+        if (!has_blocks(v))
+            continue;
+        struct ggn_check *checks = malloc(v->manifest.n_blocks * sizeof *checks);
+        rc = !checks ? base_fail_nomem(err, v->dir) : ggn_view_check(observer, v, threads, checks, err);
+        for (uint32_t k = 0; k < v->manifest.n_blocks && !rc; k++) {
+            const struct ggn_check *c = &checks[k];
+            printf("%-24.24s %5u %9.0f%s %9.0f %8.3f %8.3f\n", v->name, c->id, c->recorded, c->beyond ? "+" : " ", c->halves,
+                   log2(c->halves / c->recorded), c->curve);
+            if (!isnan(c->curve))
+                curves[count++] = fabs(c->curve);
+        }
+        free(checks);
+    }
     if (!rc && count > 0)
         printf("%zu blocks (+: beyond the last level): |curve| median %.3f, 90th percentile %.3f octaves\n", count,
                ggn_stats_quantile(curves, count, 0.5), ggn_stats_quantile(curves, count, 0.9));

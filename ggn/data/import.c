@@ -333,37 +333,24 @@ static int fill_row(const struct view *v, const struct seq_manifest *m, struct r
     return rc;
 }
 
-static void row_release(struct row *row)
-{
-    for (int c = 0; c < row->columns && row->builders; c++)
-        seq_builder_release(&row->builders[c]);
-    free(row->builders);
-    free(row->display);
-    free(row->mean); /* one allocation of all doubles */
-}
-
-static int row_init(struct row *row, const struct view *v, const struct seq_manifest *m, int index, struct base_err *err)
-{
-    const size_t pixels = (size_t)m->block * m->block;
-    *row = (struct row){.columns = (int)(m->width / m->block), .block = (int)m->block, .y0 = index * (int)m->block};
-    row->builders = calloc((size_t)row->columns, sizeof *row->builders);
-    row->display = malloc(3 * pixels);
-    row->mean = calloc(11 * pixels, sizeof *row->mean);
-    if (!row->builders || !row->display || !row->mean)
-        return base_fail_nomem(err, v->dir);
-    row->first = row->mean + 3 * pixels;
-    row->half = row->first + 3 * pixels;
-    row->none = row->half + 3 * pixels;
-    row->scratch = row->none + pixels;
-    return 0;
-}
-
 static int import_row(const struct view *v, const char *out, struct seq_manifest *m, int index,
                       const struct ggn_import_options *o, struct base_err *err)
 {
-    const uint32_t block = m->block;
-    struct row row;
-    int rc = row_init(&row, v, m, index, err);
+    const uint32_t block = m->block, columns = m->width / block;
+    const size_t pixels = (size_t)block * block;
+    struct row row = {.columns = (int)columns,
+                      .block = (int)block,
+                      .y0 = index * (int)block,
+                      .builders = calloc(columns, sizeof *row.builders),
+                      .display = malloc(3 * pixels),
+                      .mean = calloc(11 * pixels, sizeof *row.mean)};
+    int rc = row.builders && row.display && row.mean ? 0 : base_fail_nomem(err, v->dir);
+    if (!rc) {
+        row.first = row.mean + 3 * pixels;
+        row.half = row.first + 3 * pixels;
+        row.none = row.half + 3 * pixels;
+        row.scratch = row.none + pixels;
+    }
     for (int c = 0; c < row.columns && !rc; c++)
         rc = seq_builder_init(&row.builders[c], block, block, c * (int)block, row.y0, (uint32_t)(index * row.columns + c), 0,
                               err);
@@ -381,7 +368,11 @@ static int import_row(const struct view *v, const char *out, struct seq_manifest
         b->bytes = row.builders[c].size;
         m->n_blocks += !rc;
     }
-    row_release(&row);
+    for (int c = 0; c < row.columns && row.builders; c++)
+        seq_builder_release(&row.builders[c]);
+    free(row.builders);
+    free(row.display);
+    free(row.mean); /* one allocation of all doubles */
     return rc;
 }
 

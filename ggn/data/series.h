@@ -71,10 +71,10 @@ void ggn_series_set_release(struct ggn_series_set *set);
 int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uint32_t seed, struct base_err *err);
 
 /* Continues recorded series of all splits that end near or before their threshold (all: every labelled one, also where
- * training has no use for it), up to 0.7 of the reference's samples beyond the last level: the reference's samples go on where the recording stopped, their running mean simulated from the
- * half buffers. Where there is no reference but a full level, the whole series is made anew, up to SEQ_SIMULATED_CAP: its
- * mean stands for the converged image. With set->keep_recorded that is a further, synthetic series, and the recorded one
- * stays: its levels have noise of their own. */
+ * training has no use for it), up to 0.7 of the reference's samples beyond the last level: the reference's samples go on
+ * where the recording stopped, their running mean simulated from the half buffers. Where there is no reference but a full
+ * level, the whole series is made anew, up to SEQ_SIMULATED_CAP: its mean stands for the converged image. With
+ * set->keep_recorded that is a further, synthetic series, and the recorded one stays: its levels have noise of their own. */
 int ggn_series_set_extend(struct ggn_series_set *set, int all, uint32_t seed, struct base_err *err);
 
 /* Makes every labelled series that has a full level anew, its levels `ratio` > 1 apart and up to SEQ_SIMULATED_CAP: from

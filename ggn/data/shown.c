@@ -148,21 +148,16 @@ int ggn_shown_write_reference(const struct ggn_shown_request *q, int view, const
 
 /* --- views ------------------------------------------------------------------------------------------------------------ */
 
-static int is_named(const struct ggn_shown *s, int index)
-{
-    for (int i = 0; i < index; i++)
-        if (strcmp(s->views[i].name, s->views[index].name) == 0)
-            return 0;
-    return ggn_shown_plain_name(s->views[index].name);
-}
-
 /* The last part of the folder's path, with the kind behind it. */
 static int name_view(struct ggn_shown *s, int index, const char *folder, struct base_err *err)
 {
     struct ggn_shown_view *view = &s->views[index];
     int n = snprintf(view->name, sizeof view->name, "%s%s%s", base_file_name(folder), view->kind ? "." : "",
                      ggn_shown_kind_names[view->kind]);
-    if (n >= (int)sizeof view->name || !is_named(s, index))
+    int named = n < (int)sizeof view->name && ggn_shown_plain_name(view->name);
+    for (int i = 0; i < index; i++)
+        named = named && strcmp(s->views[i].name, view->name) != 0;
+    if (!named)
         return base_fail(err, BASE_EINVAL,
                          "%s: a view's folder needs a name of its own of letters, digits, '.', '_' and '-'", folder);
     return 0;

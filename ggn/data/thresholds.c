@@ -156,21 +156,15 @@ static int list_json(const char *path, const cJSON *root, struct ggn_thresholds 
     return 0;
 }
 
-/* Where the first pixel lies in its block: blocks are those of the whole picture, of which the file may hold a crop. */
-static void find_corner(const char *path, const struct pic_image *image, int block, int *left, int *top)
-{
-    struct pic_window w;
-    int found = pic_read_header(path, &w, NULL, 0, NULL) == 0 && w.x1 - w.x0 == image->width && w.y1 - w.y0 == image->height;
-    *left = found ? w.x0 % block : 0;
-    *top = found ? w.y0 % block : 0;
-}
-
 /* One value per block: the largest in the block (a block is one value; the largest forgives borders that are filtered). */
 static int list_stop_map(const char *path, const struct pic_image *image, int block, struct ggn_thresholds *t,
                          struct base_err *err)
 {
-    int left, top;
-    find_corner(path, image, block, &left, &top);
+    /* Blocks are those of the whole picture, of which the file may hold a crop. */
+    struct pic_window w;
+    const int found =
+        pic_read_header(path, &w, NULL, 0, NULL) == 0 && w.x1 - w.x0 == image->width && w.y1 - w.y0 == image->height;
+    const int left = found ? w.x0 % block : 0, top = found ? w.y0 % block : 0; /* of the first pixel in its block */
     long columns = (left + image->width + block - 1L) / block, rows = (top + image->height + block - 1L) / block;
     if (columns * rows > GGN_VIEW_BLOCKS)
         return base_fail(err, BASE_EINVAL, "%s: %ld blocks of %d pixels", path, columns * rows, block);

@@ -14,21 +14,6 @@ void ggn_windows_release(struct ggn_windows *w)
     *w = (struct ggn_windows){0};
 }
 
-/* Whether the window that ends at `last` has a label, and which. */
-static int label_window(const struct ggn_level_series *c, int series, int last, const struct ggn_window_options *o,
-                        struct ggn_window *out)
-{
-    double spp = c->spp[o->label_first ? last - o->length + 1 : last];
-    int noisy = c->has_label ? ggn_label_noisy(&c->label, spp) : -1;
-
-    if (noisy < 0)
-        return 0;
-    *out = (struct ggn_window){.series = series, .last = last, .noisy = noisy, .octave = log2(spp / c->label.threshold)};
-    double p = o->soft && c->spread > 0 ? ggn_label_p_noisy(&c->label, spp, c->spread) : (double)NAN;
-    out->label = p >= 0 && p <= 1 ? p : noisy;
-    return 1;
-}
-
 int ggn_windows_create(struct ggn_windows *w, const struct ggn_series_set *set, const struct ggn_window_options *o,
                        struct base_err *err)
 {
@@ -48,8 +33,18 @@ int ggn_windows_create(struct ggn_windows *w, const struct ggn_series_set *set, 
         w->first[i] = w->n;
         if (c->split != o->split || (c->synthetic && !o->synthetic))
             continue;
-        for (int last = o->length - 1; last < c->n_levels; last++)
-            w->n += label_window(c, i, last, o, &w->list[w->n]);
+        for (int last = o->length - 1; last < c->n_levels; last++) {
+            const double spp = c->spp[o->label_first ? last - o->length + 1 : last];
+            const int noisy = c->has_label ? ggn_label_noisy(&c->label, spp) : -1;
+            if (noisy < 0) /* not labelled */
+                continue;
+            const double p = o->soft && c->spread > 0 ? ggn_label_p_noisy(&c->label, spp, c->spread) : (double)NAN;
+            w->list[w->n++] = (struct ggn_window){.series = i,
+                                                  .last = last,
+                                                  .label = p >= 0 && p <= 1 ? p : noisy,
+                                                  .noisy = noisy,
+                                                  .octave = log2(spp / c->label.threshold)};
+        }
     }
     w->first[set->n] = w->n;
     return 0;

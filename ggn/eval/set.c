@@ -194,7 +194,7 @@ static const struct seq_record *earlier_look(const struct seq_block *p, uint32_t
     return 2 * p->levels[from].spp <= p->levels[k].spp ? &p->levels[from] : NULL;
 }
 
-/* Of each recorded level what the observer sees from its own halves, and how many times that without them; NaN: no telling. */
+/* Of each recorded level what the observer sees from its own halves, and how many times that without them; NaN: unknown. */
 static int see_levels(const struct seq_block *p, double *halves, double *ratio, struct base_err *err)
 {
     int rc = 0;

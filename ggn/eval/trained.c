@@ -111,33 +111,23 @@ static double window_logit(void *data, const int *levels)
         v->inference, noisy, clean, noise_map, scalars, v->set->width, v->set->height);
 }
 
-/* log2 of the law's error: at cases as the set says, at the levels before them as they were measured. [n_levels] */
-static void list_law(const struct run *r, const struct ggn_eval_block *b, double *law)
-{
-    const struct ggn_level_series *c = &r->set->images.series[b->series];
-    const size_t pixels = (size_t)r->set->images.width * (size_t)r->set->images.height;
-    const int skipped = r->set->window - 1;
-
-    for (int i = 0; i < c->n_levels; i++) {
-        double seen = i < skipped ? c->measure[i].visible : r->set->law[b->first + (size_t)(i - skipped)];
-        law[i] = ggn_measure_octaves(ggn_observer_error(&r->observers[b->view], seen, pixels));
-    }
-}
-
 static int judge_block(void *data, long index, int worker, struct base_err *err)
 {
     const struct run *r = data;
     const struct ggn_eval_block *b = &r->set->blocks[index];
     const struct ggn_level_series *c = &r->set->images.series[b->series];
     const int skipped = r->set->window - 1, by_law = r->rule.reach > 0;
-    const size_t levels = (size_t)c->n_levels;
+    const size_t levels = (size_t)c->n_levels, pixels = ggn_series_set_values(&r->set->images) / 3;
     struct viewer *viewer = &r->viewers[worker];
     struct ggn_seen *seen = malloc(levels * sizeof *seen);
     double *law = by_law ? malloc(levels * sizeof *law) : NULL;
     int rc = !seen || (by_law && !law) ? base_fail_nomem(err, r->method->name) : 0;
 
-    if (!rc && by_law)
-        list_law(r, b, law);
+    /* log2 of the law's error: at cases as the set says, at the levels before them as they were measured */
+    for (int i = 0; i < c->n_levels && !rc && by_law; i++) {
+        double visible = i < skipped ? c->measure[i].visible : r->set->law[b->first + (size_t)(i - skipped)];
+        law[i] = ggn_measure_octaves(ggn_observer_error(&r->observers[b->view], visible, pixels));
+    }
     if (!rc) {
         viewer->series = c;
         viewer->law = law;

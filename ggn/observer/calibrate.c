@@ -15,20 +15,15 @@ struct evidence {
     int n;
 };
 
-/* In samples of the study. */
-static double prediction(const struct evidence *e, int i, double level)
-{
-    int censored;
-    return ggn_observer_to_study(ggn_curve_threshold(&e->curves[i], level, &censored));
-}
-
 /* Sum of |log2(predicted / human)| over the blocks of all views but `skip`. */
 static double misfit(const struct evidence *e, int skip, double level)
 {
     double sum = 0.0;
+    int censored;
     for (int i = 0; i < e->n; i++)
         if (e->blocks[i].view != skip)
-            sum += fabs(log2(prediction(e, i, level) / e->blocks[i].human));
+            sum +=
+                fabs(log2(ggn_observer_to_study(ggn_curve_threshold(&e->curves[i], level, &censored)) / e->blocks[i].human));
     return sum;
 }
 

@@ -231,14 +231,6 @@ static void feature_difference(float *const y[2], const struct filters *f, float
         difference[i] = (float)sqrt((double)difference[i] / sqrt(2.0));
 }
 
-static double largest_difference(void)
-{
-    double lab[2][3];
-    rgb_to_hunt_lab((const double[3]){0.0, 1.0, 0.0}, lab[0]);
-    rgb_to_hunt_lab((const double[3]){0.0, 0.0, 1.0}, lab[1]);
-    return hyab_power(lab[0], lab[1]);
-}
-
 int ggn_flip(const uint8_t *reference, const uint8_t *test, int width, int height, double pixels_per_degree, float *map,
              struct ggn_flip_stats *stats, struct base_err *err)
 {
@@ -268,8 +260,11 @@ int ggn_flip(const uint8_t *reference, const uint8_t *test, int width, int heigh
         perceive(&csf, lab[k], scratch[0], scratch[1], width, height);
     }
     feature_difference(light, &features, scratch, width, height, feature);
+    double green[3], blue[3], sum = 0.0, max = 0.0;
+    rgb_to_hunt_lab((const double[3]){0.0, 1.0, 0.0}, green);
+    rgb_to_hunt_lab((const double[3]){0.0, 0.0, 1.0}, blue);
+    const double e_max = hyab_power(green, blue); /* the largest difference */
     /* An edge or point that appears or vanishes is seen where its colour alone is not: hence the power below 1. */
-    double e_max = largest_difference(), sum = 0.0, max = 0.0;
     for (size_t i = 0; i < n; i++) {
         double a[3] = {(double)lab[0][0][i], (double)lab[0][1][i], (double)lab[0][2][i]};
         double b[3] = {(double)lab[1][0][i], (double)lab[1][1][i], (double)lab[1][2][i]};
