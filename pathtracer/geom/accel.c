@@ -11,9 +11,7 @@
 struct pt_accel {
     RTCDevice device;
     RTCScene world;
-    RTCScene *objects;      /* [object_count], owns */
-    RTCGeometry *instances; /* [instance_count], borrows from `world` */
-    int32_t object_count;
+    RTCScene *objects; /* [object_count of the scene], owns */
     enum RTCSceneFlags flags;
     int packet; /* rays that go together: the processor's own width, 1 = one by one */
     atomic_llong bytes;
@@ -53,17 +51,13 @@ struct left_out {
     } of[PT_PASSED];
 };
 
-static int is_left_out(const struct left_out *list, uint32_t i, unsigned geometry, unsigned primitive, unsigned instance)
+/* The crossings of a quadric, a bit each; of a triangle bit 0. */
+static unsigned crossings_left_out(const void *context, unsigned geometry, unsigned primitive, unsigned instance)
 {
-    return list->of[i].geometry == geometry && list->of[i].primitive == primitive && list->of[i].instance == instance;
-}
-
-/* The crossings of a quadric, a bit each. */
-static unsigned crossings_left_out(const struct left_out *list, unsigned geometry, unsigned primitive, unsigned instance)
-{
+    const struct left_out *list = ((const struct pt_embree_context *)context)->left_out;
     unsigned crossings = 0;
     for (uint32_t i = 0; list && i < list->count; i++)
-        if (is_left_out(list, i, geometry, primitive, instance))
+        if (list->of[i].geometry == geometry && list->of[i].primitive == primitive && list->of[i].instance == instance)
             crossings |= 1u << list->of[i].crossing;
     return crossings;
 }
@@ -71,40 +65,47 @@ static unsigned crossings_left_out(const struct left_out *list, unsigned geometr
 /* Triangles. */
 static void leave_out(const struct RTCFilterFunctionNArguments *args)
 {
-    const struct left_out *list = ((const struct pt_embree_context *)args->context)->left_out;
     const struct RTCHit *hit = (const struct RTCHit *)args->hit; /* of one ray */
-    for (uint32_t i = 0; i < list->count; i++)
-        if (is_left_out(list, i, hit->geomID, hit->primID, hit->instID[0]))
-            args->valid[0] = 0;
+    if (crossings_left_out(args->context, hit->geomID, hit->primID, hit->instID[0]))
+        args->valid[0] = 0;
+}
+
+/* Vector `field` (its first component) of ray i of n. */
+static inline pt_vec3 get_vector(const union lane *lanes, int field, int n, int i)
+{
+    return v3(lanes[field * n + i].f, lanes[(field + 1) * n + i].f, lanes[(field + 2) * n + i].f);
+}
+
+static inline void put_vector(pt_vec3 v, union lane *lanes, int field, int n, int i)
+{
+    lanes[field * n + i].f = v.x;
+    lanes[(field + 1) * n + i].f = v.y;
+    lanes[(field + 2) * n + i].f = v.z;
 }
 
 /* Ray i of n; as pt_quadric_intersect. */
-static int quadric_query(const struct pt_quadric *q, const union lane *rays, unsigned n, unsigned i, unsigned left_out,
-                         float *t, pt_vec3 *p_quadric)
+static int quadric_query(const struct pt_quadric *q, const union lane *rays, int n, int i, unsigned left_out, float *t,
+                         pt_vec3 *p_quadric)
 {
-    return pt_quadric_intersect(q, v3(rays[ORG_X * n + i].f, rays[ORG_Y * n + i].f, rays[ORG_Z * n + i].f),
-                                v3(rays[DIR_X * n + i].f, rays[DIR_Y * n + i].f, rays[DIR_Z * n + i].f),
-                                rays[TNEAR * n + i].f, rays[TFAR * n + i].f, left_out, t, p_quadric);
+    return pt_quadric_intersect(q, get_vector(rays, ORG_X, n, i), get_vector(rays, DIR_X, n, i), rays[TNEAR * n + i].f,
+                                rays[TFAR * n + i].f, left_out, t, p_quadric);
 }
 
 static void quadric_intersect(const struct RTCIntersectFunctionNArguments *args)
 {
-    unsigned n = args->N;
+    int n = (int)args->N;
     union lane *lanes = (union lane *)args->rayhit;
-    const unsigned left_out = crossings_left_out(((const struct pt_embree_context *)args->context)->left_out, args->geomID,
-                                                 args->primID, args->context->instID[0]);
+    const unsigned left_out = crossings_left_out(args->context, args->geomID, args->primID, args->context->instID[0]);
     float t;
     pt_vec3 p;
-    for (unsigned i = 0; i < n; i++) {
+    for (int i = 0; i < n; i++) {
         int crossing = args->valid[i] ? quadric_query(args->geometryUserPtr, lanes, n, i, left_out, &t, &p) : 0;
         if (!crossing)
             continue;
         lanes[TFAR * n + i].f = t;
         lanes[HIT_U * n + i].f = (float)(crossing - 1);
         lanes[HIT_V * n + i].f = 0.0f;
-        lanes[NG_X * n + i].f = p.x;
-        lanes[NG_Y * n + i].f = p.y;
-        lanes[NG_Z * n + i].f = p.z;
+        put_vector(p, lanes, NG_X, n, i);
         lanes[GEOM_ID * n + i].u = args->geomID;
         lanes[PRIM_ID * n + i].u = args->primID;
         lanes[INST_ID * n + i].u = args->context->instID[0];
@@ -113,11 +114,11 @@ static void quadric_intersect(const struct RTCIntersectFunctionNArguments *args)
 
 static void quadric_occluded(const struct RTCOccludedFunctionNArguments *args)
 {
-    unsigned n = args->N;
+    int n = (int)args->N;
     union lane *lanes = (union lane *)args->ray;
     float t;
     pt_vec3 p;
-    for (unsigned i = 0; i < n; i++)
+    for (int i = 0; i < n; i++)
         if (args->valid[i] && quadric_query(args->geometryUserPtr, lanes, n, i, 0, &t, &p))
             lanes[TFAR * n + i].f = -INFINITY;
 }
@@ -248,26 +249,22 @@ static int build_instances(struct pt_scene *scene, struct pt_accel *accel)
             return 0;
         rtcSetGeometryInstancedScene(g, accel->objects[scene->instances[i].object]);
         set_transforms(g, &scene->instances[i]);
-        accel->instances[i] = g;
         if (!attach(accel->world, g, (unsigned)(scene->world_shape_count + i)))
             return 0;
     }
     return 1;
 }
 
-static void destroy(struct pt_accel *accel)
+static void destroy(const struct pt_scene *scene, struct pt_accel *accel)
 {
-    if (!accel)
-        return;
     if (accel->world)
         rtcReleaseScene(accel->world);
-    for (int32_t i = 0; i < accel->object_count; i++)
-        if (accel->objects && accel->objects[i])
+    for (int32_t i = 0; accel->objects && i < scene->object_count; i++)
+        if (accel->objects[i])
             rtcReleaseScene(accel->objects[i]);
     if (accel->device)
         rtcReleaseDevice(accel->device);
     free(accel->objects);
-    free(accel->instances);
     free(accel);
 }
 
@@ -283,10 +280,7 @@ static int native_packet(RTCDevice device)
 
 static int build(struct pt_scene *scene, struct pt_accel *accel)
 {
-    accel->object_count = scene->object_count;
     if (scene->object_count && !(accel->objects = calloc((size_t)scene->object_count, sizeof *accel->objects)))
-        return 0;
-    if (scene->instance_count && !(accel->instances = calloc((size_t)scene->instance_count, sizeof *accel->instances)))
         return 0;
     accel->device = rtcNewDevice(NULL);
     if (!accel->device)
@@ -318,7 +312,7 @@ int pt_accel_build(struct pt_scene *scene, struct base_err *err)
     pt_terminate_begin(what);
     int built = build(scene, accel);
     if (!built)
-        destroy(accel); /* Embree may lack memory for that, too */
+        destroy(scene, accel); /* Embree may lack memory for that, too */
     pt_terminate_end();
     if (!built)
         return base_fail_nomem(err, what);
@@ -336,29 +330,14 @@ int pt_accel_build(struct pt_scene *scene, struct base_err *err)
 
 void pt_accel_release(struct pt_scene *scene)
 {
-    destroy(scene->accel);
+    if (scene->accel)
+        destroy(scene, scene->accel);
     scene->accel = NULL;
 }
 
 long long pt_accel_bytes(const struct pt_scene *scene) { return scene->accel ? atomic_load(&scene->accel->bytes) : 0; }
 
 /* --- queries ---------------------------------------------------------------------------------------------------------- */
-
-static inline struct RTCRay make_ray(const struct pt_ray *ray)
-{
-    return (struct RTCRay){.org_x = ray->origin.x,
-                           .org_y = ray->origin.y,
-                           .org_z = ray->origin.z,
-                           .tnear = ray->t_min,
-                           .dir_x = ray->direction.x,
-                           .dir_y = ray->direction.y,
-                           .dir_z = ray->direction.z,
-                           .time = ray->time,
-                           .tfar = ray->t_max,
-                           .mask = ~0u,
-                           .id = 0,
-                           .flags = 0};
-}
 
 /* Embree's ids as ours. */
 static inline void name_shape(const struct pt_scene *scene, unsigned geometry, unsigned instance, struct pt_hit *hit)
@@ -374,31 +353,142 @@ static inline void name_shape(const struct pt_scene *scene, unsigned geometry, u
     }
 }
 
-static inline struct RTCRayHit make_query(const struct pt_ray *ray)
+/* Where the number n of lanes is a constant. */
+#define ALWAYS_INLINE static inline __attribute__((always_inline))
+
+struct packet {
+    _Alignas(64) union lane lanes[FIELDS * 16];
+    _Alignas(64) int valid[16];
+};
+
+/* Rays of a list, or, where that is NULL, side by side. */
+struct batch {
+    const struct pt_ray *const *list;
+    const struct pt_ray_lanes *lanes;
+};
+
+ALWAYS_INLINE void put_ray(const struct pt_ray *from, union lane *lanes, int n, int i)
 {
-    struct RTCRayHit rh;
-    rh.ray = make_ray(ray);
-    rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    return rh;
+    put_vector(from->origin, lanes, ORG_X, n, i);
+    put_vector(from->direction, lanes, DIR_X, n, i);
+    lanes[TNEAR * n + i].f = from->t_min;
+    lanes[TIME * n + i].f = from->time;
+    lanes[TFAR * n + i].f = from->t_max;
 }
 
-static inline int take_answer(const struct pt_scene *scene, const struct RTCRayHit *rh, struct pt_hit *hit)
+ALWAYS_INLINE void put_field(const float *from, union lane *lanes, int count, int n)
 {
-    hit->t = rh->ray.tfar;
-    hit->u = rh->hit.u;
-    hit->v = rh->hit.v;
-    hit->primitive = (int32_t)rh->hit.primID;
-    hit->geometric = v3(rh->hit.Ng_x, rh->hit.Ng_y, rh->hit.Ng_z);
-    name_shape(scene, rh->hit.geomID, rh->hit.instID[0], hit);
-    return hit->shape >= 0;
+    for (int i = 0; i < n; i++)
+        lanes[i].f = from[i];
+    for (int i = count; i < n; i++)
+        lanes[i].f = from[0];
+}
+
+ALWAYS_INLINE void put_lanes(const struct pt_ray_lanes *rays, int first, union lane *lanes, int count, int n)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        put_field(rays->origin[axis] + first, &lanes[(ORG_X + axis) * n], count, n);
+        put_field(rays->direction[axis] + first, &lanes[(DIR_X + axis) * n], count, n);
+    }
+    for (int i = 0; i < n; i++) {
+        lanes[TNEAR * n + i].f = rays->t_min;
+        lanes[TIME * n + i].f = 0.0f;
+        lanes[TFAR * n + i].f = rays->t_max;
+    }
+}
+
+/* The rays from `first` on of `count`, as many as go together in n lanes, as a question. Lanes without one hold a ray all
+ * the same. Returns how many there are. */
+ALWAYS_INLINE int packet_fill(struct packet *p, const struct batch *rays, int first, int count, int n)
+{
+    const int filled = count - first < n ? count - first : n;
+    for (int i = 0; rays->list && i < n; i++)
+        put_ray(rays->list[first + (i < filled ? i : 0)], p->lanes, n, i);
+    if (!rays->list)
+        put_lanes(rays->lanes, first, p->lanes, filled, n);
+    for (int i = 0; i < n; i++) {
+        p->valid[i] = i < filled ? -1 : 0;
+        p->lanes[MASK * n + i].u = ~0u;
+        p->lanes[RAY_ID * n + i].u = p->lanes[FLAGS * n + i].u = 0;
+        p->lanes[GEOM_ID * n + i].u = p->lanes[INST_ID * n + i].u = RTC_INVALID_GEOMETRY_ID;
+    }
+    return filled;
+}
+
+/* What ray i of n has met. */
+ALWAYS_INLINE void take_hit(const struct pt_scene *scene, const struct packet *p, int n, int i, struct pt_hit *hit)
+{
+    hit->t = p->lanes[TFAR * n + i].f;
+    hit->u = p->lanes[HIT_U * n + i].f;
+    hit->v = p->lanes[HIT_V * n + i].f;
+    hit->primitive = (int32_t)p->lanes[PRIM_ID * n + i].u;
+    hit->geometric = get_vector(p->lanes, NG_X, n, i);
+    name_shape(scene, p->lanes[GEOM_ID * n + i].u, p->lanes[INST_ID * n + i].u, hit);
+}
+
+/* Asks for the hits of the next rays, or, if those are not wanted, whether there are any. Returns how many rays it asked. */
+ALWAYS_INLINE int ask(const struct pt_scene *scene, const struct batch *rays, int first, int count, int coherent,
+                      struct pt_hit *const *hits, uint8_t *occluded, int n)
+{
+    struct packet p;
+    const int filled = packet_fill(&p, rays, first, count, n);
+    if (hits) {
+        pt_embree_intersect(scene->accel->world, n, p.valid, p.lanes, coherent);
+        for (int i = 0; i < filled; i++)
+            take_hit(scene, &p, n, i, hits[first + i]);
+    } else {
+        pt_embree_occluded(scene->accel->world, n, p.valid, p.lanes);
+        for (int i = 0; i < filled; i++)
+            occluded[first + i] = p.lanes[TFAR * n + i].f < 0.0f;
+    }
+    return filled;
+}
+
+static inline void ask_all(const struct pt_scene *scene, const struct batch *rays, int count, int coherent,
+                           struct pt_hit *const *hits, uint8_t *occluded)
+{
+    for (int i = 0; i < count;)
+        switch (count - i > 1 ? scene->accel->packet : 1) {
+        case 16: i += ask(scene, rays, i, count, coherent, hits, occluded, 16); break;
+        case 8: i += ask(scene, rays, i, count, coherent, hits, occluded, 8); break;
+        case 4: i += ask(scene, rays, i, count, coherent, hits, occluded, 4); break;
+        default: i += ask(scene, rays, i, count, coherent, hits, occluded, 1); break;
+        }
 }
 
 int pt_accel_intersect(const struct pt_scene *scene, const struct pt_ray *ray, struct pt_hit *hit)
 {
-    struct RTCRayHit rh = make_query(ray);
-    pt_embree_intersect1(scene->accel->world, &rh);
-    return take_answer(scene, &rh, hit);
+    ask_all(scene, &(struct batch){.list = &ray}, 1, 0, &hit, NULL);
+    return hit->shape >= 0;
+}
+
+void pt_accel_intersect_many(const struct pt_scene *scene, const struct pt_ray *const *rays, int count, int coherent,
+                             struct pt_hit *const *hits)
+{
+    ask_all(scene, &(struct batch){.list = rays}, count, coherent, hits, NULL);
+}
+
+void pt_accel_intersect_lanes(const struct pt_scene *scene, const struct pt_ray_lanes *rays, int count, int coherent,
+                              struct pt_hit *const *hits)
+{
+    ask_all(scene, &(struct batch){.lanes = rays}, count, coherent, hits, NULL);
+}
+
+int pt_accel_occluded(const struct pt_scene *scene, const struct pt_ray *ray)
+{
+    uint8_t occluded;
+    ask_all(scene, &(struct batch){.list = &ray}, 1, 0, NULL, &occluded);
+    return occluded;
+}
+
+void pt_accel_occluded_many(const struct pt_scene *scene, const struct pt_ray *const *rays, int count, uint8_t *occluded)
+{
+    ask_all(scene, &(struct batch){.list = rays}, count, 0, NULL, occluded);
+}
+
+void pt_accel_occluded_lanes(const struct pt_scene *scene, const struct pt_ray_lanes *rays, int count, uint8_t *occluded)
+{
+    ask_all(scene, &(struct batch){.lanes = rays}, count, 0, NULL, occluded);
 }
 
 /* A ray that goes on begins this share before what it has passed: rounding may put what is at the same place before it. */
@@ -430,186 +520,11 @@ int pt_accel_intersect_behind(const struct pt_scene *scene, const struct pt_ray 
         list.of[i].primitive = (unsigned)of->primitive;
         list.of[i].crossing = scene->shapes[of->shape].kind == PT_SHAPE_QUADRIC && of->u > 0.0f;
     }
-    struct RTCRayHit rh = make_query(ray);
-    pt_embree_intersect1_filtered(scene->accel->world, &rh, leave_out, &list);
-    return take_answer(scene, &rh, hit);
-}
-
-int pt_accel_occluded(const struct pt_scene *scene, const struct pt_ray *ray)
-{
-    struct RTCRay r = make_ray(ray);
-    pt_embree_occluded1(scene->accel->world, &r);
-    return r.tfar < 0.0f;
-}
-
-struct packet {
-    _Alignas(64) union lane lanes[FIELDS * 16];
-    _Alignas(64) int valid[16];
-};
-
-static inline void put_ray(const struct pt_ray *from, union lane *lanes, int n, int i)
-{
-    lanes[ORG_X * n + i].f = from->origin.x;
-    lanes[ORG_Y * n + i].f = from->origin.y;
-    lanes[ORG_Z * n + i].f = from->origin.z;
-    lanes[TNEAR * n + i].f = from->t_min;
-    lanes[DIR_X * n + i].f = from->direction.x;
-    lanes[DIR_Y * n + i].f = from->direction.y;
-    lanes[DIR_Z * n + i].f = from->direction.z;
-    lanes[TIME * n + i].f = from->time;
-    lanes[TFAR * n + i].f = from->t_max;
-    lanes[MASK * n + i].u = ~0u;
-    lanes[RAY_ID * n + i].u = lanes[FLAGS * n + i].u = 0;
-}
-
-/* How many of `count` rays go together next, each in a lane of n. */
-static inline int packet_begin(struct packet *p, int count, int n)
-{
-    count = count < n ? count : n;
-    for (int i = 0; i < n; i++)
-        p->valid[i] = i < count ? -1 : 0;
-    return count;
-}
-
-/* The first rays of a list of `count`, as many as go together. Lanes without one hold a ray all the same. */
-static inline int packet_fill(struct packet *p, const struct pt_ray *const *rays, int count, int n)
-{
-    count = packet_begin(p, count, n);
-    for (int i = 0; i < n; i++)
-        put_ray(rays[i < count ? i : 0], p->lanes, n, i);
-    return count;
-}
-
-static inline void put_field(const float *from, union lane *lanes, int count, int n)
-{
-    for (int i = 0; i < n; i++)
-        lanes[i].f = from[i];
-    for (int i = count; i < n; i++)
-        lanes[i].f = from[0];
-}
-
-/* The same from ray `first` on of those that lie side by side; n is a constant wherever this is inlined. */
-static inline __attribute__((always_inline)) void put_lanes(struct packet *p, const struct pt_ray_lanes *rays, int first,
-                                                            int count, int n)
-{
-    for (int axis = 0; axis < 3; axis++) {
-        put_field(rays->origin[axis] + first, &p->lanes[(ORG_X + axis) * n], count, n);
-        put_field(rays->direction[axis] + first, &p->lanes[(DIR_X + axis) * n], count, n);
-    }
-    for (int i = 0; i < n; i++) {
-        p->lanes[TNEAR * n + i].f = rays->t_min;
-        p->lanes[TIME * n + i].f = 0.0f;
-        p->lanes[TFAR * n + i].f = rays->t_max;
-        p->lanes[MASK * n + i].u = ~0u;
-        p->lanes[RAY_ID * n + i].u = p->lanes[FLAGS * n + i].u = 0;
-    }
-}
-
-static inline int packet_fill_lanes(struct packet *p, const struct pt_ray_lanes *rays, int first, int count, int n)
-{
-    count = packet_begin(p, count - first, n);
-    if (n == 16)
-        put_lanes(p, rays, first, count, 16);
-    else if (n == 8)
-        put_lanes(p, rays, first, count, 8);
-    else
-        put_lanes(p, rays, first, count, 4);
-    return count;
-}
-
-static inline struct pt_ray lane_ray(const struct pt_ray_lanes *rays, int i)
-{
-    return (struct pt_ray){v3(rays->origin[0][i], rays->origin[1][i], rays->origin[2][i]),
-                           v3(rays->direction[0][i], rays->direction[1][i], rays->direction[2][i]), rays->t_min, rays->t_max,
-                           0.0f};
-}
-
-static void packet_intersect(const struct pt_scene *scene, struct packet *p, int n, int coherent)
-{
-    for (int i = 0; i < n; i++)
-        p->lanes[GEOM_ID * n + i].u = p->lanes[INST_ID * n + i].u = RTC_INVALID_GEOMETRY_ID;
-    pt_embree_intersect(scene->accel->world, n, p->valid, p->lanes, coherent);
-}
-
-/* What ray i of n has met. */
-static inline void take_hit(const struct pt_scene *scene, const struct packet *p, int n, int i, struct pt_hit *hit)
-{
-    hit->t = p->lanes[TFAR * n + i].f;
-    hit->u = p->lanes[HIT_U * n + i].f;
-    hit->v = p->lanes[HIT_V * n + i].f;
-    hit->primitive = (int32_t)p->lanes[PRIM_ID * n + i].u;
-    hit->geometric = v3(p->lanes[NG_X * n + i].f, p->lanes[NG_Y * n + i].f, p->lanes[NG_Z * n + i].f);
-    name_shape(scene, p->lanes[GEOM_ID * n + i].u, p->lanes[INST_ID * n + i].u, hit);
-}
-
-void pt_accel_intersect_many(const struct pt_scene *scene, const struct pt_ray *const *rays, int count, int coherent,
-                             struct pt_hit *const *hits)
-{
     struct packet p;
-    int n = scene->accel->packet;
-    while (count > 1 && n > 1) {
-        int filled = packet_fill(&p, rays, count, n);
-        packet_intersect(scene, &p, n, coherent);
-        for (int i = 0; i < filled; i++)
-            take_hit(scene, &p, n, i, hits[i]);
-        count -= filled;
-        rays += filled;
-        hits += filled;
-    }
-    for (int i = 0; i < count; i++)
-        pt_accel_intersect(scene, rays[i], hits[i]);
-}
-
-void pt_accel_intersect_lanes(const struct pt_scene *scene, const struct pt_ray_lanes *rays, int count, int coherent,
-                              struct pt_hit *hits)
-{
-    struct packet p;
-    int n = scene->accel->packet, done = 0;
-    while (count - done > 1 && n > 1) {
-        int filled = packet_fill_lanes(&p, rays, done, count, n);
-        packet_intersect(scene, &p, n, coherent);
-        for (int i = 0; i < filled; i++)
-            take_hit(scene, &p, n, i, &hits[done + i]);
-        done += filled;
-    }
-    for (; done < count; done++) {
-        struct pt_ray ray = lane_ray(rays, done);
-        pt_accel_intersect(scene, &ray, &hits[done]);
-    }
-}
-
-void pt_accel_occluded_many(const struct pt_scene *scene, const struct pt_ray *const *rays, int count, uint8_t *occluded)
-{
-    struct packet p;
-    int n = scene->accel->packet;
-    while (count > 1 && n > 1) {
-        int filled = packet_fill(&p, rays, count, n);
-        pt_embree_occluded(scene->accel->world, n, p.valid, p.lanes);
-        for (int i = 0; i < filled; i++)
-            occluded[i] = p.lanes[TFAR * n + i].f < 0.0f;
-        count -= filled;
-        rays += filled;
-        occluded += filled;
-    }
-    for (int i = 0; i < count; i++)
-        occluded[i] = (uint8_t)pt_accel_occluded(scene, rays[i]);
-}
-
-void pt_accel_occluded_lanes(const struct pt_scene *scene, const struct pt_ray_lanes *rays, int count, uint8_t *occluded)
-{
-    struct packet p;
-    int n = scene->accel->packet, done = 0;
-    while (count - done > 1 && n > 1) {
-        int filled = packet_fill_lanes(&p, rays, done, count, n);
-        pt_embree_occluded(scene->accel->world, n, p.valid, p.lanes);
-        for (int i = 0; i < filled; i++)
-            occluded[done + i] = p.lanes[TFAR * n + i].f < 0.0f;
-        done += filled;
-    }
-    for (; done < count; done++) {
-        struct pt_ray ray = lane_ray(rays, done);
-        occluded[done] = (uint8_t)pt_accel_occluded(scene, &ray);
-    }
+    packet_fill(&p, &(struct batch){.list = &ray}, 0, 1, 1);
+    pt_embree_intersect1_filtered(scene->accel->world, p.lanes, leave_out, &list);
+    take_hit(scene, &p, 1, 0, hit);
+    return hit->shape >= 0;
 }
 
 void pt_accel_instance_transform(const struct pt_scene *scene, int32_t id, float time, struct pt_mat34 *to_render)
@@ -618,5 +533,6 @@ void pt_accel_instance_transform(const struct pt_scene *scene, int32_t id, float
         *to_render = scene->instances[id].to_render[0];
         return;
     }
-    rtcGetGeometryTransform(scene->accel->instances[id], time, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, to_render->m);
+    RTCGeometry g = rtcGetGeometry(scene->accel->world, (unsigned)(scene->world_shape_count + id));
+    rtcGetGeometryTransform(g, time, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, to_render->m);
 }

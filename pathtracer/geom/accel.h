@@ -69,7 +69,7 @@ struct pt_ray_lanes {
 };
 /* As pt_accel_intersect_many and pt_accel_occluded_many with the first `count` of them. */
 void pt_accel_intersect_lanes(const struct pt_scene *scene, const struct pt_ray_lanes *rays, int count, int coherent,
-                              struct pt_hit *hits);
+                              struct pt_hit *const *hits);
 void pt_accel_occluded_lanes(const struct pt_scene *scene, const struct pt_ray_lanes *rays, int count, uint8_t *occluded);
 
 /* Object → render transform of instance `id` at `time`, the one its hits were found with. */

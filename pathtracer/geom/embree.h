@@ -2,7 +2,7 @@
 #define PT_GEOM_EMBREE_H
 /*
  * Embree 3 or 4, for accel.c only: PT_EMBREE, which the Makefile says, is the one that is included, and these functions are
- * what the two are asked differently. Rays are the caller's, one or a packet of n = 4, 8 or 16 in Embree's order, of which
+ * what the two are asked differently. Rays are the caller's, a packet of n = 1, 4, 8 or 16 in Embree's order, of which
  * those take part that are -1 in valid[n]. Any number of threads may ask a committed scene.
  */
 #if PT_EMBREE == 4
@@ -46,26 +46,13 @@ struct pt_embree_context {
 #define PT_EMBREE_FILTER(function) context.embree.filter = (function)
 #endif
 
-static inline void pt_embree_intersect1(RTCScene scene, struct RTCRayHit *ray)
-{
-    PT_EMBREE_ARGUMENTS(Intersect, 0);
-    PT_EMBREE_ASK(rtcIntersect1, ray, scene);
-}
-
-/* `filter` clears *valid of triangles that are not to be hit. */
-static inline void pt_embree_intersect1_filtered(RTCScene scene, struct RTCRayHit *ray, RTCFilterFunctionN filter,
-                                                 const void *left_out)
+/* One ray; `filter` clears *valid of triangles that are not to be hit. */
+static inline void pt_embree_intersect1_filtered(RTCScene scene, void *ray, RTCFilterFunctionN filter, const void *left_out)
 {
     PT_EMBREE_ARGUMENTS(Intersect, 0);
     context.left_out = left_out;
     PT_EMBREE_FILTER(filter);
-    PT_EMBREE_ASK(rtcIntersect1, ray, scene);
-}
-
-static inline void pt_embree_occluded1(RTCScene scene, struct RTCRay *ray)
-{
-    PT_EMBREE_ARGUMENTS(Occluded, 0);
-    PT_EMBREE_ASK(rtcOccluded1, ray, scene);
+    PT_EMBREE_ASK(rtcIntersect1, (struct RTCRayHit *)ray, scene);
 }
 
 /* Neighbours that are `coherent` go the same way through the scene. */
@@ -76,8 +63,10 @@ static inline void pt_embree_intersect(RTCScene scene, int n, const int *valid, 
         PT_EMBREE_ASK(rtcIntersect16, (struct RTCRayHit16 *)rays, valid, scene);
     else if (n == 8)
         PT_EMBREE_ASK(rtcIntersect8, (struct RTCRayHit8 *)rays, valid, scene);
-    else
+    else if (n == 4)
         PT_EMBREE_ASK(rtcIntersect4, (struct RTCRayHit4 *)rays, valid, scene);
+    else
+        PT_EMBREE_ASK(rtcIntersect1, (struct RTCRayHit *)rays, scene);
 }
 
 static inline void pt_embree_occluded(RTCScene scene, int n, const int *valid, void *rays)
@@ -87,7 +76,9 @@ static inline void pt_embree_occluded(RTCScene scene, int n, const int *valid, v
         PT_EMBREE_ASK(rtcOccluded16, (struct RTCRay16 *)rays, valid, scene);
     else if (n == 8)
         PT_EMBREE_ASK(rtcOccluded8, (struct RTCRay8 *)rays, valid, scene);
-    else
+    else if (n == 4)
         PT_EMBREE_ASK(rtcOccluded4, (struct RTCRay4 *)rays, valid, scene);
+    else
+        PT_EMBREE_ASK(rtcOccluded1, (struct RTCRay *)rays, scene);
 }
 #endif

@@ -207,7 +207,7 @@ PT_KERNEL_INLINE void pt_run_sample_lanes(pt_effects fx, const struct pt_scene *
     for (int vertex = 1; n > 0; vertex++) {
         const float t_min = vertex == 1 ? PT_RAY_OFF_START : 0.0f; /* of the camera's rays */
         struct pt_ray_lanes rays = pt_lane_rays(&run.paths.origin, &run.paths.direction, t_min, INFINITY);
-        pt_accel_intersect_lanes(scene, &rays, n, vertex == 1, run.hits);
+        pt_accel_intersect_lanes(scene, &rays, n, vertex == 1, hits);
         pt_fetch_hits(fx, scene, hits, n);
         n = pt_lane_places(fx, &run, n, settings->max_depth >= 0 && vertex > settings->max_depth);
         pt_lanes_best()->numbers(&run.keys, n, (uint32_t)vertex, PT_VERTEX_DIMS(fx), run.u);

@@ -118,7 +118,7 @@ static void start_is_not_met(void **state)
     for (int coherent = 0; coherent < 2; coherent++)
         for (int kind = 0; kind < 2; kind++) {
             if (kind)
-                pt_accel_intersect_lanes(&scene, &lanes, N, coherent, hits);
+                pt_accel_intersect_lanes(&scene, &lanes, N, coherent, found);
             else
                 pt_accel_intersect_many(&scene, list, N, coherent, found);
             for (int i = 0; i < N; i++)
@@ -365,15 +365,16 @@ static void compare_many(const struct pt_scene *scene, int count, int coherent, 
 static void compare_lanes(const struct pt_scene *scene, int count, int coherent, uint32_t *state)
 {
     float d[3][48], o[3][48];
-    struct pt_hit hits[RAYS];
+    struct pt_hit hits[RAYS], *got[RAYS];
     uint8_t occluded[RAYS];
     for (int i = 0; i < count; i++) {
+        got[i] = &hits[i];
         const pt_vec3 to = v3(4.0f * number(state) - 2.0f, 4.0f * number(state) - 2.0f, 9.0f);
         d[0][i] = to.x, d[1][i] = to.y, d[2][i] = to.z;
         o[0][i] = 0.1f, o[1][i] = 0.2f, o[2][i] = -4.0f;
     }
     const struct pt_ray_lanes rays = {{o[0], o[1], o[2]}, {d[0], d[1], d[2]}, 0.0f, 0.5f + number(state)};
-    pt_accel_intersect_lanes(scene, &rays, count, coherent, hits);
+    pt_accel_intersect_lanes(scene, &rays, count, coherent, got);
     pt_accel_occluded_lanes(scene, &rays, count, occluded);
     for (int i = 0; i < count; i++) {
         const struct pt_ray ray = {v3(o[0][i], o[1][i], o[2][i]), v3(d[0][i], d[1][i], d[2][i]), 0.0f, rays.t_max, 0.0f};
