@@ -30,13 +30,12 @@ static inline int pt_layer_bounces(const struct pt_bsdf *b) { return (PT_LAYER_E
 /* Base of the layer as a closure of its own. */
 static inline struct pt_bsdf pt_layer_base(const struct pt_bsdf *b)
 {
-    struct pt_bsdf base = {.kind = b->kind == PT_BSDF_COATED_CONDUCTOR ? PT_BSDF_CONDUCTOR : PT_BSDF_DIFFUSE,
-                           .alpha_x = b->base_alpha_x,
-                           .alpha_y = b->base_alpha_y,
-                           .reflectance = b->reflectance,
-                           .eta_rgb = b->eta_rgb,
-                           .k_rgb = b->k_rgb};
-    return base;
+    return (struct pt_bsdf){.kind = b->kind == PT_BSDF_COATED_CONDUCTOR ? PT_BSDF_CONDUCTOR : PT_BSDF_DIFFUSE,
+                            .alpha_x = b->base_alpha_x,
+                            .alpha_y = b->base_alpha_y,
+                            .reflectance = b->reflectance,
+                            .eta_rgb = b->eta_rgb,
+                            .k_rgb = b->k_rgb};
 }
 
 /* Through the interface, given that it transmits; the 1/etap² of radiance is left to the caller. 0: nothing passes. */
@@ -59,25 +58,6 @@ static inline int pt_layer_transmit(const struct pt_bsdf *b, pt_vec3 wo, float u
         out->weight *= pt_ggx_g2_over_g1(wo, out->wi, b->alpha_x, b->alpha_y);
         out->pdf_solid = pt_ggx_visible_pdf(wo, m, b->alpha_x, b->alpha_y) * fabsf(im) / fmaxf(denom * denom, 1e-20f);
     }
-    return 1;
-}
-
-/* Reflection off the interface, given that it reflects. */
-static inline int pt_layer_reflect(const struct pt_bsdf *b, pt_vec3 wo, float u0, float u1, struct pt_layer_ray *out)
-{
-    if (pt_dielectric_is_smooth(b)) {
-        out->wi = v3(-wo.x, -wo.y, wo.z);
-        out->weight = pt_fresnel_dielectric(wo.z, b->eta);
-        out->pdf_solid = 0.0f;
-        return 1;
-    }
-    pt_vec3 m = pt_ggx_sample_visible(wo, b->alpha_x, b->alpha_y, u0, u1);
-    float om = v3_dot(wo, m);
-    out->wi = v3_norm(v3_sub(v3_scale(m, 2.0f * om), wo));
-    if (!(wo.z * out->wi.z > 0.0f))
-        return 0;
-    out->weight = pt_fresnel_dielectric(om, b->eta) * pt_ggx_g2_over_g1(wo, out->wi, b->alpha_x, b->alpha_y);
-    out->pdf_solid = 0.25f * pt_ggx_visible_pdf(wo, m, b->alpha_x, b->alpha_y) / fabsf(om);
     return 1;
 }
 
@@ -119,15 +99,6 @@ static inline int pt_layer_survives(pt_vec3 *beta, int depth, struct pt_rng *rng
     return 1;
 }
 
-/* Along direction w from height *z to where light meets the layer's medium, 1, or to the boundary, if that comes first. */
-static inline int pt_layer_collides(const struct pt_bsdf *b, pt_vec3 w, float *z, struct pt_rng *rng)
-{
-    float dz = -log1pf(-pt_rng_float(rng)) * fabsf(w.z), next = w.z > 0.0f ? *z + dz : *z - dz;
-    int inside = next > 0.0f && next < b->thickness;
-    *z = inside ? next : w.z > 0.0f ? b->thickness : 0.0f;
-    return inside;
-}
-
 /* State of one walk; the interface lies at z = thickness, the base at 0. */
 struct pt_layer_walk {
     const struct pt_bsdf *top; /* eta and alpha of the interface */
@@ -160,32 +131,58 @@ static inline void pt_layer_escape(struct pt_layer_walk *k, float pdf)
     k->f = v3_madd(k->f, through, v3_mul(k->beta, f));
 }
 
-/* Scattering inside the layer: 1 when it happened before the next boundary, else k->z is on that boundary. */
-static inline int pt_layer_medium(struct pt_layer_walk *k, struct pt_rng *rng)
+/* On to where light scatters inside the layer, 1 and the density of its new direction, or to the boundary, if that comes
+ * first. */
+static inline int pt_layer_travel(struct pt_layer_walk *k, struct pt_rng *rng, float *pdf)
 {
     const struct pt_bsdf *b = k->top;
-    if (!pt_layer_collides(b, k->w, &k->z, rng))
+    const float start = k->z;
+    k->z = k->w.z > 0.0f ? b->thickness : 0.0f;
+    if (v3_is_black(b->albedo)) {
+        k->beta = v3_scale(k->beta, pt_layer_extinction(b->thickness, k->w.z));
         return 0;
-    pt_vec3 wo = v3_neg(k->w);
+    }
+    float dz = -log1pf(-pt_rng_float(rng)) * fabsf(k->w.z), next = k->w.z > 0.0f ? start + dz : start - dz;
+    if (!(next > 0.0f && next < b->thickness))
+        return 0;
+    k->z = next;
     k->beta = v3_mul(k->beta, b->albedo);
-    float p = pt_phase_eval(b->g, wo, v3_neg(k->exit.wi));
+    float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng);
+    *pdf = pt_phase_sample(b->g, v3_neg(k->w), u0, u1, &k->w);
+    return 1;
+}
+
+/* The same, and light that leaves from there. */
+static inline int pt_layer_medium(struct pt_layer_walk *k, struct pt_rng *rng)
+{
+    pt_vec3 wo = v3_neg(k->w);
+    float pdf;
+    if (!pt_layer_travel(k, rng, &pdf))
+        return 0;
     /* exit.wi points down into the layer from outside; the walk has to head the other way */
+    float p = pt_phase_eval(k->top->g, wo, v3_neg(k->exit.wi));
     pt_layer_connect(k, v3_splat(p), p);
-    float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng), pdf = pt_phase_sample(b->g, wo, u0, u1, &k->w);
     if (k->w.z > 0.0f && !k->top_delta)
         pt_layer_escape(k, pdf);
     return 1;
 }
 
+/* Reflection off the interface, given that it reflects. */
 static inline int pt_layer_at_interface(struct pt_layer_walk *k, struct pt_rng *rng)
 {
-    struct pt_layer_ray r;
+    const struct pt_bsdf *b = k->top;
+    pt_vec3 wo = v3_neg(k->w);
     float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng);
-    if (!pt_layer_reflect(k->top, v3_neg(k->w), u0, u1, &r))
-        return 0;
-    k->beta = v3_scale(k->beta, r.weight);
-    k->w = r.wi;
-    return 1;
+    if (k->top_delta) {
+        k->w.z = wo.z;
+        k->beta = v3_scale(k->beta, pt_fresnel_dielectric(wo.z, b->eta));
+        return 1;
+    }
+    pt_vec3 m = pt_ggx_sample_visible(wo, b->alpha_x, b->alpha_y, u0, u1);
+    float om = v3_dot(wo, m);
+    k->w = v3_norm(v3_sub(v3_scale(m, 2.0f * om), wo));
+    k->beta = v3_scale(k->beta, pt_fresnel_dielectric(om, b->eta) * pt_ggx_g2_over_g1(wo, k->w, b->alpha_x, b->alpha_y));
+    return wo.z * k->w.z > 0.0f;
 }
 
 static inline int pt_layer_bounce(const struct pt_bsdf *base, pt_vec3 wo, struct pt_rng *rng, struct pt_bsdf_sample *s)
@@ -224,19 +221,13 @@ static inline pt_vec3 pt_layer_walk_eval(const struct pt_bsdf *b, pt_vec3 wo, pt
     float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng), u2 = pt_rng_float(rng), u3 = pt_rng_float(rng);
     if (!pt_layer_transmit(b, wo, u0, u1, &enter) || !pt_layer_transmit(b, wi, u2, u3, &k.exit))
         return k.f;
-    int scatters = !v3_is_black(b->albedo);
     k.w = enter.wi;
     k.beta = v3_splat(enter.weight / (b->eta * b->eta));
     for (int depth = 0; depth < PT_LAYER_EVENTS + b->more_events; depth++) {
         if (!pt_layer_survives(&k.beta, depth, rng) || k.w.z == 0.0f)
             break;
-        if (scatters) {
-            if (pt_layer_medium(&k, rng))
-                continue;
-        } else {
-            k.z = k.w.z > 0.0f ? b->thickness : 0.0f;
-            k.beta = v3_scale(k.beta, pt_layer_extinction(b->thickness, k.w.z));
-        }
+        if (pt_layer_medium(&k, rng))
+            continue;
         if (!(k.w.z > 0.0f ? pt_layer_at_interface(&k, rng) : pt_layer_at_base(&k, rng)))
             break;
     }
@@ -259,17 +250,6 @@ static inline int pt_layer_cross(const struct pt_bsdf *b, pt_vec3 wo, float u_lo
     return *transmitted ? wo.z * wi->z < 0.0f : wo.z * wi->z > 0.0f;
 }
 
-/* Distance to the next scattering inside the layer: 1 and a new direction, or 0 and *z on the boundary that was reached. */
-static inline int pt_layer_scatter(const struct pt_bsdf *b, pt_vec3 *w, pt_vec3 *beta, float *z, struct pt_rng *rng)
-{
-    if (!pt_layer_collides(b, *w, z, rng))
-        return 0;
-    *beta = v3_mul(*beta, b->albedo);
-    float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng);
-    pt_phase_sample(b->g, v3_neg(*w), u0, u1, w);
-    return 1;
-}
-
 /*
  * Follows light from wo (z > 0) through the layer until it leaves: 0 absorbed, 1 reflected by the interface, 2 came from
  * below it. The weight is that of a perfect sample, at most 1 but for roulette: what pt_layer_walk_eval estimates pointwise,
@@ -278,44 +258,35 @@ static inline int pt_layer_scatter(const struct pt_bsdf *b, pt_vec3 *w, pt_vec3 
 static inline int pt_layer_walk_sample(const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
                                        struct pt_rng *rng, pt_vec3 *wi, pt_vec3 *weight)
 {
-    struct pt_bsdf base = pt_layer_base(b);
-    pt_vec3 w, beta;
-    float factor, z = b->thickness;
-    int transmitted, scatters = !v3_is_black(b->albedo);
-    if (!pt_layer_cross(b, wo, u_lobe, u0, u1, &w, &factor, &transmitted))
+    struct pt_layer_walk k = {.top = b, .base = pt_layer_base(b), .z = b->thickness};
+    float factor, pdf;
+    int transmitted;
+    if (!pt_layer_cross(b, wo, u_lobe, u0, u1, &k.w, &factor, &transmitted))
         return 0;
-    beta = v3_splat(factor);
-    if (!transmitted) {
-        *wi = w;
-        *weight = beta;
+    *wi = k.w;
+    *weight = k.beta = v3_splat(factor);
+    if (!transmitted)
         return 1;
-    }
     for (int depth = 0; depth < PT_LAYER_EVENTS + b->more_events; depth++) {
-        if (!pt_layer_survives(&beta, depth, rng) || w.z == 0.0f)
+        if (!pt_layer_survives(&k.beta, depth, rng) || k.w.z == 0.0f)
             return 0;
-        if (scatters) {
-            if (pt_layer_scatter(b, &w, &beta, &z, rng))
-                continue;
-        } else {
-            beta = v3_scale(beta, pt_layer_extinction(b->thickness, w.z));
-        }
-        if (w.z < 0.0f) {
+        if (pt_layer_travel(&k, rng, &pdf))
+            continue;
+        if (k.w.z < 0.0f) {
             struct pt_bsdf_sample s;
-            if (!pt_layer_bounce(&base, v3_neg(w), rng, &s))
+            if (!pt_layer_bounce(&k.base, v3_neg(k.w), rng, &s))
                 return 0;
-            beta = v3_mul(beta, s.weight);
-            w = s.wi;
+            k.beta = v3_mul(k.beta, s.weight);
+            k.w = s.wi;
             continue;
         }
         float v_lobe = pt_rng_float(rng), v0 = pt_rng_float(rng), v1 = pt_rng_float(rng);
-        if (!pt_layer_cross(b, v3_neg(w), v_lobe, v0, v1, &w, &factor, &transmitted))
+        if (!pt_layer_cross(b, v3_neg(k.w), v_lobe, v0, v1, &k.w, &factor, &transmitted))
             return 0;
-        beta = v3_scale(beta, factor);
-        if (transmitted) {
-            *wi = w;
-            *weight = beta;
+        *wi = k.w;
+        *weight = k.beta = v3_scale(k.beta, factor);
+        if (transmitted)
             return 2;
-        }
     }
     return 0;
 }
