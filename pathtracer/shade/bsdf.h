@@ -10,7 +10,7 @@
  *   void pt_NAME_closure(fx, scene, material, surface, b)       fills the fields of *b that the model uses
  *   int pt_NAME_has_smooth(b)                                   whether any part of it is not a delta distribution
  *   pt_vec3 pt_NAME_eval(fx, b, wo, wi, pdf_solid)              as pt_bsdf_eval (bsdf_dispatch.h)
- *   int pt_NAME_sample(fx, b, wo, u_lobe, u0, u1, out)          as pt_bsdf_sample
+ *   int pt_NAME_sample(fx, b, wo, u_lobe, u0, u1, out)          as pt_bsdf_sample; eta_scale 1 and flags 0 are set
  *   pt_vec3 pt_NAME_albedo(b, wo)                               as pt_bsdf_albedo
  *   const struct pt_bsdf_read pt_NAME_reads[]                   what it reads of a scene file
  */

@@ -111,8 +111,6 @@ static inline int pt_coat_clear_sample(pt_effects fx, const struct pt_bsdf *b, p
     pt_coat_split(b, w.z, &base, &spec);
     float p = pt_coat_choice(spec, base, pt_coat_base_factor(b));
     int rough = !pt_dielectric_is_smooth(b);
-    out->eta_scale = 1.0f;
-    out->flags = 0;
     if (u_lobe < p) {
         if (!((fx & PT_FX_GLOSSY) && rough)) {
             out->wi = v3(-wo.x, -wo.y, wo.z);

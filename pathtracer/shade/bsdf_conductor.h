@@ -45,7 +45,6 @@ static inline int pt_conductor_sample_smooth(const struct pt_bsdf *b, pt_vec3 wo
     out->wi = v3(-wo.x, -wo.y, wo.z);
     out->weight = pt_fresnel_conductor_rgb(fabsf(wo.z), b->eta_rgb, b->k_rgb);
     out->pdf_solid = 1.0f;
-    out->eta_scale = 1.0f;
     out->flags = PT_SCATTER_DELTA;
     return wo.z != 0.0f;
 }
@@ -63,8 +62,6 @@ static inline int pt_conductor_sample_rough(const struct pt_bsdf *b, pt_vec3 wo,
     out->weight =
         v3_scale(pt_fresnel_conductor_rgb(fabsf(om), b->eta_rgb, b->k_rgb), pt_ggx_g2_over_g1(wo, out->wi, ax, ay));
     out->pdf_solid = 0.5f * pt_ggx_d(m, ax, ay) / (fabsf(wo.z) + pt_ggx_stretch(wo, ax, ay));
-    out->eta_scale = 1.0f;
-    out->flags = 0;
     return 1;
 }
 

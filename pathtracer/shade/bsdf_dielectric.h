@@ -64,7 +64,6 @@ static inline int pt_dielectric_sample_smooth(const struct pt_bsdf *b, pt_vec3 w
         out->wi = v3(-wo.x, -wo.y, wo.z);
         out->weight = v3_splat(1.0f);
         out->pdf_solid = r;
-        out->eta_scale = 1.0f;
         out->flags = PT_SCATTER_DELTA;
         return 1;
     }
@@ -117,8 +116,6 @@ static inline int pt_dielectric_sample_rough(const struct pt_bsdf *b, pt_vec3 wo
     pt_vec3 m = pt_ggx_sample_visible(wo, ax, ay, u0, u1); /* m.z > 0: the sign of om is that of wo.z */
     float om = v3_dot(wo, m), cos_t, fresnel = pt_fresnel_dielectric_t(om, b->eta, &cos_t);
     float visible = fabsf(wo.z) + pt_ggx_stretch(wo, ax, ay), d = pt_ggx_d(m, ax, ay);
-    out->eta_scale = 1.0f;
-    out->flags = 0;
     if (u_lobe < fresnel) {
         out->wi = v3_norm(v3_sub(v3_scale(m, 2.0f * om), wo));
         if (!(wo.z * out->wi.z > 0.0f))

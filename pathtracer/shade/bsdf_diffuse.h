@@ -46,8 +46,6 @@ static inline int pt_diffuse_sample(pt_effects fx, const struct pt_bsdf *b, pt_v
     wi.z = copysignf(wi.z, wo.z);
     out->wi = wi;
     out->weight = b->reflectance;
-    out->eta_scale = 1.0f;
-    out->flags = 0;
     return 1;
 }
 

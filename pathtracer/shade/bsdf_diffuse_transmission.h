@@ -61,7 +61,6 @@ static inline int pt_diffuse_transmission_sample(pt_effects fx, const struct pt_
     wi.z = copysignf(wi.z, reflected ? wo.z : -wo.z);
     out->wi = wi;
     out->weight = v3_scale(colour, 1.0f / p);
-    out->eta_scale = 1.0f;
     out->flags = reflected ? 0 : PT_SCATTER_TRANSMIT;
     return 1;
 }

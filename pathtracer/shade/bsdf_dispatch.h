@@ -92,6 +92,8 @@ static inline pt_vec3 pt_bsdf_eval(pt_effects fx, const struct pt_bsdf *b, pt_ve
 static inline int pt_bsdf_sample(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, float u_lobe, float u0, float u1,
                                  struct pt_bsdf_sample *out)
 {
+    out->eta_scale = 1.0f;
+    out->flags = 0;
     if (!(fx & PT_FX_BSDF))
         return pt_diffuse_sample(fx, b, wo, u_lobe, u0, u1, out);
 #define PT_BSDF_CASE(id, name, file_name, words, needs) \

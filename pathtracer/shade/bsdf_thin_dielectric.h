@@ -54,7 +54,6 @@ static inline int pt_thin_dielectric_sample(pt_effects fx, const struct pt_bsdf 
     out->wi = reflected ? v3(-wo.x, -wo.y, wo.z) : v3_neg(wo);
     out->weight = v3_splat(1.0f);
     out->pdf_solid = reflected ? r : 1.0f - r;
-    out->eta_scale = 1.0f;
     out->flags = reflected ? PT_SCATTER_DELTA : PT_SCATTER_DELTA | PT_SCATTER_TRANSMIT;
     return wo.z != 0.0f;
 }

@@ -188,6 +188,7 @@ static inline int pt_layer_at_interface(struct pt_layer_walk *k, struct pt_rng *
 static inline int pt_layer_bounce(const struct pt_bsdf *base, pt_vec3 wo, struct pt_rng *rng, struct pt_bsdf_sample *s)
 {
     float u0 = pt_rng_float(rng), u1 = pt_rng_float(rng);
+    s->flags = 0;
     if (base->kind != PT_BSDF_CONDUCTOR)
         return pt_diffuse_sample(PT_FX_ALL, base, wo, 0.0f, u0, u1, s);
     return base->alpha_x > 0.0f ? pt_conductor_sample_rough(base, wo, u0, u1, s) : pt_conductor_sample_smooth(base, wo, s);

@@ -138,7 +138,6 @@ __attribute__((noinline, unused)) static int pt_coat_walk_sample(const struct pt
         return 0;
     float side = wo.z < 0.0f ? -1.0f : 1.0f;
     pt_vec3 w = v3_scale(wo, side), wi;
-    out->eta_scale = 1.0f;
     out->flags = PT_SCATTER_DELTA;
     out->wi = v3(-wo.x, -wo.y, wo.z);
     if (pt_coat_walk_is_delta(b)) {
