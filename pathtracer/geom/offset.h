@@ -15,8 +15,7 @@
 /* p moved off the surface with unit normal n to the side that `w` points to. */
 static inline pt_vec3 pt_offset_point(pt_vec3 p, pt_vec3 n, pt_vec3 error, pt_vec3 w)
 {
-    float d = fabsf(n.x) * error.x + fabsf(n.y) * error.y + fabsf(n.z) * error.z;
-    return v3_madd(p, copysignf(d, v3_dot(n, w)), n);
+    return v3_madd(p, copysignf(v3_dot(v3_abs(n), error), v3_dot(n, w)), n);
 }
 
 #endif

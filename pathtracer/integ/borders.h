@@ -28,8 +28,8 @@ struct pt_borders {
 
 static inline float pt_place_slack(const struct pt_place *at, pt_vec3 direction)
 {
-    pt_vec3 n = at->s.n_geometric, e = at->error;
-    return PT_PLACE_SHARE * (fabsf(n.x) * e.x + fabsf(n.y) * e.y + fabsf(n.z) * e.z) / fabsf(v3_dot(n, direction));
+    pt_vec3 n = at->s.n_geometric;
+    return PT_PLACE_SHARE * v3_dot(v3_abs(n), at->error) / fabsf(v3_dot(n, direction));
 }
 
 /* Whether the surface `at`, met at t behind the first border, is at its place. */

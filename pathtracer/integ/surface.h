@@ -121,8 +121,7 @@ static inline void pt_place_quadric(const struct pt_scene *scene, const struct p
 static inline void pt_place_on_ray(const struct pt_ray *ray, float t, struct pt_place *at)
 {
     pt_vec3 o = ray->origin, way = v3_scale(ray->direction, t), e = at->error;
-    pt_vec3 error = v3(PT_OFFSET_ERROR * (fabsf(o.x) + fabsf(way.x)), PT_OFFSET_ERROR * (fabsf(o.y) + fabsf(way.y)),
-                       PT_OFFSET_ERROR * (fabsf(o.z) + fabsf(way.z)));
+    pt_vec3 error = v3_scale(v3_add(v3_abs(o), v3_abs(way)), PT_OFFSET_ERROR);
     if (16.0f * (error.x + error.y + error.z) < e.x + e.y + e.z) {
         at->p = v3_add(o, way);
         at->error = error;

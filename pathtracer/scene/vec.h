@@ -24,6 +24,7 @@ static inline pt_vec3 v3_add(pt_vec3 a, pt_vec3 b) { return (pt_vec3){a.x + b.x,
 static inline pt_vec3 v3_sub(pt_vec3 a, pt_vec3 b) { return (pt_vec3){a.x - b.x, a.y - b.y, a.z - b.z}; }
 static inline pt_vec3 v3_mul(pt_vec3 a, pt_vec3 b) { return (pt_vec3){a.x * b.x, a.y * b.y, a.z * b.z}; }
 static inline pt_vec3 v3_scale(pt_vec3 a, float s) { return (pt_vec3){a.x * s, a.y * s, a.z * s}; }
+static inline pt_vec3 v3_abs(pt_vec3 a) { return (pt_vec3){fabsf(a.x), fabsf(a.y), fabsf(a.z)}; }
 static inline pt_vec3 v3_neg(pt_vec3 a) { return (pt_vec3){-a.x, -a.y, -a.z}; }
 /* a + s b */
 static inline pt_vec3 v3_madd(pt_vec3 a, float s, pt_vec3 b)

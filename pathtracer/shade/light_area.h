@@ -31,10 +31,8 @@ static inline int pt_light_triangle_towards(const struct pt_emitter *e, int two_
     /* dω = cos dA / dist², cos = towards / dist */
     out->inv_pdf_solid = e->area_over_pmf * towards * inv_dist * (inv_dist * inv_dist);
     /* of the point, and of the distance at which a ray from p_ref meets the surface */
-    pt_vec3 error = v3(PT_OFFSET_ERROR * (fabsf(e->p0.x) + fabsf(e->e1.x) + fabsf(e->e2.x) + fabsf(d.x)),
-                       PT_OFFSET_ERROR * (fabsf(e->p0.y) + fabsf(e->e1.y) + fabsf(e->e2.y) + fabsf(d.y)),
-                       PT_OFFSET_ERROR * (fabsf(e->p0.z) + fabsf(e->e1.z) + fabsf(e->e2.z) + fabsf(d.z)));
-    out->target = pt_offset_point(p, e->n, error, v3_neg(d));
+    pt_vec3 size = v3_add(v3_add(v3_add(v3_abs(e->p0), v3_abs(e->e1)), v3_abs(e->e2)), v3_abs(d));
+    out->target = pt_offset_point(p, e->n, v3_scale(size, PT_OFFSET_ERROR), v3_neg(d));
     return (towards > 0.0f) & (out->inv_pdf_solid > 0.0f);
 }
 
