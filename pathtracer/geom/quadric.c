@@ -100,12 +100,11 @@ int pt_quadric_intersect(const struct pt_quadric *q, pt_vec3 origin, pt_vec3 dir
 
 void pt_quadric_bounds(const struct pt_quadric *q, pt_vec3 *lower, pt_vec3 *upper)
 {
-    float r = q->radius, z0 = q->kind == PT_QUADRIC_SPHERE ? fmaxf(q->z_min, -r) : q->z_min;
-    float z1 = q->kind == PT_QUADRIC_DISK ? q->z_min : q->kind == PT_QUADRIC_SPHERE ? fminf(q->z_max, r) : q->z_max;
+    float r = q->radius;
     *lower = v3_splat(INFINITY);
     *upper = v3_splat(-INFINITY);
     for (int i = 0; i < 8; i++) {
-        pt_vec3 p = pt_mat34_point(&q->to_render, v3(i & 1 ? r : -r, i & 2 ? r : -r, i & 4 ? z1 : z0));
+        pt_vec3 p = pt_mat34_point(&q->to_render, v3(i & 1 ? r : -r, i & 2 ? r : -r, i & 4 ? q->z_max : q->z_min));
         *lower = v3_least(*lower, p);
         *upper = v3_most(*upper, p);
     }
@@ -140,8 +139,7 @@ void pt_quadric_uv(const struct pt_quadric *q, pt_vec3 p_quadric, float *u, floa
     pt_vec3 dv = v3(0.0f, 0.0f, q->z_max - q->z_min);
     *u = (float)(angle_of(x, y) / (double)q->phi_max);
     if (q->kind == PT_QUADRIC_SPHERE) {
-        double lo = acos(fmin(1.0, fmax(-1.0, (double)q->z_min / r))),
-               hi = acos(fmin(1.0, fmax(-1.0, (double)q->z_max / r)));
+        double lo = acos((double)q->z_min / r), hi = acos((double)q->z_max / r);
         *v = (float)((acos(fmin(1.0, fmax(-1.0, z / r))) - lo) / (hi - lo));
         dv = v3((float)(z * c * (hi - lo)), (float)(z * s * (hi - lo)), (float)(-rho * (hi - lo)));
     } else if (q->kind == PT_QUADRIC_CYLINDER) {

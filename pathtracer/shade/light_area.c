@@ -15,35 +15,28 @@ static float similarity(const struct pt_mat34 *t)
     return similar ? sqrtf(xx) : 0.0f;
 }
 
-/* A whole sphere under a similarity has its centre and radius in render space; else the radius is 0. */
-static float whole_sphere(const struct pt_quadric *q, pt_vec3 *centre)
-{
-    const float *m = q->to_render.m;
-    *centre = v3(m[3], m[7], m[11]);
-    if (q->kind != PT_QUADRIC_SPHERE || q->z_min > -q->radius || q->z_max < q->radius || q->phi_max < 2.0f * PT_PI - 1e-4f)
-        return 0.0f;
-    return q->radius * similarity(&q->to_render);
-}
+/* Steps in which the area of a stretched quadric is summed up: within 1e-4 however flat or long the transform makes it. */
+enum { AREA_STEPS = 256 };
 
 /* A point of the sphere itself counts as inside: its own rounding must not decide which way it is lit, and from outside only
  * the near half is sampled, which for an inner side is the point itself. */
 #define ON_SPHERE 0.99999f
 
-/* The cone has the near side of a sphere only. Where a mask lets rays through, the far side is seen, too. */
-static int is_seen_through(const struct pt_shape *shape)
+/* 1 - cos of the half angle of the cone that a whole sphere under a similarity fills as seen from p_ref, with its centre and
+ * radius in render space. 0 for other quadrics, from inside, and where a mask lets rays through, so that the far side is
+ * seen, too. */
+static float cone_of(const struct pt_quadric *q, const struct pt_shape *shape, pt_vec3 p_ref, pt_vec3 *centre, float *radius)
 {
-    return shape->has_alpha && (shape->alpha.texture || shape->alpha.value.x > 0.0f);
-}
-
-/* Steps in which the area of a stretched quadric is summed up: within 1e-4 however flat or long the transform makes it. */
-enum { AREA_STEPS = 256 };
-
-/* 1 - cos of the half angle of the cone that the sphere fills, 0 when seen from inside. Without cancellation:
- * 1 - cos θ = sin² θ / (1 + cos θ). */
-static float cone(pt_vec3 to_centre, float radius)
-{
-    float dist2 = v3_dot(to_centre, to_centre), sin2 = radius * radius / dist2;
-    return sin2 < ON_SPHERE ? sin2 / (1.0f + sqrtf(1.0f - sin2)) : 0.0f;
+    const float *m = q->to_render.m;
+    if (q->kind != PT_QUADRIC_SPHERE || q->z_min > -q->radius || q->z_max < q->radius || q->phi_max < 2.0f * PT_PI - 1e-4f ||
+        (shape->has_alpha && (shape->alpha.texture || shape->alpha.value.x > 0.0f)))
+        return 0.0f;
+    *centre = v3(m[3], m[7], m[11]);
+    *radius = q->radius * similarity(&q->to_render);
+    pt_vec3 to_centre = v3_sub(*centre, p_ref);
+    float dist2 = v3_dot(to_centre, to_centre), sin2 = *radius * *radius / dist2;
+    /* without cancellation: 1 - cos θ = sin² θ / (1 + cos θ) */
+    return *radius > 0.0f && sin2 < ON_SPHERE ? sin2 / (1.0f + sqrtf(1.0f - sin2)) : 0.0f;
 }
 
 /* Area in the quadric's own space. */
@@ -52,9 +45,7 @@ static float area_of(const struct pt_quadric *q)
     if (q->kind == PT_QUADRIC_DISK)
         return 0.5f * q->phi_max * (q->radius * q->radius - q->inner_radius * q->inner_radius);
     /* Archimedes: the zone of a sphere has the area of the cylinder around it */
-    float z0 = q->kind == PT_QUADRIC_SPHERE ? fmaxf(q->z_min, -q->radius) : q->z_min;
-    float z1 = q->kind == PT_QUADRIC_SPHERE ? fminf(q->z_max, q->radius) : q->z_max;
-    return q->phi_max * q->radius * (z1 - z0);
+    return q->phi_max * q->radius * (q->z_max - q->z_min);
 }
 
 /* dA in render space per dA in the quadric's space, where its unit normal there is n: |det M| |M⁻ᵀ n|. */
@@ -74,11 +65,11 @@ static pt_vec3 point_on(const struct pt_quadric *q, float u0, float u1, pt_vec3 
         *n = v3(0.0f, 0.0f, 1.0f);
         return v3(r * c, r * s, q->z_min);
     }
+    float z = q->z_min + u1 * (q->z_max - q->z_min);
     if (q->kind == PT_QUADRIC_CYLINDER) {
         *n = v3(c, s, 0.0f);
-        return v3(q->radius * c, q->radius * s, q->z_min + u1 * (q->z_max - q->z_min));
+        return v3(q->radius * c, q->radius * s, z);
     }
-    float z0 = fmaxf(q->z_min, -q->radius), z1 = fminf(q->z_max, q->radius), z = z0 + u1 * (z1 - z0);
     float rho = sqrtf(fmaxf(0.0f, q->radius * q->radius - z * z));
     *n = v3(rho * c / q->radius, rho * s / q->radius, z / q->radius);
     return v3(rho * c, rho * s, z);
@@ -88,11 +79,11 @@ static pt_vec3 point_on(const struct pt_quadric *q, float u0, float u1, pt_vec3 
  * as the integrand is smooth in it, the polar angle θ. */
 static double mean_area_scale(const struct pt_quadric *q)
 {
-    float z0 = fmaxf(-1.0f, q->z_min / q->radius), z1 = fminf(1.0f, q->z_max / q->radius);
     float sin_theta[AREA_STEPS] = {1.0f}, cos_theta[AREA_STEPS] = {0.0f};
     int n = q->kind == PT_QUADRIC_SPHERE ? AREA_STEPS : 1;
     for (int k = 0; k < n && n > 1; k++) {
-        float theta = acosf(z1) + (acosf(z0) - acosf(z1)) * ((float)k + 0.5f) / AREA_STEPS;
+        float top = acosf(q->z_max / q->radius),
+              theta = top + (acosf(q->z_min / q->radius) - top) * ((float)k + 0.5f) / AREA_STEPS;
         sin_theta[k] = sinf(theta);
         cos_theta[k] = cosf(theta);
     }
@@ -125,7 +116,7 @@ static int finish(const struct pt_light *light, const struct pt_shape *shape, pt
     out->delta = 0;
     out->finite = 1;
     /* as of triangles (light_area.h) */
-    error = v3_add(error, v3_scale(v3(fabsf(d.x), fabsf(d.y), fabsf(d.z)), PT_OFFSET_ERROR));
+    error = v3_add(error, v3_scale(v3_abs(d), PT_OFFSET_ERROR));
     out->target = pt_offset_point(p, n, error, v3_neg(d));
     return out->inv_pdf_solid > 0.0f && out->inv_pdf_solid < INFINITY;
 }
@@ -145,8 +136,7 @@ static int sample_cone(const struct pt_light *light, const struct pt_shape *shap
     float sin_alpha = sin_beta * cos_theta - cos_beta * sin_theta, cos_alpha = cos_beta * cos_theta + sin_beta * sin_theta;
     pt_vec3 n = pt_frame_to_world(&frame, v3(sin_alpha * cos_phi, sin_alpha * sin_phi, -cos_alpha)),
             p = v3_madd(centre, radius, n);
-    pt_vec3 error = v3(PT_OFFSET_ERROR * (fabsf(centre.x) + radius), PT_OFFSET_ERROR * (fabsf(centre.y) + radius),
-                       PT_OFFSET_ERROR * (fabsf(centre.z) + radius));
+    pt_vec3 error = v3_scale(v3_add(v3_abs(centre), v3_splat(radius)), PT_OFFSET_ERROR);
     out->inv_pdf_solid = 2.0f * PT_PI * one_minus_cos;
     return finish(light, shape, p_ref, p, n, error, out);
 }
@@ -158,8 +148,7 @@ int pt_light_quadric_sample(const struct pt_scene *scene, const struct pt_emitte
     const struct pt_shape *shape = &scene->shapes[light->shape];
     const struct pt_quadric *q = &scene->quadrics[shape->data];
     pt_vec3 centre, n_quadric;
-    float radius = is_seen_through(shape) ? 0.0f : whole_sphere(q, &centre),
-          one_minus_cos = radius > 0.0f ? cone(v3_sub(centre, p_ref), radius) : 0.0f;
+    float radius, one_minus_cos = cone_of(q, shape, p_ref, &centre, &radius);
     if (one_minus_cos > 0.0f) {
         int lit = sample_cone(light, shape, p_ref, centre, radius, one_minus_cos, u0, u1, out);
         out->inv_pdf_solid /= e->pmf;
@@ -182,13 +171,10 @@ float pt_light_quadric_pdf(const struct pt_scene *scene, const struct pt_shape *
 {
     const struct pt_quadric *q = &scene->quadrics[shape->data];
     pt_vec3 centre;
-    float radius = is_seen_through(shape) ? 0.0f : whole_sphere(q, &centre),
-          one_minus_cos = radius > 0.0f ? cone(v3_sub(centre, p_ref), radius) : 0.0f;
+    float radius, one_minus_cos = cone_of(q, shape, p_ref, &centre, &radius);
     if (one_minus_cos > 0.0f)
         return 1.0f / (2.0f * PT_PI * one_minus_cos);
-    /* n_quadric ∝ Mᵀ n */
-    pt_vec3 n_quadric = v3_norm(pt_mat34_normal(&q->to_render, n));
-    pt_vec3 d = v3_sub(p, p_ref);
+    pt_vec3 d = v3_sub(p, p_ref), n_quadric = v3_norm(pt_mat34_normal(&q->to_render, n)); /* ∝ Mᵀ n */
     float cosine = fabsf(v3_dot(n, wi));
     return cosine > 0.0f ? v3_dot(d, d) / (cosine * area_of(q) * area_scale(q, n_quadric)) : 0.0f;
 }
