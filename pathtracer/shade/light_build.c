@@ -258,18 +258,6 @@ static void spread(const struct pt_scene *scene, const int32_t *ids, int32_t cou
     }
 }
 
-static int list_far(struct pt_scene *scene, struct pt_light_tree *tree, const struct shares *s, const double *weights)
-{
-    if (s->far_count == 0)
-        return 1;
-    if (!(tree->far = pt_arena_alloc(&scene->arena, (size_t)s->far_count, sizeof *tree->far)))
-        return 0;
-    for (int32_t i = 0; i < scene->emitter_count; i++)
-        if (at_infinity(&scene->lights[scene->emitters[i].light]) && weights[i] > 0.0)
-            tree->far[tree->far_count++] = i;
-    return 1;
-}
-
 /* A place on a mesh that is no lamp, the k-th of PROBES; 0 when the shape has none. */
 static int probe(const struct pt_scene *scene, int k, struct pt_rng *rng, struct pt_receiver *at)
 {
@@ -320,12 +308,17 @@ static int make_tree(struct pt_scene *scene, const struct shares *s, const doubl
     struct pt_light_tree *tree = pt_arena_alloc(&scene->arena, 1, sizeof *tree);
     struct pt_light_bounds *bounds = pt_arena_alloc(scratch, n, sizeof *bounds);
     int32_t *ids = pt_arena_alloc(scratch, n, sizeof *ids), count = 0;
-    if (!tree || !bounds || !ids || !list_far(scene, tree, s, weights))
+    if (!tree || !bounds || !ids)
         return 0;
-    for (int32_t i = 0; i < scene->emitter_count; i++)
-        if (!at_infinity(&scene->lights[scene->emitters[i].light]) &&
-            bound_emitter(scene, &scene->emitters[i], weights[i], &bounds[count]))
+    if (s->far_count > 0 && !(tree->far = pt_arena_alloc(&scene->arena, (size_t)s->far_count, sizeof *tree->far)))
+        return 0;
+    for (int32_t i = 0; i < scene->emitter_count; i++) {
+        const int far = at_infinity(&scene->lights[scene->emitters[i].light]);
+        if (far && weights[i] > 0.0)
+            tree->far[tree->far_count++] = i;
+        if (!far && bound_emitter(scene, &scene->emitters[i], weights[i], &bounds[count]))
             ids[count++] = i;
+    }
     if (count < TREE_LIGHTS)
         return 1;
     spread(scene, ids, count, bounds);
@@ -373,11 +366,10 @@ int pt_lights_build(struct pt_scene *scene, struct base_err *err)
     if (count > INT32_MAX / 2)
         return base_fail(err, BASE_EINVAL, "too many emitting triangles (%lld)", (long long)count);
     struct pt_arena scratch = {0};
-    int ok = 1;
     size_t lights = (size_t)scene->light_count;
     scene->env_lights = pt_arena_alloc(&scene->arena, lights, sizeof *scene->env_lights);
     scene->env_distributions = pt_arena_alloc(&scene->arena, lights, sizeof *scene->env_distributions);
-    ok = scene->env_lights && scene->env_distributions && build_environments(scene);
+    int ok = scene->env_lights && scene->env_distributions && build_environments(scene);
     if (ok && count > 0) {
         double *weights = pt_arena_alloc(&scratch, (size_t)count, sizeof *weights);
         scene->emitters = pt_arena_alloc(&scene->arena, (size_t)count, sizeof *scene->emitters);

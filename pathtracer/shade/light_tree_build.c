@@ -45,8 +45,15 @@ static void unite_cones(struct pt_light_bounds *a, const struct pt_light_bounds 
     a->emission_rad = fmaxf(a->emission_rad, b->emission_rad);
 }
 
+/* *a with what *b has. Either may be empty: its end is 0. */
 static void unite(struct cluster *a, const struct cluster *b)
 {
+    if (b->end == 0)
+        return;
+    if (a->end == 0) {
+        *a = *b;
+        return;
+    }
     a->b.lower = v3_least(a->b.lower, b->b.lower);
     a->b.upper = v3_most(a->b.upper, b->b.upper);
     unite_cones(&a->b, &b->b);
@@ -69,20 +76,10 @@ static struct cluster single(const struct build *build, int32_t i)
     return c;
 }
 
-/* *sum, which is empty unless *any, with what c has. */
-static void join(struct cluster *sum, int *any, const struct cluster *c)
-{
-    if (*any)
-        unite(sum, c);
-    else
-        *sum = *c;
-    *any = 1;
-}
-
 static struct cluster gather(const struct build *build, int32_t begin, int32_t end)
 {
-    struct cluster all = single(build, begin);
-    for (int32_t i = begin + 1; i < end; i++) {
+    struct cluster all = {0};
+    for (int32_t i = begin; i < end; i++) {
         struct cluster one = single(build, i);
         unite(&all, &one);
     }
@@ -92,9 +89,11 @@ static struct cluster gather(const struct build *build, int32_t begin, int32_t e
 }
 
 /* Intensity times the measures of place and orientation (eq. 1 there): what a cluster is expected to cost in variance. The
- * square of the diagonal keeps lights in a row from having no surface. */
+ * square of the diagonal keeps lights in a row from having no surface. INFINITY for an empty one. */
 static double cost(const struct cluster *c)
 {
+    if (c->end == 0)
+        return INFINITY;
     pt_vec3 d = v3_sub(c->b.upper, c->b.lower);
     double area = 2.0 * ((double)d.x * (double)d.y + (double)d.y * (double)d.z + (double)d.z * (double)d.x);
     double o = (double)c->b.normals_rad, w = fmin(o + (double)c->b.emission_rad, (double)PT_PI);
@@ -130,8 +129,7 @@ static void centroid_range(const struct build *build, const struct cluster *c, i
 /* Least cost over the splits between the buckets of one axis; *after: the last bucket on the left. INFINITY: none. */
 static double best_on_axis(const struct build *build, const struct cluster *c, int axis, int *after)
 {
-    struct cluster buckets[BUCKETS];
-    int used[BUCKETS] = {0};
+    struct cluster buckets[BUCKETS] = {0}, left = {0}, right = {0};
     double right_cost[BUCKETS] = {0}, best = INFINITY;
     float low, high;
     centroid_range(build, c, axis, &low, &high);
@@ -140,20 +138,15 @@ static double best_on_axis(const struct build *build, const struct cluster *c, i
     for (int32_t i = c->begin; i < c->end; i++) {
         int k = bucket_of(&build->bounds[build->order[i]], axis, low, high);
         struct cluster one = single(build, i);
-        join(&buckets[k], &used[k], &one);
+        unite(&buckets[k], &one);
     }
-    struct cluster sum = {0};
-    int any = 0;
     for (int k = BUCKETS - 1; k > 0; k--) {
-        if (used[k])
-            join(&sum, &any, &buckets[k]);
-        right_cost[k] = any ? cost(&sum) : INFINITY;
+        unite(&right, &buckets[k]);
+        right_cost[k] = cost(&right);
     }
-    any = 0;
     for (int k = 0; k + 1 < BUCKETS; k++) {
-        if (used[k])
-            join(&sum, &any, &buckets[k]);
-        double total = any ? cost(&sum) + right_cost[k + 1] : INFINITY;
+        unite(&left, &buckets[k]);
+        double total = cost(&left) + right_cost[k + 1];
         if (total < best) {
             best = total;
             *after = k;
