@@ -1,4 +1,3 @@
-#include "integ/kernel_sets.h"
 #include "integ/run.h"
 
 PT_KERNEL_DEFINE(all, PT_FX_ALL)

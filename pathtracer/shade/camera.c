@@ -48,11 +48,10 @@ static void decompose(const struct pt_mat34 *t, struct decomposed *out)
     pt_vec3 q0 = v3_norm(c0);
     float xy = v3_dot(q0, c1);
     pt_vec3 q1 = v3_norm(v3_madd(c1, -xy, q0)), q2 = v3_cross(q0, q1);
+    *out =
+        (struct decomposed){.stretch = {v3_dot(q0, c0), xy, v3_dot(q0, c2), v3_dot(q1, c1), v3_dot(q1, c2), v3_dot(q2, c2)},
+                            .translation = v3(t->m[3], t->m[7], t->m[11])};
     quaternion_of(q0, q1, q2, out->q);
-    float stretch[6] = {v3_dot(q0, c0), xy, v3_dot(q0, c2), v3_dot(q1, c1), v3_dot(q1, c2), v3_dot(q2, c2)};
-    for (int i = 0; i < 6; i++)
-        out->stretch[i] = stretch[i];
-    out->translation = v3(t->m[3], t->m[7], t->m[11]);
 }
 
 static void slerp(const float a[4], const float b[4], float t, float out[4])

@@ -82,34 +82,24 @@ struct coat_key {
 
 static struct coat_key coat_key(const struct pt_scene *scene, const struct pt_material *m)
 {
-    struct pt_surface s = {0};
-    struct coat_key key = {.eta = m->eta, .thickness = fmaxf(0.0f, m->thickness.value.x), .rows = 1};
-    if (m->roughness_u.texture || m->roughness_v.texture) {
-        key.rows = PT_COAT_TEXTURED_ROWS;
-        key.alpha_max = 1.0f;
-        return key;
+    struct coat_key key = {m->eta, fmaxf(0.0f, m->thickness.value.x), 0.0f, 1.0f, PT_COAT_TEXTURED_ROWS};
+    if (!m->roughness_u.texture && !m->roughness_v.texture) {
+        float ax, ay;
+        pt_material_alpha(0, scene, m, &m->roughness_u, &m->roughness_v, &(struct pt_surface){0}, &ax, &ay);
+        key.alpha_min = key.alpha_max = pt_coat_alpha(ax, ay);
+        key.rows = 1;
     }
-    float ax, ay;
-    pt_material_alpha(0, scene, m, &m->roughness_u, &m->roughness_v, &s, &ax, &ay);
-    key.alpha_min = key.alpha_max = pt_coat_alpha(ax, ay);
     return key;
-}
-
-static int same_key(const struct coat_key *a, const struct coat_key *b)
-{
-    return a->eta == b->eta && a->thickness == b->thickness && a->alpha_min == b->alpha_min &&
-           a->alpha_max == b->alpha_max && a->rows == b->rows;
 }
 
 static const float *find_table(const struct pt_scene *scene, int32_t before, const struct coat_key *key)
 {
     for (int32_t i = 0; i < before; i++) {
         const struct pt_material *m = &scene->materials[i];
-        if (m->kind == PT_BSDF_COATED_DIFFUSE && m->coat_table) {
-            struct coat_key other = coat_key(scene, m);
-            if (same_key(key, &other))
-                return m->coat_table;
-        }
+        struct coat_key k = coat_key(scene, m);
+        if (m->coat_table && k.eta == key->eta && k.thickness == key->thickness && k.alpha_min == key->alpha_min &&
+            k.alpha_max == key->alpha_max && k.rows == key->rows)
+            return m->coat_table;
     }
     return NULL;
 }

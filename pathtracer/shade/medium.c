@@ -15,15 +15,11 @@ static float glow(float emission, float sigma, float t)
 
 int pt_media_build(struct pt_scene *scene, struct base_err *err)
 {
-    for (int32_t i = 0; i < scene->medium_count; i++) {
-        struct pt_medium *m = &scene->media[i];
-        if (m->kind == PT_MEDIUM_GRID) {
-            int rc = pt_medium_grid_build(m, &scene->arena, err);
-            if (rc)
-                return rc;
-        }
-    }
-    return 0;
+    int rc = 0;
+    for (int32_t i = 0; i < scene->medium_count && !rc; i++)
+        if (scene->media[i].kind == PT_MEDIUM_GRID)
+            rc = pt_medium_grid_build(&scene->media[i], &scene->arena, err);
+    return rc;
 }
 
 /* One channel is chosen by its share of the path's throughput β and gives the distance; the weight is the balance heuristic
