@@ -107,23 +107,17 @@ PT_KERNEL_INLINE int pt_lane_places(pt_effects fx, struct pt_lane_run *run, int 
 /* The emitter that path i samples, NULL: none; *by_tree as in struct pt_lane_hits. */
 static inline const struct pt_emitter *pt_lane_pick(const struct pt_lane_run *run, int i, float *by_tree)
 {
-    const struct pt_scene *scene = run->scene;
     const float u = run->u[PT_DIM_LIGHT_PICK][i];
     *by_tree = 1.0f;
-    if (scene->emitter_count == 0)
+    if (run->scene->emitter_count == 0)
         return NULL;
-    if (!scene->light_tree)
-        return pt_light_pick_by_power(scene, u);
+    if (!run->scene->light_tree) /* wherever path i is */
+        return pt_light_pick_by_power(run->scene, u);
     pt_vec3 n = pt_lane_get(&run->at.n_shading, i);
     struct pt_receiver at = {pt_lane_get(&run->at.p, i), n, PT_RECEIVER_SURFACE};
     if (v3_dot(v3_neg(pt_lane_get(&run->paths.direction, i)), n) < 0.0f)
         at.n = v3_neg(n);
-    float pmf;
-    int32_t k = pt_light_tree_pick(scene, &at, u, &pmf);
-    if (k < 0)
-        return NULL;
-    *by_tree = scene->emitters[k].pmf / pmf;
-    return &scene->emitters[k];
+    return pt_light_pick(run->scene, &at, u, by_tree);
 }
 
 static inline void pt_lane_emitters(struct pt_lane_run *run, int count)

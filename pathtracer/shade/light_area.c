@@ -112,9 +112,6 @@ static int finish(const struct pt_light *light, const struct pt_shape *shape, pt
     pt_vec3 d = v3_sub(p, p_ref), n = shape->flip_normal ? v3_neg(n_out) : n_out;
     if (!(v3_dot(n, d) < 0.0f) && !light->two_sided)
         return 0;
-    out->radiance = light->emission;
-    out->delta = 0;
-    out->finite = 1;
     /* as of triangles (light_area.h) */
     error = v3_add(error, v3_scale(v3_abs(d), PT_OFFSET_ERROR));
     out->target = pt_offset_point(p, n, error, v3_neg(d));

@@ -9,7 +9,7 @@
 /* Area in render space, within 1e-4 of it. */
 double pt_light_quadric_area(const struct pt_quadric *q);
 
-/* Out of line: quadrics are rare as lights. 0 when the point cannot be lit. */
+/* Out of line: quadrics are rare as lights. A point on one, and the density of the way to it; 0 when that cannot be lit. */
 int pt_light_quadric_sample(const struct pt_scene *scene, const struct pt_emitter *e, pt_vec3 p_ref, float u0, float u1,
                             struct pt_light_sample *out);
 float pt_light_quadric_pdf(const struct pt_scene *scene, const struct pt_shape *shape, pt_vec3 p_ref, pt_vec3 p, pt_vec3 n,
@@ -34,16 +34,6 @@ static inline int pt_light_triangle_towards(const struct pt_emitter *e, int two_
     pt_vec3 size = v3_add(v3_add(v3_add(v3_abs(e->p0), v3_abs(e->e1)), v3_abs(e->e2)), v3_abs(d));
     out->target = pt_offset_point(p, e->n, v3_scale(size, PT_OFFSET_ERROR), v3_neg(d));
     return (towards > 0.0f) & (out->inv_pdf_solid > 0.0f);
-}
-
-static inline int pt_light_triangle_sample(const struct pt_scene *scene, const struct pt_emitter *e, pt_vec3 p_ref, float u0,
-                                           float u1, struct pt_light_sample *out)
-{
-    const struct pt_light *light = &scene->lights[e->light];
-    out->radiance = light->emission;
-    out->delta = 0;
-    out->finite = 1;
-    return pt_light_triangle_towards(e, light->two_sided, p_ref, u0, u1, out);
 }
 
 /* Density with which sampling towards `at` would have chosen the point p (unit geometric normal n) of a shape's

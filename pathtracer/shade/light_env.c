@@ -278,7 +278,6 @@ int pt_light_env_sample(const struct pt_scene *scene, const struct pt_light *lig
 {
     const int constant = light->kind == PT_LIGHT_ENV_CONSTANT;
     float through = 0.0f, by_image = 0.0f;
-    out->pixel = NULL;
     if (light->has_portal && (constant || u0 < 0.5f)) {
         through = pt_portal_sample(light, p, constant ? u0 : 2.0f * u0, u1, &out->wi);
         if (!(through > 0.0f))
@@ -292,9 +291,6 @@ int pt_light_env_sample(const struct pt_scene *scene, const struct pt_light *lig
     }
     float pdf = mixed(light, through, by_image);
     out->inv_pdf_solid = 1.0f / pdf;
-    out->radiance = light->emission;
-    out->delta = 0;
-    out->finite = 0;
     return pdf > 0.0f;
 }
 

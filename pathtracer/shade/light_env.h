@@ -11,8 +11,8 @@
 pt_vec3 pt_light_env_image_eval(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 w);
 /* Density with which pt_light_env_sample chooses w at p, without the probability of the selection. */
 float pt_light_env_density(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 p, pt_vec3 w);
-/* A direction at p by numbers in [0, 1); 0 when there is none. Half of the samples go through the portal where there is one;
- * all of them if the environment is constant, which is selected for that only. */
+/* A direction at p by numbers in [0, 1), its density, and the image's pixel; 0 when there is none. Half of the samples go
+ * through the portal where there is one; all of them if the environment is constant, which is selected for that only. */
 int pt_light_env_sample(const struct pt_scene *scene, const struct pt_light *light, pt_vec3 p, float u0, float u1,
                         struct pt_light_sample *out);
 /* The distribution from which the image is sampled, in the scene's arena; 0 when out of memory. */
