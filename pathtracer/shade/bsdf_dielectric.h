@@ -24,28 +24,6 @@ static inline void pt_dielectric_closure(pt_effects fx, const struct pt_scene *s
     b->eta = m->eta;
 }
 
-/*
- * Shading normals may see a direction on another side of the interface than it is on. In which medium a ray is says the
- * geometric normal, for glass as for fog: it decides which way round wo meets the index, and that radiance shrinks by etap²
- * where a path crosses the surface, not where it crosses the plane of the shading normal. Along a path these factors cancel,
- * so that no normal makes glass brighter than what is around it.
- */
-
-/* Turns *b over if wo, whose cosine with the geometric normal is `cos_geometric`, is not on the side that wo.z says. */
-static inline void pt_dielectric_face(struct pt_bsdf *b, pt_vec3 wo, float cos_geometric)
-{
-    if (wo.z * cos_geometric < 0.0f)
-        b->eta = 1.0f / b->eta;
-}
-
-/* What the factor for radiance's shrinking must be corrected by when light from wi `crosses` the surface, or does not. */
-static inline float pt_dielectric_side_factor(const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, int crosses)
-{
-    float etap = wo.z < 0.0f ? 1.0f / b->eta : b->eta;
-    int transmits = wo.z * wi.z < 0.0f;
-    return transmits == crosses ? 1.0f : crosses ? 1.0f / (etap * etap) : etap * etap;
-}
-
 static inline int pt_dielectric_has_smooth(const struct pt_bsdf *b) { return !pt_dielectric_is_smooth(b); }
 
 static inline pt_vec3 pt_dielectric_albedo(const struct pt_bsdf *b, pt_vec3 wo)

@@ -34,20 +34,30 @@ static inline void pt_material_bsdf(pt_effects fx, const struct pt_scene *scene,
 #undef PT_BSDF_CASE
 }
 
-/* To be called once for a closure, before it is evaluated; cos_geometric: of wo with the geometric normal. */
+/*
+ * Shading normals may see a direction on another side of the interface than it is on. In which medium a ray is says the
+ * geometric normal, for glass as for fog: it decides which way round wo meets the index, and that radiance shrinks by etap²
+ * where a path crosses the surface, not where it crosses the plane of the shading normal. Along a path these factors cancel,
+ * so that no normal makes glass brighter than what is around it.
+ */
+
+/* Turns glass over if wo, whose cosine with the geometric normal is `cos_geometric`, is not on the side that wo.z says. To be
+ * called once for a closure, before it is evaluated. */
 static inline void pt_bsdf_face(pt_effects fx, struct pt_bsdf *b, pt_vec3 wo, float cos_geometric)
 {
-    if ((fx & PT_FX_TRANSMISSION) && b->kind == PT_BSDF_DIELECTRIC)
-        pt_dielectric_face(b, wo, cos_geometric);
+    if ((fx & PT_FX_TRANSMISSION) && b->kind == PT_BSDF_DIELECTRIC && wo.z * cos_geometric < 0.0f)
+        b->eta = 1.0f / b->eta;
 }
 
 /* Factor on what pt_bsdf_eval and pt_bsdf_sample say of wi; 1 where the shading normal sees wo and wi on the sides that they
  * are on. `crosses`: these are different ones. */
 static inline float pt_bsdf_side_factor(pt_effects fx, const struct pt_bsdf *b, pt_vec3 wo, pt_vec3 wi, int crosses)
 {
-    if (!(fx & PT_FX_TRANSMISSION) || b->kind != PT_BSDF_DIELECTRIC)
+    int transmits = wo.z * wi.z < 0.0f;
+    if (!(fx & PT_FX_TRANSMISSION) || b->kind != PT_BSDF_DIELECTRIC || transmits == crosses)
         return 1.0f;
-    return pt_dielectric_side_factor(b, wo, wi, crosses);
+    float etap = wo.z < 0.0f ? 1.0f / b->eta : b->eta;
+    return crosses ? 1.0f / (etap * etap) : etap * etap;
 }
 
 /* Whether any part of *b is not a delta distribution: next-event estimation is of no use when it returns 0. */
