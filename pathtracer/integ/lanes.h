@@ -60,7 +60,6 @@ struct pt_lane_paths {
 };
 
 struct pt_lanes {
-    const char *name; /* "base", "avx2", "avx512" */
     /* u[d][i] for i < count: the number of dimension d of block `block` of path i. */
     void (*numbers)(const struct pt_lane_keys *keys, int count, uint32_t block, struct pt_lane_dims dims,
                     float (*u)[PT_RUN]);

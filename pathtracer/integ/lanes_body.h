@@ -7,8 +7,6 @@
 
 #define PT_LANES_JOIN(a, b) a##b
 #define PT_LANES_TABLE(name) PT_LANES_JOIN(pt_lanes_, name)
-#define PT_LANES_TEXT_OF(name) #name
-#define PT_LANES_TEXT(name) PT_LANES_TEXT_OF(name)
 
 static void sobol_pair(const struct pt_lane_keys *keys, int count, uint32_t dim, float *restrict x, float *restrict y)
 {
@@ -135,4 +133,4 @@ static void bounce(const struct pt_lane_hits *hits, float (*u)[PT_RUN], int coun
 }
 
 extern const struct pt_lanes PT_LANES_TABLE(PT_LANES_NAME);
-const struct pt_lanes PT_LANES_TABLE(PT_LANES_NAME) = {PT_LANES_TEXT(PT_LANES_NAME), numbers, bounce};
+const struct pt_lanes PT_LANES_TABLE(PT_LANES_NAME) = {numbers, bounce};

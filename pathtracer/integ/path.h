@@ -239,27 +239,27 @@ PT_KERNEL_INLINE float pt_mis_weight(float p, float q)
     return 1.0f / (1.0f + r * r);
 }
 
-PT_KERNEL_INLINE int pt_path_sample_light(pt_effects fx, const struct pt_path *path, const struct pt_receiver *at,
-                                          struct pt_sample2 u, struct pt_light_sample *light)
+/* Light towards the last vertex, for its plan; 0: none. */
+PT_KERNEL_INLINE int pt_path_sample_light(pt_effects fx, struct pt_path *path, struct pt_sample2 u)
 {
     if (path->scene->emitter_count == 0 || path->settings->strategy != PT_STRATEGY_MIS)
         return 0;
-    return pt_light_sample(fx, path->scene, at, pt_path_1d(path, PT_DIM_LIGHT_PICK), u.x, u.y, light);
+    return pt_light_sample(fx, path->scene, &path->prev, pt_path_1d(path, PT_DIM_LIGHT_PICK), u.x, u.y, &path->plan.light);
 }
 
 /* `f` is BSDF · cos or the phase function towards the light, `pdf` the density with which it would have sampled that. */
-PT_KERNEL_INLINE void pt_path_plan_light(pt_effects fx, const struct pt_path *path, pt_vec3 f, float pdf, pt_vec3 origin,
-                                         int32_t medium, struct pt_light_plan *plan)
+PT_KERNEL_INLINE void pt_path_plan_light(pt_effects fx, struct pt_path *path, pt_vec3 f, float pdf, pt_vec3 origin,
+                                         int32_t medium)
 {
-    struct pt_light_sample *light = &plan->light;
+    struct pt_light_sample *light = &path->plan.light;
     float scale = light->inv_pdf_solid, r = pdf * scale;
     if (fx & PT_FX_ALPHA)
         scale *= pt_place_lamp_alpha(path->scene, light);
     if (!((fx & (PT_FX_DELTA_LIGHT | PT_FX_ALPHA)) && light->delta))
         scale *= 1.0f / (1.0f + r * r); /* power heuristic */
-    plan->add = v3_mul(v3_scale(v3_mul(f, light->radiance), scale), path->throughput);
-    plan->origin = origin;
-    plan->medium = medium;
+    path->plan.add = v3_mul(v3_scale(v3_mul(f, light->radiance), scale), path->throughput);
+    path->plan.origin = origin;
+    path->plan.medium = medium;
 }
 
 /* The ray that says whether the planned light arrives. */
@@ -376,10 +376,9 @@ PT_KERNEL_INLINE int pt_path_cross_medium(pt_effects fx, struct pt_path *path, f
     if (path->trace)
         pt_trace_scatter(path->trace, path->medium, p, path->throughput);
     path->prev = (struct pt_receiver){p, v3_splat(0.0f), PT_RECEIVER_VOLUME};
-    struct pt_light_plan *plan = &path->plan;
-    if (pt_path_sample_light(fx, path, &path->prev, pt_path_2d(path, PT_DIM_LIGHT), &plan->light)) {
-        float phase = pt_phase_eval(medium->g, wo, plan->light.wi);
-        pt_path_plan_light(fx, path, v3_splat(phase), phase, p, path->medium, plan);
+    if (pt_path_sample_light(fx, path, pt_path_2d(path, PT_DIM_LIGHT))) {
+        float phase = pt_phase_eval(medium->g, wo, path->plan.light.wi);
+        pt_path_plan_light(fx, path, v3_splat(phase), phase, p, path->medium);
     }
     struct pt_sample2 u = pt_sampler_2d(&path->sampler, PT_DIM_PHASE);
     path->pdf_prev = pt_phase_sample(medium->g, wo, u.x, u.y, &wi);
@@ -464,19 +463,19 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
     if (path->trace)
         pt_trace_surface(path->trace, at, &bsdf, path->throughput);
 
-    struct pt_light_plan *plan = &path->plan;
     path->prev = pt_path_receiver(fx, at->p, &frame, &bsdf, wo);
-    if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, &path->prev, u_light, &plan->light)) {
+    if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, u_light)) {
+        const struct pt_light_sample *light = &path->plan.light;
         float pdf;
-        pt_vec3 wi = plan->light.wi, wi_local = pt_frame_to_local(&frame, wi);
+        pt_vec3 wi = light->wi, wi_local = pt_frame_to_local(&frame, wi);
         pt_vec3 f = pt_bsdf_eval(fx, &bsdf, wo, wi_local, &pdf);
         int crosses = pt_path_crosses(at, wo_world, wi);
-        if (crosses && !pt_bsdf_transmits(fx, &bsdf) && (plan->light.finite || plan->light.delta))
+        if (crosses && !pt_bsdf_transmits(fx, &bsdf) && (light->finite || light->delta))
             f = v3_splat(0.0f);
         else if (fx & PT_FX_TRANSMISSION)
             f = v3_scale(f, pt_bsdf_side_factor(fx, &bsdf, wo, wi_local, crosses));
         pt_path_plan_light(fx, path, f, pdf, pt_offset_point(at->p, at->s.n_geometric, at->error, wi),
-                           fx & PT_FX_MEDIA ? pt_medium_towards(at, wi, path->medium) : -1, plan);
+                           fx & PT_FX_MEDIA ? pt_medium_towards(at, wi, path->medium) : -1);
     }
     return pt_path_scatter(fx, path, at, &frame, &bsdf, wo, u_bsdf);
 }

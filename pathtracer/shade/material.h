@@ -50,19 +50,15 @@ static inline const struct pt_material *pt_material_resolve(pt_effects fx, const
     return m;
 }
 
-static inline int pt_material_is_anisotropic(const struct pt_material *m)
-{
-    return m->roughness_u.texture != m->roughness_v.texture || m->roughness_u.value.x != m->roughness_v.value.x ||
-           m->base_roughness_u.texture != m->base_roughness_v.texture ||
-           m->base_roughness_u.value.x != m->base_roughness_v.value.x;
-}
-
 /* Whether pt_material_frame reads dpdu and dpdv. */
 static inline int pt_material_needs_tangents(pt_effects fx, const struct pt_material *m)
 {
     if ((fx & PT_FX_BUMP) && (m->bump || m->normal_map))
         return 1;
-    return (fx & PT_FX_GLOSSY) && pt_material_is_anisotropic(m);
+    return (fx & PT_FX_GLOSSY) &&
+           (m->roughness_u.texture != m->roughness_v.texture || m->roughness_u.value.x != m->roughness_v.value.x ||
+            m->base_roughness_u.texture != m->base_roughness_v.texture ||
+            m->base_roughness_u.value.x != m->base_roughness_v.value.x);
 }
 
 /* Shading frame; its n stays on the side of n_geometric, its s follows dpdu where that matters. */
