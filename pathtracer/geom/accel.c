@@ -1,12 +1,15 @@
+#define _GNU_SOURCE 1 /* RTLD_DEFAULT */
 #include "geom/accel.h"
 
+#include <dlfcn.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 #include "geom/embree.h"
 #include "geom/quadric.h"
-#include "geom/terminate.h"
 
 struct pt_accel {
     RTCDevice device;
@@ -123,6 +126,34 @@ static void quadric_occluded(const struct RTCOccludedFunctionNArguments *args)
             lanes[TFAR * n + i].f = -INFINITY;
 }
 
+/* --- out of memory ---------------------------------------------------------------------------------------------------- */
+
+/* What memory is wanted for, in errors. */
+#define WHAT "the acceleration structure"
+
+/*
+ * When memory runs out in the middle of a parallel loop of a library in C++, its exception cannot leave the loop, and the
+ * process is aborted with what C++ says of it. With this as its last word it ends with a line and exit status 1 instead, as
+ * any other lack of memory does.
+ */
+static void say_and_end(void)
+{
+    static const char line[] = "lull-render: out of memory (" WHAT ")\n";
+    (void)!write(STDERR_FILENO, line, sizeof line - 1);
+    _exit(1);
+}
+
+typedef void (*handler)(void);
+
+/* std::set_terminate: a program in C has it by the libraries that are in C++, or needs none. */
+static handler set_handler(handler now)
+{
+    handler (*set_terminate)(handler);
+    void *symbol = dlsym(RTLD_DEFAULT, "_ZSt13set_terminatePFvvE");
+    memcpy(&set_terminate, &symbol, sizeof set_terminate); /* a pointer to data into one to a function */
+    return set_terminate ? set_terminate(now) : NULL;
+}
+
 /* --- building --------------------------------------------------------------------------------------------------------- */
 
 static bool count_bytes(void *user, ssize_t bytes, bool post)
@@ -214,12 +245,6 @@ static int attach(RTCScene target, RTCGeometry g, unsigned id)
     return 1;
 }
 
-/* Whether rays can go on behind this shape. */
-static int is_passable(const struct pt_scene *scene, const struct pt_shape *shape)
-{
-    return shape->has_alpha || scene->materials[shape->material].kind == PT_MATERIAL_INTERFACE;
-}
-
 static RTCScene make_group(struct pt_scene *scene, const struct pt_accel *accel, int32_t first, int32_t count, int commit)
 {
     RTCDevice device = accel->device;
@@ -287,8 +312,8 @@ static int build(struct pt_scene *scene, struct pt_accel *accel)
         return 0;
     accel->packet = native_packet(accel->device);
     accel->flags = RTC_SCENE_FLAG_ROBUST;
-    for (int32_t i = 0; i < scene->shape_count; i++)
-        if (is_passable(scene, &scene->shapes[i]))
+    for (int32_t i = 0; i < scene->shape_count; i++) /* rays can go on behind some */
+        if (scene->shapes[i].has_alpha || scene->materials[scene->shapes[i].material].kind == PT_MATERIAL_INTERFACE)
             accel->flags = RTC_SCENE_FLAG_ROBUST | PT_EMBREE_FLAG_FILTER;
     rtcSetDeviceMemoryMonitorFunction(accel->device, count_bytes, accel);
     for (int32_t i = 0; i < scene->object_count; i++) {
@@ -305,17 +330,16 @@ static int build(struct pt_scene *scene, struct pt_accel *accel)
 
 int pt_accel_build(struct pt_scene *scene, struct base_err *err)
 {
-    static const char what[] = "the acceleration structure";
     struct pt_accel *accel = calloc(1, sizeof *accel);
     if (!accel)
-        return base_fail_nomem(err, what);
-    pt_terminate_begin(what);
+        return base_fail_nomem(err, WHAT);
+    handler before = set_handler(say_and_end); /* one thread at a time */
     int built = build(scene, accel);
     if (!built)
         destroy(scene, accel); /* Embree may lack memory for that, too */
-    pt_terminate_end();
+    set_handler(before);
     if (!built)
-        return base_fail_nomem(err, what);
+        return base_fail_nomem(err, WHAT);
     struct RTCBounds b;
     rtcGetSceneBounds(accel->world, &b);
     if (b.lower_x <= b.upper_x) {
