@@ -68,6 +68,6 @@ int pt_action_debug_path(const struct pt_scene *scene, const struct pt_render_co
     if (at[0] >= config->width || at[1] >= config->height)
         return base_fail(err, BASE_EINVAL, "--debug-path %d,%d,%d: the image has %dx%d pixels", at[0], at[1], at[2],
                          config->width, config->height);
-    pt_kernel_trace(scene, &config->integrator, (uint32_t)at[0], (uint32_t)at[1], (uint32_t)at[2], stdout);
+    pt_kernel_trace(scene, &config->integrator, (uint32_t)at[0], (uint32_t)at[1], (uint32_t)at[2], stdout, NULL);
     return 0;
 }

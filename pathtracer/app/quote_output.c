@@ -28,7 +28,7 @@ static void take_census(const struct pt_render *r, const struct lull_host_block 
     for (uint32_t i = 0; i < REPLAYED; i++) {
         uint32_t at = (uint32_t)((uint64_t)i * pixels / REPLAYED);
         uint32_t x = (uint32_t)b->x0 + at % width, y = (uint32_t)b->y0 + at / width;
-        pt_kernel_census(r->scene, &r->config.integrator, x, y, i, met);
+        pt_kernel_trace(r->scene, &r->config.integrator, x, y, i, NULL, met);
     }
     expensive->mostly = "nothing";
     for (int k = 0; k < PT_MET_COUNT; k++) {

@@ -123,7 +123,7 @@ static void draw(const char *path, const struct way *way, struct picture *out)
     memset(out, 0, sizeof *out);
     print_scene(scene, kernel_name, out->made, sizeof out->made);
     for (uint32_t i = 0; i < PIXELS; i++)
-        pt_kernel_census(scene, &settings, i % WIDTH, i / WIDTH, 0, out->met);
+        pt_kernel_trace(scene, &settings, i % WIDTH, i / WIDTH, 0, NULL, out->met);
     for (int y = 0; y < HEIGHT; y++)
         for (uint32_t sample = 0; sample < SPP; sample++) {
             struct pt_path_result row[WIDTH];

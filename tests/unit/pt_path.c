@@ -209,7 +209,7 @@ static void trace_tells_the_same_path(void **state)
     rich_scene(&scene, 1);
     pt_kernel_all(&scene, &settings, 12, 14, 1, 3, &r);
     capture_begin(&messages);
-    pt_kernel_trace(&scene, &settings, 12, 14, 3, messages.log.out);
+    pt_kernel_trace(&scene, &settings, 12, 14, 3, messages.log.out, NULL);
     capture_end(&messages);
     snprintf(expected, sizeof expected, "\nend: pixel value (%g, %g, %g)\n", (double)r.radiance.x, (double)r.radiance.y,
              (double)r.radiance.z);
