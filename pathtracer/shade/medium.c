@@ -43,17 +43,12 @@ static void homogeneous_sample(const struct pt_medium *m, float t_max, pt_vec3 t
     float u = pt_rng_float(rng);
     float sigma = u < share.x ? sigma_t.x : u < share.x + share.y ? sigma_t.y : sigma_t.z;
     float t = sigma > 0.0f ? -log1pf(-pt_rng_float(rng)) / sigma : INFINITY;
-    if (t < t_max) {
-        pt_vec3 tr = beer_rgb(sigma_t, t);
-        float pdf = v3_dot(share, v3_mul(sigma_t, tr));
-        event->scattered = 1;
-        event->t = t;
-        event->weight = pdf > 0.0f ? v3_scale(v3_mul(m->sigma_s, tr), 1.0f / pdf) : v3_splat(0.0f);
-    } else {
-        pt_vec3 tr = beer_rgb(sigma_t, t_max);
-        float p = v3_dot(share, tr);
-        event->weight = p > 0.0f ? v3_scale(tr, 1.0f / p) : v3_splat(0.0f);
-    }
+    event->scattered = t < t_max;
+    event->t = event->scattered ? t : t_max;
+    pt_vec3 tr = beer_rgb(sigma_t, event->t);
+    float pdf = v3_dot(share, event->scattered ? v3_mul(sigma_t, tr) : tr);
+    pt_vec3 value = event->scattered ? v3_mul(m->sigma_s, tr) : tr;
+    event->weight = pdf > 0.0f ? v3_scale(value, 1.0f / pdf) : v3_splat(0.0f);
 }
 
 void pt_medium_sample_distance(const struct pt_medium *medium, pt_vec3 origin, pt_vec3 direction, float t_max,
