@@ -39,12 +39,4 @@ static inline pt_vec3 pt_sample_cosine(float u0, float u1)
     return v3(r * (1.0f - 2.0f * s2 * s2), r * (2.0f * s2 * c2), sqrtf(rest > 1e-12f ? rest : 1e-12f));
 }
 
-/* Uniform on the sphere; pdf_solid = 1/(4π). */
-static inline pt_vec3 pt_sample_sphere(float u0, float u1)
-{
-    float z = 1.0f - 2.0f * u0, r = sqrtf(fmaxf(0.0f, 1.0f - z * z)), s, c;
-    pt_sincos_turn(u1, &s, &c);
-    return v3(r * c, r * s, z);
-}
-
 #endif

@@ -6,6 +6,7 @@
 
 #include "sample/rng.h"
 #include "shade/bsdf_dispatch.h"
+#include "support/pt_sphere.h"
 
 struct bsdf_case {
     const char *name;

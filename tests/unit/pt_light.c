@@ -13,9 +13,9 @@
 #include "integ/surface.h"
 #include "shade/alias.h"
 #include "shade/light_select.h"
-#include "shade/warp.h"
 #include "support/pt_scenes.h"
 #include "support/pt_mat34.h"
+#include "support/pt_sphere.h"
 
 enum { SAMPLES = 200000 };
 static const double PI = 3.14159265358979323846;

@@ -9,9 +9,9 @@
 #include "sample/rng.h"
 #include "scene/settings.h"
 #include "shade/light_select.h"
-#include "shade/warp.h"
 #include "support/pt_scenes.h"
 #include "support/pt_mat34.h"
+#include "support/pt_sphere.h"
 
 enum { EMITTERS_MAX = 256, SWEEP = 1 << 15, PLACES = 60 };
 

@@ -14,7 +14,7 @@
 #include "integ/surface.h"
 #include "sample/rng.h"
 #include "shade/light_select.h"
-#include "shade/warp.h"
+#include "support/pt_sphere.h"
 #include "support/pt_text_scene.h"
 
 enum { RAYS = 400 };

@@ -16,8 +16,8 @@
 #include "integ/surface.h"
 #include "pbrt/load.h"
 #include "sample/rng.h"
-#include "shade/warp.h"
 #include "support/pt_captured.h"
+#include "support/pt_sphere.h"
 
 enum { CORNERS = 6, FACES = 8, RAYS = 200 };
 /* An octahedron, whose corners are the outward normals at them. */
