@@ -39,8 +39,8 @@ pt_kernel *pt_kernel_select(pt_effects needed, pt_effects *covers, const char **
 /* What the vertices of paths are: a scattering model each, or a collision in a medium. */
 enum { PT_MET_MEDIUM = PT_BSDF_COUNT, PT_MET_COUNT };
 
-/* One path vertex by vertex: in words on `out` (--debug-path), and added to met[PT_MET_COUNT]; either may be NULL. Slower than
- * the other kernels. */
+/* One path vertex by vertex: in words on `out` (--debug-path), and added to met[PT_MET_COUNT]; either may be NULL. Slower
+ * than the other kernels. */
 void pt_kernel_trace(const struct pt_scene *scene, const struct pt_integrator *settings, uint32_t x, uint32_t y,
                      uint32_t sample, FILE *out, uint64_t *met);
 

@@ -101,10 +101,10 @@ struct pt_mesh {
 enum pt_quadric_kind { PT_QUADRIC_SPHERE, PT_QUADRIC_DISK, PT_QUADRIC_CYLINDER };
 
 struct pt_quadric {
-    int32_t kind;                           /* enum pt_quadric_kind */
-    float radius, inner_radius;             /* inner: disk only */
-    float z_min, z_max;                     /* sphere: within its radius, all of that = whole; cylinder; disk: both its height */
-    float phi_max;                          /* radians, 2π = whole */
+    int32_t kind;               /* enum pt_quadric_kind */
+    float radius, inner_radius; /* inner: disk only */
+    float z_min, z_max;         /* sphere: within ± radius, all of it = whole; cylinder; disk: both its height */
+    float phi_max;              /* radians, 2π = whole */
     struct pt_mat34 to_render, from_render; /* quadric's own space ↔ render (or the object's) space */
 };
 

@@ -41,8 +41,8 @@ static inline void pt_material_bsdf(pt_effects fx, const struct pt_scene *scene,
  * so that no normal makes glass brighter than what is around it.
  */
 
-/* Turns glass over if wo, whose cosine with the geometric normal is `cos_geometric`, is not on the side that wo.z says. To be
- * called once for a closure, before it is evaluated. */
+/* Turns glass over if wo, whose cosine with the geometric normal is `cos_geometric`, is not on the side that wo.z says. To
+ * be called once for a closure, before it is evaluated. */
 static inline void pt_bsdf_face(pt_effects fx, struct pt_bsdf *b, pt_vec3 wo, float cos_geometric)
 {
     if ((fx & PT_FX_TRANSMISSION) && b->kind == PT_BSDF_DIELECTRIC && wo.z * cos_geometric < 0.0f)
