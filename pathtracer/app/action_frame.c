@@ -5,7 +5,6 @@
 #include "agree.h"
 #include "base/interrupt.h"
 #include "render/farm.h"
-#include "render/host_find.h"
 
 /* What the scene asks for, and what decides when a block of it is done. */
 static int explain(struct pt_open *o, struct base_err *err)

@@ -9,8 +9,6 @@
 
 #include "base/files.h"
 #include "render/checkpoint.h"
-#include "render/host_find.h"
-#include "render/host_planes.h"
 #include "render/output.h"
 #include "shot_table.h"
 #include "watch.h"

@@ -4,7 +4,6 @@
 
 #include "quote_output.h"
 #include "render/checkpoint.h"
-#include "render/host_find.h"
 #include "watch.h"
 
 struct pilot {

@@ -3,7 +3,6 @@
 #include <zlib.h>
 
 #include "base/version.h"
-#include "render/host.h"
 
 static int32_t add_to_crc(const struct lull_writer *to, const void *data, uint64_t size)
 {

@@ -6,7 +6,6 @@
 #include "base/clock.h"
 #include "base/files.h"
 #include "pbrt/load.h"
-#include "render/host_find.h"
 #include "render/output.h"
 #include "sample/sampler.h"
 

@@ -10,7 +10,6 @@
 #include "base/log.h"
 #include "frame.h"
 #include "integ/integrator.h"
-#include "render/mask.h"
 #include "render/render.h"
 #include "scene/scene.h"
 

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "base/files.h"
-#include "render/host.h"
 
 /*
  * magic[8], identity bytes, identity; film bytes, film arrays; the state of the frame (lull_host_save); crc32 of all before.

@@ -2,7 +2,6 @@
 
 #include <stdlib.h>
 
-#include "render/host_planes.h"
 
 void pt_denoised_release(struct pt_denoised *d)
 {

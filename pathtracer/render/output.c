@@ -12,7 +12,6 @@
 #include "picture/png.h"
 #include "base/version.h"
 #include "image/exr.h"
-#include "render/host.h"
 
 /* The block that a pixel is in. Blocks of the list form a full rectangle of grid cells. */
 static const struct lull_host_block *block_at(const struct lull_host_blocks *b, int x, int y)

@@ -6,8 +6,6 @@
 #include <string.h>
 
 #include "base/options.h"
-#include "render/host.h"
-#include "render/host_planes.h"
 
 enum { COARSER = 3 }; /* of `times`, those coarser than what is just seen */
 static const struct pt_quote_setting times[] = {

@@ -5,7 +5,6 @@
 
 #include "base/clock.h"
 #include "render/farm.h"
-#include "render/host_planes.h"
 
 /* Length of a slice: short enough for a live line, an interrupt and a time budget, long enough that its barrier costs
  * nothing. */

@@ -18,8 +18,7 @@
 #include "pbrt/load.h"
 #include "render/checkpoint.h"
 #include "render/denoised.h"
-#include "render/host_find.h"
-#include "render/host_planes.h"
+#include "render/host.h"
 #include "render/output.h"
 #include "support/pt_identity.h"
 

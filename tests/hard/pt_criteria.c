@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "render/host_find.h"
+#include "render/host.h"
 #include "support/pt_fake.h"
 
 enum { BLOCK = 100, FIRST_CHECK = 32 };

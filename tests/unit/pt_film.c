@@ -9,7 +9,7 @@
 #include <lull/criterion_kit.h>
 
 #include "host/frame.h"
-#include "render/host_planes.h"
+#include "render/host.h"
 
 static struct pt_path_result sample_of(float r, float g, float b)
 {
