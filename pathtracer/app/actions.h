@@ -15,6 +15,9 @@ int pt_action_status(enum pt_render_outcome outcome);
 int pt_action_frame(struct pt_open *open, const struct pt_shot_frame *frame, struct job *job, int *status,
                     struct base_err *err);
 
+/* What every process of a job must have alike: the version, the identity, the model that the criterion starts with. */
+int pt_agree_identity(const struct pt_open *open, struct base_identity *to, struct base_err *err);
+
 int pt_action_image(struct pt_open *open, int *status, struct base_err *err);
 /* The last line of a render: what it came to. */
 void pt_action_summary(const struct pt_render *render, struct base_log *log);
@@ -22,7 +25,6 @@ void pt_action_summary(const struct pt_render *render, struct base_log *log);
 /* A pilot and its answer, which the caller destroys. *status not 0: it was ended before. */
 int pt_action_pilot(struct pt_open *open, struct pt_quote **quote, int *status, struct base_err *err);
 int pt_action_quote(struct pt_open *open, int *status, struct base_err *err);
-int pt_action_record(struct pt_open *open, int *status, struct base_err *err);
 
 /* --explain: the effects that a scene calls for, why, and what they cost, on stdout. Times a few thousand paths (about a
  * second) with the chosen kernel and with the general one. name: the scene's, for the heading. */

@@ -10,8 +10,7 @@
 
 #include <cmocka.h>
 
-#include "app/agree.h"
-#include "app/open.h"
+#include "app/actions.h"
 #include "base/files.h"
 #include "integ/integrator.h"
 #include "host/frame.h"
