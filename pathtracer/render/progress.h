@@ -23,7 +23,7 @@ struct pt_progress {
     struct pt_progress_pace pace;
     double percent;   /* of the work, as of the last line … */
     uint64_t samples; /* … when the render had so many */
-    int map;          /* above the line stand the blocks (render/progress_map.h), as large as a terminal has room */
+    int map;          /* above the line stand the blocks, as large as a terminal has room */
     char quality[48]; /* the criterion's quality parameter, told beside the map; "": it has none */
 };
 
