@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
+#include "base/files.h"
 #include "job/job.h"
 #include "pbrt/xform.h"
 #include "render/checkpoint.h"
@@ -15,20 +15,28 @@
 
 static int expected(struct base_err *err, const char *what) { return base_fail(err, BASE_EINVAL, "expected %s", what); }
 
-/* n integers in [low, high] with one separator character between them. */
+/* An integer in [low, high] of so many characters. */
+static int get_integer(const char *text, size_t length, int64_t low, int64_t high, int *out)
+{
+    char part[24];
+    int64_t v;
+    if (length >= sizeof part)
+        return 0;
+    memcpy(part, text, length);
+    part[length] = '\0';
+    if (!base_parse_integer(part, low, high, &v))
+        return 0;
+    *out = (int)v;
+    return 1;
+}
+
+/* n of them with one separator character between them. */
 static int get_list(const char *text, char separator, int n, int64_t low, int64_t high, int *out)
 {
     for (int i = 0; i < n; i++) {
-        char part[24];
-        int64_t v;
-        size_t length = i + 1 < n ? strcspn(text, (char[]){separator, '\0'}) : strlen(text);
-        if (length >= sizeof part || (i + 1 < n && text[length] != separator))
+        const size_t length = i + 1 < n ? strcspn(text, (char[]){separator, '\0'}) : strlen(text);
+        if ((i + 1 < n && text[length] != separator) || !get_integer(text, length, low, high, &out[i]))
             return 0;
-        memcpy(part, text, length);
-        part[length] = '\0';
-        if (!base_parse_integer(part, low, high, &v))
-            return 0;
-        out[i] = (int)v;
         text += length + 1;
     }
     return 1;
@@ -180,18 +188,11 @@ static int set_denoise(void *into, const char *value, struct base_err *err)
     return 0;
 }
 
-/* `path` ends in `.ending`, whatever the case. */
-static int has_ending(const char *path, const char *ending)
-{
-    const char *dot = strrchr(path, '.');
-    return dot && strcasecmp(dot + 1, ending) == 0;
-}
-
 static int set_stop_map(void *into, const char *value, struct base_err *err)
 {
     const char **maps = &((struct pt_cli *)into)->paths[PT_STOP_MAPS];
     int count = 0;
-    if (!has_ending(value, "png") && !has_ending(value, "csv"))
+    if (!base_file_has_ending(value, "png") && !base_file_has_ending(value, "csv"))
         return expected(err, "a name that ends in .png or .csv");
     while (count < PT_CLI_MAX_STOP_MAPS && maps[count])
         count++;
@@ -212,20 +213,14 @@ static int set_debug_path(void *into, const char *value, struct base_err *err)
 
 static int set_quote_pilot(void *into, const char *value, struct base_err *err)
 {
-    struct pt_cli *cli = into;
-    char spp[24];
-    int64_t n;
-    size_t length = strcspn(value, ":");
-    if (length < sizeof spp) {
-        memcpy(spp, value, length);
-        spp[length] = '\0';
-        if (base_parse_integer(spp, 1, INT32_MAX, &n) &&
-            (value[length] == '\0' || base_parse_real(value + length + 1, 0.01, 1e9, &cli->render.pilot_s))) {
-            cli->render.pilot_spp = (uint64_t)n;
-            return 0;
-        }
-    }
-    return expected(err, "SPP or SPP:SECONDS, samples per pixel from 1, seconds from 0.01");
+    struct pt_render_config *r = &((struct pt_cli *)into)->render;
+    const size_t length = strcspn(value, ":");
+    int spp;
+    if (!get_integer(value, length, 1, INT32_MAX, &spp) ||
+        (value[length] != '\0' && !base_parse_real(value + length + 1, 0.01, 1e9, &r->pilot_s)))
+        return expected(err, "SPP or SPP:SECONDS, samples per pixel from 1, seconds from 0.01");
+    r->pilot_spp = (uint64_t)spp;
+    return 0;
 }
 
 /* --- what the image depends on: options of several parts, or whose line has another name --------------------------  */
