@@ -172,15 +172,6 @@ static int check_names(const struct pt_cli *cli, const struct pt_shot *s, struct
     return 0;
 }
 
-/* By --frames and --camera-path. BASE_EINVAL when these, or names in the command line, do not fit together or a scene is not
- * there. *s is released by pt_shot_release, after a failure too. */
-static int find_frames(const struct pt_cli *cli, struct pt_shot *s, struct base_err *err)
-{
-    *s = (struct pt_shot){0};
-    int rc = cli->shot.camera_path ? read_path(&cli->shot, s, err) : pt_shot_parse_frames(cli->shot.frames, s, err);
-    return rc ? rc : check_names(cli, s, err);
-}
-
 void pt_shot_release(struct pt_shot *s)
 {
     free(s->frames);
@@ -190,48 +181,29 @@ void pt_shot_release(struct pt_shot *s)
 
 /* --- frame by frame -------------------------------------------------------------------------------------------------- */
 
-/* An empty file holds nobody's place: that of another program, or what a full disk left. */
-static int is_there(const char *path)
-{
-    struct stat st;
-    return stat(path, &st) == 0 && st.st_size > 0;
-}
-
-/* Samples by the table instead of a criterion. */
-static int use_table(struct pt_shot_frame *f, const struct pt_shot_table *table, const char *name, struct base_err *err)
-{
-    f->table = table;
-    f->block_spp = pt_shot_table_frame(table, f->number);
-    return f->block_spp ? 0 : base_fail(err, BASE_EINVAL, "%s: frame %d is not in it", name, f->number);
-}
-
 static int render_frame(struct pt_open *o, struct pt_shot_frame *f, const struct pt_shot_table *table, const char *place,
                         int *status, struct base_err *err)
 {
     const char *output = f->paths[PT_OUTPUT], *checkpoint = f->paths[PT_CHECKPOINT];
+    struct stat st;
     int rc = 0;
-    if (is_there(output) && pt_output_is_ours(output) && pt_exr_is_whole(output)) {
+    if (pt_output_is_ours(output) && pt_exr_is_whole(output)) {
         base_log_note(o->log, "frame %d: %s is there", f->number, output);
         return 0;
     }
-    if (table)
-        rc = use_table(f, table, o->cli->shot.table, err);
+    if (table && !(f->block_spp = pt_shot_table_frame(table, f->number)))
+        rc = base_fail(err, BASE_EINVAL, "%s: frame %d is not in it", o->cli->shot.table, f->number);
+    f->table = table;
     if (!rc)
         rc = base_file_check_kind(checkpoint, &pt_checkpoint_kind, err);
     if (rc)
         return rc;
     base_log_note(o->log, "frame %d (%s)", f->number, place);
-    f->resume = checkpoint && is_there(checkpoint);
+    f->resume = checkpoint && stat(checkpoint, &st) == 0 && st.st_size > 0; /* an empty one is what a full disk left */
     rc = pt_action_frame(o, f, NULL, status, err);
     if (!rc && *status == 0 && checkpoint && unlink(checkpoint) != 0 && errno != ENOENT)
         base_log_say(o->log, "%s: cannot be removed, though its frame is done", checkpoint);
     return rc;
-}
-
-int pt_shot_frame_init(const struct pt_shot *s, size_t i, const struct pt_cli *cli, struct pt_shot_frame *f,
-                       struct base_err *err)
-{
-    return pt_frame_init(f, cli, s->frames[i], s->views ? &s->views[i] : NULL, err);
 }
 
 static int render_all(struct pt_open *o, const struct pt_shot *s, size_t first, size_t step, int *status,
@@ -244,7 +216,7 @@ static int render_all(struct pt_open *o, const struct pt_shot *s, size_t first, 
         struct pt_shot_frame f;
         char place[64];
         snprintf(place, sizeof place, "%zu of %zu", i + 1, s->count);
-        rc = pt_shot_frame_init(s, i, o->cli, &f, err);
+        rc = pt_frame_init(&f, o->cli, s->frames[i], s->views ? &s->views[i] : NULL, err);
         if (!rc)
             rc = render_frame(o, &f, name ? &table : NULL, place, status, err);
         pt_frame_release(&f);
@@ -255,9 +227,11 @@ static int render_all(struct pt_open *o, const struct pt_shot *s, size_t first, 
 
 int pt_shot_run(const struct pt_cli *cli, struct job *job, struct base_log *log, int *status, struct base_err *err)
 {
-    struct pt_shot s;
+    struct pt_shot s = {0};
     struct pt_open open = {0};
-    int rc = find_frames(cli, &s, err);
+    int rc = cli->shot.camera_path ? read_path(&cli->shot, &s, err) : pt_shot_parse_frames(cli->shot.frames, &s, err);
+    if (!rc)
+        rc = check_names(cli, &s, err);
     if (!rc && cli->shot.plan && job)
         rc = base_fail(err, BASE_EINVAL, "--plan-shot is the work of one process: leave out mpirun");
     if (!rc)

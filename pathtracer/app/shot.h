@@ -18,9 +18,6 @@ int pt_shot_parse_frames(const char *text, struct pt_shot *shot, struct base_err
 /* Lines "frame;eye;at;up;fov" below one that says so; the first four as for --look-at, fov as for --fov or nothing. name: of
  * the file. */
 int pt_shot_parse_path(const char *name, const char *text, size_t size, struct pt_shot *shot, struct base_err *err);
-/* Frame i, by number and path (frame.h). */
-int pt_shot_frame_init(const struct pt_shot *shot, size_t i, const struct pt_cli *cli, struct pt_shot_frame *frame,
-                       struct base_err *err);
 
 /* Every frame whose image is not there yet, one after the other; of several processes each takes every n-th. Or, with
  * --plan-shot, its table. */

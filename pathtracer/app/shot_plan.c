@@ -52,7 +52,7 @@ static int run_pilot(struct plan *p, struct pt_open *o, const struct pt_shot *s,
 {
     struct pt_shot_frame f;
     struct pt_quote *quote = NULL;
-    int rc = pt_shot_frame_init(s, at, o->cli, &f, err);
+    int rc = pt_frame_init(&f, o->cli, s->frames[at], s->views ? &s->views[at] : NULL, err);
     base_log_note(o->log, "pilot of frame %d", s->frames[at]);
     if (!rc)
         rc = pt_open_scene(o, &f, err);
