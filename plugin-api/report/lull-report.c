@@ -9,9 +9,7 @@
 #include "base/options.h"
 #include "base/outputs.h"
 #include "picture/read.h"
-#include "report/exr.h"
-#include "report/sheet.h"
-#include "report/shown_as.h"
+#include "report/report.h"
 
 enum { FAILED = 1, BAD_INPUT = 2, LAYERS = 3 };
 

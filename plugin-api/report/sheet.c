@@ -1,15 +1,16 @@
-#include "report/sheet.h"
+#include "report/report.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <zlib.h>
 
-#include "picture/apng.h"
+#include "base/files.h"
 #include "picture/colour_map.h"
 #include "picture/font.h"
+#include "picture/png.h"
 #include "picture/read.h"
-#include "report/shown_as.h"
 
 enum { LEAST_SIDE = 240, GAP = 4, MARGIN = 6, BAR = 10, LEGEND = MARGIN + BAR + MARGIN + 2 * PIC_FONT_HEIGHT + MARGIN };
 
@@ -18,8 +19,103 @@ struct sheet {
     int32_t enlarge;
     double low, high; /* samples, of all frames */
     struct pic_canvas canvas;
-    struct pic_apng out;
+    struct base_file_out file;
+    uint32_t frames, frame, chunks; /* all, written; numbered chunks so far */
+    uint16_t delay[2];              /* of a frame, in seconds: what is divided, by what */
 };
+
+/* --- a moving picture as an animated PNG ------------------------------------------------------------------------------
+ * Browsers show it and play it in a loop; other programs show its first frame. Frames are compressed by libpng; what is
+ * around them follows "Portable Network Graphics (PNG) Specification (Third Edition)", W3C 2025, 11.3.6. */
+
+enum { SIGNATURE = 8, AROUND = 12, WORD = 4 }; /* bytes: of a file's head, of a chunk's length, name and checksum */
+
+static void put_word(uint8_t *at, uint32_t v)
+{
+    for (int i = 0; i < WORD; i++)
+        at[i] = (uint8_t)(v >> (24 - 8 * i));
+}
+
+static uint32_t word_at(const uint8_t *at)
+{
+    return (uint32_t)at[0] << 24 | (uint32_t)at[1] << 16 | (uint32_t)at[2] << 8 | at[3];
+}
+
+/* A chunk of up to two parts. Failures are found by base_file_commit. */
+static void write_chunk(FILE *f, const char *name, const void *first, uint32_t first_size, const void *second,
+                        uint32_t second_size)
+{
+    uint8_t word[WORD];
+    uint32_t sum = (uint32_t)crc32(crc32(0, (const Bytef *)name, WORD), first, first_size);
+    put_word(word, first_size + second_size);
+    fwrite(word, 1, WORD, f);
+    fwrite(name, 1, WORD, f);
+    fwrite(first, 1, first_size, f);
+    if (second_size > 0) {
+        fwrite(second, 1, second_size, f);
+        sum = (uint32_t)crc32(sum, second, second_size);
+    }
+    put_word(word, sum);
+    fwrite(word, 1, WORD, f);
+}
+
+/* Width, height and time of the frame that follows, which replaces the one before. */
+static void write_frame_head(struct sheet *s)
+{
+    uint8_t c[26] = {0};
+    put_word(c, s->chunks++);
+    put_word(c + 4, (uint32_t)s->canvas.width);
+    put_word(c + 8, (uint32_t)s->canvas.height);
+    for (int i = 0; i < 4; i++)
+        c[20 + i] = (uint8_t)(s->delay[i / 2] >> (i % 2 ? 0 : 8));
+    write_chunk(s->file.file, "fcTL", c, sizeof c, NULL, 0);
+}
+
+/* One chunk of a frame's own PNG. The first frame's all stay; of the others the compressed pixels do, under another name. */
+static void take_chunk(struct sheet *s, const uint8_t *chunk, uint32_t size, int *is_open)
+{
+    FILE *f = s->file.file;
+    const char *name = (const char *)chunk + WORD;
+    const int is_pixels = memcmp(name, "IDAT", WORD) == 0, is_end = memcmp(name, "IEND", WORD) == 0;
+    if (is_pixels && !*is_open) {
+        if (s->frame == 0) {
+            uint8_t c[8] = {0}; /* how many; how often: 0, for ever */
+            put_word(c, s->frames);
+            write_chunk(f, "acTL", c, sizeof c, NULL, 0);
+        }
+        write_frame_head(s);
+        *is_open = 1;
+    }
+    if (is_pixels && s->frame > 0) {
+        uint8_t number[WORD];
+        put_word(number, s->chunks++);
+        write_chunk(f, "fdAT", number, WORD, chunk + 2 * WORD, size);
+    } else if (s->frame == 0 && !is_end) {
+        fwrite(chunk, 1, AROUND + size, f);
+    }
+}
+
+/* The canvas. */
+static int write_frame(struct sheet *s, struct base_err *err)
+{
+    uint8_t *png;
+    size_t size;
+    int is_open = 0, rc = pic_png_bytes(s->canvas.width, s->canvas.height, s->canvas.rgb, &png, &size, err);
+    if (rc)
+        return rc;
+    if (s->frame == 0)
+        fwrite(png, 1, SIGNATURE, s->file.file);
+    for (size_t at = SIGNATURE; at + AROUND <= size;) {
+        const uint32_t length = word_at(png + at);
+        take_chunk(s, png + at, length, &is_open);
+        at += AROUND + length;
+    }
+    s->frame++;
+    free(png);
+    return 0;
+}
+
+/* --- the sheet ---------------------------------------------------------------------------------------------------------- */
 
 static double scale_of(const struct sheet *s, double spp)
 {
@@ -87,7 +183,7 @@ static int add_frame(struct sheet *s, const char *path, struct base_err *err)
             pic_colour(PIC_VIRIDIS, scale_of(s, (double)spp.f32[i]), pixel(s, across + GAP + x, y));
         }
     if (!rc)
-        rc = pic_apng_add(&s->out, s->canvas.rgb, err);
+        rc = write_frame(s, err);
     pic_release(&picture);
     pic_release(&spp);
     return rc;
@@ -95,7 +191,8 @@ static int add_frame(struct sheet *s, const char *path, struct base_err *err)
 
 int report_sheet(const char *const *pictures, int count, double fps, const char *path, struct base_err *err)
 {
-    struct sheet s = {.low = (double)INFINITY};
+    const uint16_t parts = fps <= 60.0 ? 1000 : 250; /* as fine as 16 bits have room for */
+    struct sheet s = {.low = (double)INFINITY, .frames = (uint32_t)count, .delay = {parts, (uint16_t)lround(parts * fps)}};
     int rc = 0;
     for (int i = 0; i < count && !rc; i++)
         rc = measure(&s, pictures[i], err);
@@ -110,12 +207,14 @@ int report_sheet(const char *const *pictures, int count, double fps, const char 
         return base_fail_nomem(err, "sheet");
     memset(s.canvas.rgb, 255, bytes);
     paint_scale(&s);
-    rc = pic_apng_begin(&s.out, path, s.canvas.width, s.canvas.height, (uint32_t)count, fps, err);
+    rc = base_file_begin(&s.file, path, err);
     for (int i = 0; i < count && !rc; i++)
         rc = add_frame(&s, pictures[i], err);
-    if (!rc)
-        rc = pic_apng_end(&s.out, err);
-    pic_apng_abort(&s.out);
+    if (!rc) {
+        write_chunk(s.file.file, "IEND", "", 0, NULL, 0);
+        rc = base_file_commit(&s.file, err);
+    }
+    base_file_abort(&s.file);
     free(s.canvas.rgb);
     return rc;
 }

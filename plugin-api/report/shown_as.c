@@ -1,4 +1,4 @@
-#include "report/shown_as.h"
+#include "report/report.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -20,11 +20,15 @@ static int next(const char **at, double low, double high, double *out)
     return found;
 }
 
-int report_view_parse(const char *text, const char *path, struct report_view *out, struct base_err *err)
+int report_view_read(const char *path, struct report_view *out, struct base_err *err)
 {
-    const char *at = text;
+    struct pic_attribute attribute = {.name = "lull:view"};
+    struct pic_window window;
     struct report_view v = {0};
-    if (*text != '\0') {
+    if (pic_read_header(path, &window, &attribute, 1, NULL) != 0)
+        attribute.text[0] = '\0'; /* no picture of Lull's; whoever reads its pixels says what is wrong */
+    if (attribute.text[0] != '\0') {
+        const char *at = attribute.text;
         int good =
             next(&at, -64.0, 64.0, &v.low) && next(&at, 1e-3, 1e3, &v.per_octave) && next(&at, 0.0, MOST_CODE, &v.black);
         while (good && *at != '\0')
@@ -37,16 +41,8 @@ int report_view_parse(const char *text, const char *path, struct report_view *ou
     return 0;
 }
 
-int report_view_read(const char *path, struct report_view *out, struct base_err *err)
-{
-    struct pic_attribute attribute = {.name = "lull:view"};
-    struct pic_window window;
-    if (pic_read_header(path, &window, &attribute, 1, NULL) != 0)
-        attribute.text[0] = '\0'; /* no picture of Lull's; whoever reads its pixels says what is wrong */
-    return report_view_parse(attribute.text, path, out, err);
-}
-
-uint8_t report_view_code(const struct report_view *v, double value)
+/* The 8-bit code of a value of light; 0 for what is no number. */
+static uint8_t code_of(const struct report_view *v, double value)
 {
     if (v->count == 0)
         return base_srgb_code(value);
@@ -73,7 +69,7 @@ uint8_t *report_view_layer(const char *path, const char *layer, const struct rep
     if (pic_read_layer(path, layer, &image, NULL) == 0 && image.width == like->width && image.height == like->height)
         codes = malloc(values);
     for (size_t i = 0; codes && i < values; i++)
-        codes[i] = report_view_code(view, (double)image.f32[i]);
+        codes[i] = code_of(view, (double)image.f32[i]);
     pic_release(&image);
     return codes;
 }
