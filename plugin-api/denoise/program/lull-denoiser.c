@@ -1,10 +1,18 @@
-#include "denoise/program/library.h"
+/*
+ * lull-denoiser: runs Open Image Denoise for another process of ours, as often as it asks; see denoise/oidn.h, shared.h. The
+ * library comes by dlopen: a dozen prototypes of ours, no header of theirs. One thread calls it.
+ */
+#include "denoise/program/shared.h"
 
 #include <dlfcn.h>
+#include <poll.h>
+#include <pthread.h>
+#include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -256,22 +264,17 @@ static int run_all(const struct library *o, struct shared *s, struct base_err *e
     return rc;
 }
 
-int library_open(const char *path, struct library **out, struct base_err *err)
+/* Finds the library by path, a file, a folder, or "" for the usual places, unless it is found. Makes a device of as many
+ * threads, unless there is one from before. Unless the width is 0, denoises the colors of s, whose pictures are finite, into
+ * its outs. After a failure the process is of no more use. */
+static int denoise(struct library *o, const char *path, struct shared *s, struct base_err *err)
 {
-    struct library *o = calloc(1, sizeof *o);
-    if (!o)
-        return base_fail_nomem(err, "Open Image Denoise");
-    o->handle = find(path, err);
-    int rc = o->handle ? take_symbols(o, err) : BASE_EINVAL;
-    if (rc)
-        free(o);
-    else
-        *out = o;
-    return rc;
-}
-
-int library_denoise(struct library *o, struct shared *s, struct base_err *err)
-{
+    if (!o->handle) {
+        o->handle = find(path, err);
+        int rc = o->handle ? take_symbols(o, err) : BASE_EINVAL;
+        if (rc)
+            return rc;
+    }
     if (o->device && o->threads != s->form.threads) {
         o->release_device(o->device);
         o->device = NULL;
@@ -279,4 +282,59 @@ int library_denoise(struct library *o, struct shared *s, struct base_err *err)
     o->threads = s->form.threads;
     int rc = o->device ? 0 : make_device(o, s, err);
     return rc || s->form.width == 0 ? rc : run_all(o, s, err);
+}
+
+/* --- serving ----------------------------------------------------------------------------------------------------------- */
+
+/* Whoever asks has gone, perhaps in the middle of a run. Not by PR_SET_PDEATHSIG: the thread that started this program may
+ * end long before its process. */
+static void *end_with_caller(void *unused)
+{
+    (void)unused;
+    struct pollfd caller = {.fd = SHARED_CALLER};
+    while (!caller.revents)
+        poll(&caller, 1, -1);
+    _exit(0);
+}
+
+/* Its size changes from run to run. MAP_FAILED: there is none. */
+static struct shared *map(size_t *bytes)
+{
+    struct stat size;
+    if (fstat(SHARED_MEMORY, &size) != 0 || (size_t)size.st_size < sizeof(struct shared))
+        return MAP_FAILED;
+    *bytes = (size_t)size.st_size;
+    return mmap(NULL, *bytes, PROT_READ | PROT_WRITE, MAP_SHARED, SHARED_MEMORY, 0);
+}
+
+static void serve(struct library *library, const char *path, struct shared *s)
+{
+    struct base_err err = {0};
+    s->code = denoise(library, path, s, &err);
+    memcpy(s->text, err.text, sizeof s->text);
+    s->text[sizeof s->text - 1] = '\0';
+}
+
+int main(int argc, char **argv)
+{
+    struct library library = {0}; /* to the end: its threads outlive their device for a moment */
+    pthread_t watch;
+    size_t bytes;
+    char byte;
+    struct shared *s = argc == 2 ? map(&bytes) : MAP_FAILED;
+    if (s == MAP_FAILED || pthread_create(&watch, NULL, end_with_caller, NULL) != 0) {
+        fprintf(stderr, "lull-denoiser: programs of Lull run it, with pictures in shared memory\n");
+        return 2;
+    }
+    munmap(s, bytes);
+    signal(SIGINT, SIG_IGN); /* whoever runs it is asked to end, and ends it */
+    signal(SIGHUP, SIG_IGN);
+    signal(SIGTERM, SIG_IGN);
+    while (read(SHARED_CALLER, &byte, 1) == 1 && (s = map(&bytes)) != MAP_FAILED) {
+        serve(&library, argv[1], s);
+        munmap(s, bytes);
+        if (write(SHARED_CALLER, &byte, 1) != 1)
+            return 1;
+    }
+    return 0;
 }
