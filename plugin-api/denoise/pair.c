@@ -59,13 +59,12 @@ void lull_denoised_close(struct lull_denoised_pair *pair)
 {
     lull_oidn_close(pair->oidn);
     free(pair->memory);
-    free(pair->again);
+    free(pair->other[0]);
     *pair = (struct lull_denoised_pair){0};
 }
 
-/* whole: NULL, or whose pictures are the part's. */
-static int open_part(struct lull_denoised_part *part, size_t pixels, const struct lull_denoised_pair *whole,
-                     struct base_err *err)
+int lull_denoised_part_open(struct lull_denoised_part *part, size_t pixels, const struct lull_denoised_pair *whole,
+                            struct base_err *err)
 {
     float **const pictures[] = {&part->half[0], &part->half[1], &part->denoised[0], &part->denoised[1]};
     float **const maps[] = {&part->error.gain,  &part->error.doubt, &part->error.moved, &part->error.agreed,
@@ -81,25 +80,13 @@ static int open_part(struct lull_denoised_part *part, size_t pixels, const struc
     float *next = part->memory;
     lay_out(pictures, whole ? 0 : 4, 3 * pixels, &next);
     lay_out(maps, MAPS, pixels, &next);
-    return 0;
-}
-
-int lull_denoised_part_open(struct lull_denoised_part *part, size_t pixels, struct base_err *err)
-{
-    return open_part(part, pixels, NULL, err);
-}
-
-int lull_denoised_part_open_whole(struct lull_denoised_part *part, const struct lull_denoised_pair *pair,
-                                  struct base_err *err)
-{
-    int rc = open_part(part, pair->pixels, pair, err);
-    for (int k = 0; k < 2 && !rc; k++) {
-        part->half[k] = pair->half[k];
-        part->denoised[k] = pair->denoised[k];
+    for (int k = 0; k < 2 && whole; k++) {
+        part->half[k] = whole->half[k];
+        part->denoised[k] = whole->denoised[k];
     }
-    part->width = rc ? 0 : pair->width;
-    part->height = rc ? 0 : pair->height;
-    return rc;
+    part->width = whole ? whole->width : 0;
+    part->height = whole ? whole->height : 0;
+    return 0;
 }
 
 void lull_denoised_part_close(struct lull_denoised_part *part)
@@ -179,13 +166,9 @@ int lull_denoised_again(struct lull_denoised_pair *pair, int (*cancelled)(void *
 {
     if (!pair->albedo)
         return 0;
-    if (!pair->again) {
-        float **const pictures[] = {&pair->other[0], &pair->other[1]};
-        float *next = pair->again = malloc(2 * 3 * pair->room * sizeof *next);
-        if (!next)
-            return base_fail_nomem(err, "pictures to denoise");
-        lay_out(pictures, 2, 3 * pair->room, &next);
-    }
+    if (!pair->other[0] && !(pair->other[0] = malloc(2 * 3 * pair->room * sizeof(float))))
+        return base_fail_nomem(err, "pictures to denoise");
+    pair->other[1] = pair->other[0] + 3 * pair->room;
     return run(pair, pair->other, 1, cancelled, data, err);
 }
 

@@ -38,9 +38,8 @@ struct lull_denoised_pair { /* owns all memory; callers read and fill the buffer
     float *half[2];         /* [pixels][3]: A and B, linear */
     float *albedo, *normal; /* [pixels][3], NULL: not in the form */
     float *denoised[2];     /* [pixels][3]: F(A) and F(B) */
-    float *other[2];        /* [pixels][3]: with clean auxiliaries; NULL until lull_denoised_again */
-    void *again;            /* owns these */
-    void *memory;
+    float *other[2];        /* [pixels][3]: with clean auxiliaries; NULL until lull_denoised_again; other[0] owns both */
+    void *memory;           /* of the others */
 };
 
 /* The pixels that are kept, row by row. */
@@ -77,11 +76,10 @@ int lull_denoised_run(struct lull_denoised_pair *pair, int (*cancelled)(void *da
  * without albedo it does nothing. As lull_oidn_run, and BASE_ENOMEM. */
 int lull_denoised_again(struct lull_denoised_pair *pair, int (*cancelled)(void *data), void *data, struct base_err *err);
 
-/* A part of at most `pixels`, which has pictures of its own; all are 0. On failure *part is zeroed. */
-int lull_denoised_part_open(struct lull_denoised_part *part, size_t pixels, struct base_err *err);
-/* The whole rectangle, whose pictures are the pair's: borrows them until the pair is closed. */
-int lull_denoised_part_open_whole(struct lull_denoised_part *part, const struct lull_denoised_pair *pair,
-                                  struct base_err *err);
+/* A part of at most `pixels`, which has pictures of its own, all 0; or of all pixels of the pair `whole`, whose pictures it
+ * borrows until the pair is closed. On failure *part is zeroed. */
+int lull_denoised_part_open(struct lull_denoised_part *part, size_t pixels, const struct lull_denoised_pair *whole,
+                            struct base_err *err);
 void lull_denoised_part_close(struct lull_denoised_part *part);
 
 /* The part, which has pictures of its own, is this one of the pair's rectangle. */

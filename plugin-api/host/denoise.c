@@ -38,7 +38,7 @@ static int32_t open_pair(struct picture *p, int32_t height, struct lull_error *e
                                         .exposure = (float)p->exposure};
     int rc = lull_denoised_open(&p->pair, how->library, &form, &why);
     if (!rc)
-        rc = lull_denoised_part_open_whole(&p->part, &p->pair, &why);
+        rc = lull_denoised_part_open(&p->part, p->pair.pixels, &p->pair, &why);
     return rc ? lull_host_translate(&why, err) : LULL_OK;
 }
 

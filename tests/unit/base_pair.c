@@ -43,7 +43,7 @@ static void halves_from_means(void **unused)
     const double mean[3] = {2, 3, -1}, half[3] = {1, 5, -1}, bad[3] = {1, NAN, 0};
     open_pair(&p, "identity", 0);
     struct lull_denoised_part whole;
-    assert_int_equal(lull_denoised_part_open_whole(&whole, &p, NULL), 0);
+    assert_int_equal(lull_denoised_part_open(&whole, p.pixels, &p, NULL), 0);
     assert_true(whole.half[0] == p.half[0] && whole.denoised[1] == p.denoised[1] && whole.pixels == PIXELS);
     assert_true(whole.width == W && whole.height == H);
     lull_denoised_part_close(&whole);
@@ -123,7 +123,7 @@ static void a_part_is_a_picture_of_its_own(void **unused)
     struct lull_denoised_part part;
     uint64_t state = 1;
     open_pair(&p, "box", 0);
-    assert_int_equal(lull_denoised_part_open(&part, PART + 5, NULL), 0);
+    assert_int_equal(lull_denoised_part_open(&part, PART + 5, NULL, NULL), 0);
     for (int k = 0; k < 2; k++)
         for (int i = 0; i < 3 * PIXELS; i++)
             p.half[k][i] = 0.2f + 0.1f * (float)splitmix_uniform(&state);
@@ -185,7 +185,7 @@ static void what_fails_leaves_nothing_open(void **unused)
     assert_int_equal(lull_denoised_open(&p, "/no/such", &form, &err), BASE_EINVAL);
     assert_true(!p.oidn && !p.memory);
     err.code = 0;
-    assert_int_equal(lull_denoised_part_open(&part, SIZE_MAX / 100, &err), BASE_ENOMEM);
+    assert_int_equal(lull_denoised_part_open(&part, SIZE_MAX / 100, NULL, &err), BASE_ENOMEM);
     assert_null(part.memory);
     form.width = form.height = INT32_MAX;
     /* Its own memory is asked for first, which fails at once; the denoiser's is filled, until a machine has none left. */

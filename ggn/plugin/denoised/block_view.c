@@ -29,7 +29,7 @@ int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form,
                             &v.weight};
     float **const pictures[] = {&v.rgb, &v.crossed[0], &v.crossed[1], &v.kept[0], &v.kept[1]};
     enum { MAPS = sizeof maps / sizeof maps[0], PICTURES = sizeof pictures / sizeof pictures[0], AROUND = 2 };
-    int rc = lull_denoised_part_open(&v.part, pixels, err);
+    int rc = lull_denoised_part_open(&v.part, pixels, NULL, err);
     if (rc) /* after it P is known to be small enough for sums below */
         return rc;
     const size_t doubles = ggn_kept_scratch(form->width, form->height);
