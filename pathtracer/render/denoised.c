@@ -2,7 +2,6 @@
 
 #include <stdlib.h>
 
-
 void pt_denoised_release(struct pt_denoised *d)
 {
     free(d->rgb);

@@ -18,8 +18,8 @@ struct row_item {
 
 struct sampling {
     const struct pt_farm_slice *slice;
-    unsigned char *before; /* owns; [count][stride] the sums of each row that was begun */
-    unsigned char *begun;  /* owns; [count] */
+    unsigned char *before; /* owns; [count][stride] the sums of each row that was begun; NULL: no workers */
+    unsigned char *begun;  /* owns; [count], likewise */
     size_t stride;
 };
 
@@ -31,12 +31,14 @@ static void pack_row(void *data, uint32_t i, void *item)
     pt_row_save(s->slice->film, &to->row, to->sums);
 }
 
-/* The sums before the slice are kept until its end. */
+/* With workers, who may be lost, the sums before the slice are kept until its end. */
 static struct pt_row *begin_row(const struct sampling *s, uint32_t i)
 {
     const uint32_t index = s->slice->order[i];
-    pt_row_save(s->slice->film, &s->slice->rows[index], s->before + index * s->stride);
-    s->begun[index] = 1;
+    if (s->before) {
+        pt_row_save(s->slice->film, &s->slice->rows[index], s->before + index * s->stride);
+        s->begun[index] = 1;
+    }
     return &s->slice->rows[index];
 }
 
@@ -80,12 +82,12 @@ int pt_farm_sample(struct job *job, struct base_threads *threads, const struct p
     const struct sampling_task common = {slice->film->planes, *slice->context.integrator};
     struct sampling s = {.slice = slice};
     int rc = 0;
-    for (size_t i = 0; i < slice->count; i++) {
+    for (size_t i = 0; job && i < slice->count; i++) {
         size_t bytes = aligned(pt_row_bytes(&slice->rows[i], slice->film->planes));
         s.stride = bytes > s.stride ? bytes : s.stride;
     }
-    s.before = malloc(slice->count * s.stride);
-    s.begun = calloc(slice->count, 1);
+    s.before = job ? malloc(slice->count * s.stride) : NULL;
+    s.begun = job ? calloc(slice->count, 1) : NULL;
     const struct job_farm farm = {.count = (uint32_t)slice->count,
                                   .common_bytes = sizeof common,
                                   .item_bytes = sizeof(struct row_item) + s.stride,
@@ -95,7 +97,7 @@ int pt_farm_sample(struct job *job, struct base_threads *threads, const struct p
                                   .here = sample_here,
                                   .apply = apply_row,
                                   .data = &s};
-    if (!s.before || !s.begun)
+    if (job && (!s.before || !s.begun))
         rc = base_fail_nomem(err, "rows with workers");
     else if ((rc = job_farm_run(job, threads, &farm, err)) != 0)
         undo(&s);

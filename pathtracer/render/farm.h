@@ -21,8 +21,8 @@ struct pt_farm_slice {
     size_t count;
 };
 
-/* Rank 0: samples the rows, with the threads here and by the workers. Not 0 as job_farm_run: then the film is as it was
- * before and so are the rows. */
+/* Rank 0: samples the rows, with the threads here and by the workers, if there is a job. Not 0 as job_farm_run: then the
+ * film is as it was before and so are the rows. */
 int pt_farm_sample(struct job *job, struct base_threads *threads, const struct pt_farm_slice *slice, struct base_err *err);
 
 /* A worker: samples rows until the end of the job. The context's integrator is not used: it comes with the rows. */

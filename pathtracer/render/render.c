@@ -196,27 +196,6 @@ void pt_render_go_on(struct pt_render *r, unsigned others, uint64_t first_spp)
 
 /* --- one slice ------------------------------------------------------------------------------------------------------ */
 
-static void sample_row(void *data, long n, int worker)
-{
-    struct pt_render *r = data;
-    const struct pt_sampler_context context = {r->scene, r->kernel, &r->config.integrator};
-    (void)worker;
-    pt_row_sample(&context, &r->film, &r->work->items[r->work->order[n]]);
-}
-
-/* All rows of the slice. Not 0: none of them, as pt_farm_sample. */
-static int sample_rows(struct pt_render *r, struct base_err *err)
-{
-    const struct pt_render_work *w = r->work;
-    if (!r->config.job) {
-        base_threads_for(r->threads, (long)w->count, sample_row, r);
-        return 0;
-    }
-    const struct pt_farm_slice slice = {
-        {r->scene, r->kernel, &r->config.integrator}, &r->film, w->items, w->order, w->count};
-    return pt_farm_sample(r->config.job, r->threads, &slice, err);
-}
-
 /* Samples up to which a block goes now. */
 static uint64_t goal(const struct pt_render *r, const struct lull_host_block *b)
 {
@@ -345,9 +324,11 @@ static int slice(struct pt_render *r, int *more, struct base_err *err)
     *more = list_items(r, span_s) > 0;
     if (!*more)
         return 0;
+    const struct pt_farm_slice rows = {
+        {r->scene, r->kernel, &r->config.integrator}, &r->film, r->work->items, r->work->order, r->work->count};
     uint64_t before = r->totals->samples;
     double start_s = base_clock_wall_s();
-    int rc = sample_rows(r, err);
+    int rc = pt_farm_sample(r->config.job, r->threads, &rows, err);
     double wall_s = base_clock_wall_s() - start_s;
     r->totals->render_s += wall_s;
     if (rc)
