@@ -11,7 +11,6 @@ extern "C" {
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -380,28 +379,6 @@ int check_png(const char *name, const unsigned char *data, size_t size, base_err
     return base_fail(err, BASE_EINVAL, "%s: truncated PNG file", name);
 }
 
-/* One character ends the header of a PFM. Behind "\r\n" OpenImageIO would take the second for the first byte of the pixels,
- * which are nothing then: next to 0. */
-int check_pfm(const char *path, base_err *err)
-{
-    FILE *file = nullptr;
-    if (int rc = base_file_open(path, &file, err))
-        return rc;
-    char head[256];
-    const size_t n = std::fread(head, 1, sizeof head, file);
-    std::fclose(file);
-    size_t at = 0;
-    for (int words = 0; words < 4 && at < n; words++) { /* PF, width, height, scale */
-        while (at < n && std::isspace(static_cast<unsigned char>(head[at])) != 0)
-            at++;
-        while (at < n && std::isspace(static_cast<unsigned char>(head[at])) == 0)
-            at++;
-    }
-    if (at + 1 < n && head[at] == '\r' && head[at + 1] == '\n')
-        return base_fail(err, BASE_EINVAL, "%s: a PFM whose header ends in CR and LF (expected one of them)", path);
-    return 0;
-}
-
 /* The first bytes of a file that is there, or of what is in memory. */
 std::vector<unsigned char> head_of(const pic_request &q, size_t most)
 {
@@ -416,6 +393,19 @@ std::vector<unsigned char> head_of(const pic_request &q, size_t most)
     } else
         head.clear();
     return head;
+}
+
+/* One character ends the header of a PFM. Behind "\r\n" OpenImageIO would take the second for the first byte of the pixels,
+ * which are nothing then: next to 0. */
+int check_pfm(const pic_request &q, base_err *err)
+{
+    std::vector<unsigned char> head = head_of(q, 256);
+    int at = 0;
+    head.push_back('\0');
+    std::sscanf(reinterpret_cast<const char *>(head.data()), "%*s%*s%*s%*s%n", &at); /* PF, width, height, scale */
+    if (head[static_cast<size_t>(at)] == '\r' && head[static_cast<size_t>(at) + 1] == '\n' && at > 0)
+        return base_fail(err, BASE_EINVAL, "%s: a PFM whose header ends in CR and LF (expected one of them)", q.name);
+    return 0;
 }
 
 /* Pixels of 32 bits in a BMP have their colours where its masks say. OpenImageIO takes the bytes for blue, green, red and
@@ -466,20 +456,16 @@ struct opened {
     header first_bytes;
 };
 
-/* Of a PNG that stores no alpha with its pixels (colour types 4 and 6, at byte 25), but a transparent colour or transparent
- * entries of its palette (tRNS), pbrt reads the colours alone. */
-bool has_colours_alone(const char *name, const void *data, size_t size)
-{
-    const unsigned char *png = static_cast<const unsigned char *>(data);
-    return base_file_has_ending(name, "png") && size > 25 && (png[25] & 4) == 0;
-}
-
 int open_memory(const char *name, const void *data, size_t size, opened *out, base_err *err)
 {
-    if (base_file_has_ending(name, "png"))
-        if (int rc = check_png(name, static_cast<const unsigned char *>(data), size, err))
+    if (base_file_has_ending(name, "png")) {
+        const unsigned char *png = static_cast<const unsigned char *>(data);
+        if (int rc = check_png(name, png, size, err))
             return rc;
-    out->first_bytes.without_alpha = has_colours_alone(name, data, size);
+        /* Where no alpha is stored with its pixels (colour types 4 and 6), but a transparent colour or transparent entries
+         * of its palette (tRNS), pbrt reads the colours alone. */
+        out->first_bytes.without_alpha = (png[25] & 4) == 0;
+    }
     out->reader = std::make_unique<OIIO::Filesystem::IOMemReader>(data, size);
     out->input = ImageInput::create(format_of(name), false);
     if (!out->input || out->input->supports("ioproxy") == 0) {
@@ -505,27 +491,11 @@ int open_file(const char *path, opened *out, base_err *err)
         return rc ? rc : open_memory(path, data, size, out, err);
     }
     if (base_file_has_ending(path, "pfm"))
-        if (int rc = check_pfm(path, err))
+        if (int rc = check_pfm({PIC_STORED, path, nullptr, 0, nullptr}, err))
             return rc;
     const ImageSpec config = raw_config();
     out->input = ImageInput::open(path, &config);
     return out->input ? 0 : complain(path, OIIO::geterror(), err);
-}
-
-int answer(const pic_request *q, pic_image *out, base_err *err)
-{
-    try {
-        configure_once();
-        opened image;
-        int rc = q->data != nullptr ? open_memory(q->name, q->data, q->size, &image, err) : open_file(q->name, &image, err);
-        if (rc == 0 && base_file_has_ending(q->name, "bmp"))
-            rc = find_bmp_order(*q, &image.first_bytes, err);
-        return rc ? rc : read_pixels(*image.input, *q, image.first_bytes, out, err);
-    } catch (const std::bad_alloc &) {
-        return base_fail_nomem(err, q->name);
-    } catch (const std::exception &e) {
-        return complain(q->name, e.what(), err);
-    }
 }
 
 /* --- headers --- */
@@ -553,11 +523,33 @@ void find_attribute(const ImageSpec &spec, pic_attribute *a)
         std::snprintf(a->text, sizeof a->text, "%s", found->get_string().c_str());
 }
 
-int answer_header(const char *path, pic_window *window, pic_attribute *attributes, int count, base_err *err)
+/* What `work` returns, or what it throws as an error. */
+template <typename work> int guarded(const char *name, base_err *err, work work_on)
 {
     try {
         configure_once();
         opened image;
+        return work_on(image);
+    } catch (const std::bad_alloc &) {
+        return base_fail_nomem(err, name);
+    } catch (const std::exception &e) {
+        return complain(name, e.what(), err);
+    }
+}
+
+int answer(const pic_request *q, pic_image *out, base_err *err)
+{
+    return guarded(q->name, err, [&](opened &image) {
+        int rc = q->data != nullptr ? open_memory(q->name, q->data, q->size, &image, err) : open_file(q->name, &image, err);
+        if (rc == 0 && base_file_has_ending(q->name, "bmp"))
+            rc = find_bmp_order(*q, &image.first_bytes, err);
+        return rc ? rc : read_pixels(*image.input, *q, image.first_bytes, out, err);
+    });
+}
+
+int answer_header(const char *path, pic_window *window, pic_attribute *attributes, int count, base_err *err)
+{
+    return guarded(path, err, [&](opened &image) {
         if (int rc = open_file(path, &image, err))
             return rc;
         const ImageSpec &spec = image.input->spec();
@@ -567,11 +559,7 @@ int answer_header(const char *path, pic_window *window, pic_attribute *attribute
         if (orientation_of(*image.input, spec) >= 5)
             *window = pic_window{window->height, window->width, window->y0, window->x0, window->y1, window->x1};
         return 0;
-    } catch (const std::bad_alloc &) {
-        return base_fail_nomem(err, path);
-    } catch (const std::exception &e) {
-        return complain(path, e.what(), err);
-    }
+    });
 }
 
 } // namespace
