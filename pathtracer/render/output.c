@@ -1,3 +1,4 @@
+#define _GNU_SOURCE /* memmem */
 #include "render/output.h"
 
 #include <math.h>
@@ -185,10 +186,7 @@ int pt_output_is_ours(const char *path)
         return 0;
     size_t n = fread(begin, 1, sizeof begin, f);
     fclose(f);
-    for (size_t at = 0; at + sizeof mark - 1 <= n; at++)
-        if (memcmp(begin + at, mark, sizeof mark - 1) == 0)
-            return 1;
-    return n == 0;
+    return n == 0 || memmem(begin, n, mark, sizeof mark - 1) != NULL;
 }
 
 /* --- pictures ------------------------------------------------------------------------------------------------------- */

@@ -70,7 +70,7 @@ struct recorder {
     const struct lull_host_blocks *grid;                  /* of it */
     struct base_lock lock;                                /* of the folder */
     uint8_t *chosen;                                      /* owns; [grid.count] */
-    double *mean, *half, *difference, *moment2, *scratch; /* own; one block, planar */
+    double *mean, *half, *difference, *moment2, *scratch; /* one block, planar; mean owns all */
 };
 
 /* --- manifest ------------------------------------------------------------------------------------------------------- */
@@ -170,9 +170,7 @@ static int open_block(const struct recorder *r, const struct lull_host_block *b,
                       struct base_err *err)
 {
     struct pt_render_config c = r->config->render;
-    int crop[4] = {b->x0, b->y0, b->x1, b->y1};
-    struct lull_host_criterion *criterion = reference ? NULL : r->criterion;
-    memcpy(c.crop, crop, sizeof crop);
+    memcpy(c.crop, (const int[]){b->x0, b->y0, b->x1, b->y1}, sizeof c.crop);
     c.spp_min = c.spp_max = reference ? r->config->reference_spp : r->manifest.levels[r->manifest.n_levels - 1];
     c.uniform = 1;
     c.time_budget_s = 0.0;
@@ -180,7 +178,7 @@ static int open_block(const struct recorder *r, const struct lull_host_block *b,
     c.mask = NULL;
     c.planes = PT_FILM_HALF | PT_FILM_MOMENT2;
     c.integrator.seed = (uint32_t)(reference ? r->manifest.reference_seed : r->manifest.seed);
-    return pt_render_create(&c, r->scene, r->kernel, r->threads, criterion, out, err);
+    return pt_render_create(&c, r->scene, r->kernel, r->threads, reference ? NULL : r->criterion, out, err);
 }
 
 /* Estimates of the block's film: mean, mean of half A, D = (A - B) / 2, second moment. */
@@ -346,13 +344,13 @@ static int prepare(struct recorder *r, struct base_err *err)
     size_t pixels = (size_t)c->block_width * (size_t)c->block_height;
     r->chosen = calloc(r->grid->count, 1);
     r->manifest.blocks = calloc(r->grid->count, sizeof *r->manifest.blocks);
-    r->mean = calloc(pixels, 3 * sizeof(double));
-    r->half = calloc(pixels, 3 * sizeof(double));
-    r->difference = calloc(pixels, 3 * sizeof(double));
-    r->moment2 = calloc(pixels, sizeof(double));
-    r->scratch = calloc(pixels, sizeof(double));
-    if (!r->chosen || !r->manifest.blocks || !r->mean || !r->half || !r->difference || !r->moment2 || !r->scratch)
+    r->mean = calloc(pixels, (3 * 3 + 2) * sizeof(double));
+    if (!r->chosen || !r->manifest.blocks || !r->mean)
         return base_fail_nomem(err, "sequence");
+    r->half = r->mean + 3 * pixels;
+    r->difference = r->half + 3 * pixels;
+    r->moment2 = r->difference + 3 * pixels;
+    r->scratch = r->moment2 + pixels;
     if (!r->config->blocks)
         memset(r->chosen, 1, r->grid->count);
     else if ((rc = pt_sequence_choose(r->config->blocks, r->chosen, r->grid->count, err)) != 0)
@@ -371,10 +369,6 @@ static void recorder_release(struct recorder *r)
     lull_host_end(r->whole);
     free(r->chosen);
     free(r->mean);
-    free(r->half);
-    free(r->difference);
-    free(r->moment2);
-    free(r->scratch);
 }
 
 static int record_chosen(struct recorder *r, int *stopped, struct base_err *err)
