@@ -10,7 +10,6 @@
 #include "base/files.h"
 #include "render/checkpoint.h"
 #include "render/output.h"
-#include "shot_table.h"
 #include "watch.h"
 
 /* What the criterion of noisy pictures says of this one, [blocks], the caller's; NULL when nobody can say. */

@@ -1,4 +1,4 @@
-#include "shot_table.h"
+#include "frame.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -3,7 +3,6 @@
 #include <stdlib.h>
 
 #include "app/shot.h"
-#include "app/shot_table.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

@@ -11,7 +11,6 @@
 #include <unistd.h>
 
 #include "app/shot.h"
-#include "app/shot_table.h"
 #include "base/files.h"
 #include "sample/sampler.h"
 
