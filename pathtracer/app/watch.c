@@ -10,7 +10,6 @@
 #include "base/interrupt.h"
 #include "base/options.h"
 #include "render/checkpoint.h"
-#include "render/output.h"
 
 /* By the first of these that is set, as the C library does. */
 static int speaks_utf8(void)

@@ -1,7 +1,6 @@
 #include "render/film.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 /* One row per array: the plane that asks for it (0: always), its place in the struct, bytes per pixel. */
 static const struct array {

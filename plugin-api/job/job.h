@@ -10,7 +10,6 @@
 #define JOB_JOB_H
 
 #include <signal.h>
-#include <stddef.h>
 #include <stdint.h>
 
 #include "base/err.h"
