@@ -73,17 +73,18 @@ static const char *processor_name(char text[128])
 static struct pt_output_info describe(const struct pt_open *o, const char *quote, const char *processor)
 {
     const struct pt_cli *cli = o->cli;
-    return (struct pt_output_info){.scene = o->frame->paths[PT_SCENE],
+    const struct lull_host_report of = {.scene = o->frame->paths[PT_SCENE],
+                                        .mask = cli->mask,
+                                        .kernel = o->kernel_name,
+                                        .scene_bytes = (double)o->scene->stats.bytes,
+                                        .processor = processor,
+                                        .command = (const char *const *)cli->argv,
+                                        .command_count = (uint64_t)cli->argc};
+    return (struct pt_output_info){.of = of,
                                    .params = o->params.list,
                                    .param_count = o->params.count,
-                                   .mask = cli->mask,
                                    .effects = o->scene->effects,
-                                   .kernel = o->kernel_name,
                                    .reproducible = cli->reproducible,
-                                   .scene_bytes = o->scene->stats.bytes,
-                                   .command = (const char *const *)cli->argv,
-                                   .command_count = cli->argc,
-                                   .processor = processor,
                                    .quote = quote};
 }
 
@@ -181,7 +182,7 @@ static int render_image(struct pt_open *o, const char *quote, int *status, struc
         *status = pt_action_status(outcome);
         return rc;
     }
-    info.interrupted = pt_action_status(outcome) != 0;
+    info.of.flags = pt_action_status(outcome) != 0 ? LULL_REPORT_INTERRUPTED : 0;
     if (write_outputs(o, info, &write_err) != 0) {
         if (rc)
             base_log_say(o->log, "%s", write_err.text); /* besides the render's own error: it tells where the image is */

@@ -1,7 +1,6 @@
 #define _GNU_SOURCE /* memmem */
 #include "render/output.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -146,7 +145,7 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
     effect_names(info->effects, effects, sizeof effects);
     criterion_text(r, info, criterion, sizeof criterion);
     const struct pt_exr_attribute attributes[] = {
-        {"lull:scene", info->scene, 0.0},
+        {"lull:scene", info->of.scene, 0.0},
         {"lull:criterion", criterion, 0.0},
         {"lull:effects", effects, 0.0},
         {"lull:reasons", reasons, 0.0},
@@ -227,7 +226,7 @@ int pt_output_result(int32_t code, const struct lull_error *why, struct base_err
 int pt_output_stop_map(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
-    int32_t code = lull_host_stop_map(r->blocks, path, info->scene, &e);
+    int32_t code = lull_host_stop_map(r->blocks, path, info->of.scene, &e);
     return pt_output_result(code, &e, err);
 }
 
@@ -240,24 +239,15 @@ static struct lull_host_report describe(const struct pt_render *r, const struct 
     for (int i = 0; i < PT_FX_COUNT; i++)
         if (info->effects >> i & 1)
             effects[n++] = pt_effects_name(i);
-    struct lull_host_report report = {
-        .struct_size = sizeof report,
-        .flags = info->interrupted ? LULL_REPORT_INTERRUPTED : 0,
-        .scene = info->scene,
-        .mask = info->mask,
-        .kernel = info->kernel,
-        .effects = effects,
-        .effect_count = n,
-        .threads = (uint32_t)pt_render_threads(r),
-        .processes = (uint32_t)job_count(r->config.job),
-        .film_bytes = r->film.bytes,
-        .film_pixels = r->film.pixels,
-        .scene_bytes = info->scene_bytes >= 0 ? (double)info->scene_bytes : (double)NAN,
-        .software = "lull-render " BASE_VERSION,
-        .processor = info->processor,
-        .command = info->command,
-        .command_count = (uint64_t)info->command_count,
-    };
+    struct lull_host_report report = info->of;
+    report.struct_size = sizeof report;
+    report.effects = effects;
+    report.effect_count = n;
+    report.threads = (uint32_t)pt_render_threads(r);
+    report.processes = (uint32_t)job_count(r->config.job);
+    report.film_bytes = r->film.bytes;
+    report.film_pixels = r->film.pixels;
+    report.software = "lull-render " BASE_VERSION;
     if (info->denoised) {
         report.flags |= LULL_REPORT_DENOISED;
         report.noisy_weight = info->denoised->weight_mean;

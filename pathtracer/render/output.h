@@ -11,21 +11,14 @@
 #include "render/render.h"
 
 struct pt_output_info {
-    const char *scene;              /* path of the scene file */
+    struct lull_host_report of; /* flags, scene, mask, kernel, scene_bytes, processor, command; the render says the rest */
     const struct lull_pair *params; /* of the criterion, as given */
     uint32_t param_count;
-    const char *mask;    /* path of the picture that scales the quality parameter; NULL = none */
-    pt_effects effects;  /* what the scene calls for */
-    const char *kernel;  /* name of the kernel that rendered it */
-    int reproducible;    /* leave times out of the EXR, so that equal renders are equal files */
-    int64_t scene_bytes; /* memory of the scene; < 0 = not known */
-    int interrupted;
+    pt_effects effects;                     /* what the scene calls for */
+    int reproducible;                       /* leave times out of the EXR, so that equal renders are equal files */
     const struct pt_progress_now *progress; /* for the report; NULL: the render is over */
-    const char *const *command;             /* [command_count] words of the command line */
-    int command_count;
-    const char *processor;              /* its name; NULL: not known */
-    const char *quote;                  /* JSON of the quote that the page compares with; NULL: none */
-    const struct pt_denoised *denoised; /* the picture; NULL: the noisy one */
+    const char *quote;                      /* JSON of the quote that the page compares with; NULL: none */
+    const struct pt_denoised *denoised;     /* the picture; NULL: the noisy one */
     const double *noisy_error; /* [blocks] of the noisy picture, beside `error` of the denoised one; NULL: not known */
 };
 

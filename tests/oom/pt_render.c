@@ -104,7 +104,7 @@ static void checking(void **state)
     assert_in_range(failed, 1, 100000);
 }
 
-static struct pt_output_info info = {.scene = "a.pbrt", .kernel = "k", .effects = PT_FX_ALL};
+static struct pt_output_info info = {.of = {.scene = "a.pbrt", .kernel = "k"}, .effects = PT_FX_ALL};
 
 static int write_report(struct pt_render *r, struct base_err *err)
 {

@@ -85,12 +85,10 @@ static int setup(void **state)
     int crop[4] = {3, 5, 60, 40};
     memcpy(config.crop, crop, sizeof crop);
     config.planes = PT_FILM_AUX;
-    info = (struct pt_output_info){.scene = "dir/fake-view1.pbrt",
+    info = (struct pt_output_info){.of = {.scene = "dir/fake-view1.pbrt", .kernel = "fake", .scene_bytes = 1000},
                                    .params = &param,
                                    .param_count = 1,
-                                   .effects = PT_FX_ALPHA | PT_FX_MOTION,
-                                   .kernel = "fake",
-                                   .scene_bytes = 1000};
+                                   .effects = PT_FX_ALPHA | PT_FX_MOTION};
     if (!mkdtemp(folder))
         return -1;
     run = pt_fake_render(&config, varied, 2, "32");
@@ -449,15 +447,15 @@ static char *report_of(struct approve_case *c)
         frame.answer_room = 0; /* they stand in the case before */
         frame.blocks.block_height = 8;
         r.threads = base_threads_create(9, &err);
-        told = (struct pt_output_info){.scene = "a \"b\".pbrt",
-                                       .mask = "m.png",
-                                       .effects = PT_FX_ALL,
-                                       .kernel = "k",
-                                       .scene_bytes = -1,
-                                       .interrupted = 1};
+        told = (struct pt_output_info){.of = {.flags = LULL_REPORT_INTERRUPTED,
+                                              .scene = "a \"b\".pbrt",
+                                              .mask = "m.png",
+                                              .kernel = "k",
+                                              .scene_bytes = (double)NAN},
+                                       .effects = PT_FX_ALL};
     }
     if (strstr(c->text, "empty"))
-        told.scene_bytes = 0;
+        told.of.scene_bytes = 0;
     assert_int_equal(pt_output_report(in_folder("r.json"), &r, &told, &err), 0);
     if (alone)
         base_threads_destroy(r.threads);
