@@ -68,24 +68,19 @@ static int grey_of(const struct layer *l)
     return n == 1 && l->at[CHROMA] < 0 && l->at[ABSCISSA] < 0 ? found : -1;
 }
 
-static int is_combined(const struct layer *l)
+/* Whether the last words of its name are these. */
+static int ends_in(const struct layer *l, const char *words)
 {
-    static const char word[] = "Combined";
-    const size_t n = sizeof word - 1;
-    return l->length >= n && strncasecmp(l->name + l->length - n, word, n) == 0 &&
+    const size_t n = strlen(words);
+    return l->length >= n && strncasecmp(l->name + l->length - n, words, n) == 0 &&
            (l->length == n || l->name[l->length - n - 1] == '.');
-}
-
-/* Blender's compositor: the picture that it shows, beside the layers that the picture was made of. */
-static int is_composite(const struct layer *l)
-{
-    static const char name[] = "Composite.Combined";
-    return l->length == sizeof name - 1 && strncasecmp(l->name, name, sizeof name - 1) == 0;
 }
 
 /* The one of its kind; NULL: there is none, or there are several, *colours of them in colour. */
 static const struct layer *find_picture(const struct layer *list, int count, int *colours)
 {
+    /* Of Blender's compositor: the picture that it shows, beside the layers that the picture was made of. */
+    static const char shown[] = "Composite.Combined";
     const struct layer *colour = NULL, *combined = NULL, *grey = NULL, *composite = NULL;
     int combineds = 0, greys = 0;
     *colours = 0;
@@ -93,9 +88,9 @@ static const struct layer *find_picture(const struct layer *list, int count, int
         const struct layer *l = &list[i];
         if (l->part == 0 && l->is_own && (is_colour(l) || grey_of(l) >= 0))
             return l;
-        if (is_colour(l) && is_composite(l))
+        if (is_colour(l) && l->length == sizeof shown - 1 && ends_in(l, shown))
             composite = l;
-        if (is_colour(l) && is_combined(l))
+        if (is_colour(l) && ends_in(l, "Combined"))
             combined = ++combineds == 1 ? l : NULL;
         if (is_colour(l))
             colour = ++*colours == 1 ? l : NULL;
