@@ -4,7 +4,6 @@
 #include <stdlib.h>
 
 #include "base/clock.h"
-#include "render/farm.h"
 
 /* Length of a slice: short enough for a live line, an interrupt and a time budget, long enough that its barrier costs
  * nothing. */
@@ -21,57 +20,25 @@ static const double ROWS_PER_THREAD = 128.0, ROW_PIXELS = 16.0;
 /* What a block may get in one slice before others have had as much: its samples again, or this. */
 enum { LEAD_SPP = 8 };
 
-/* A block that is to be sampled. */
-struct candidate {
-    uint32_t block;
-    int octave;       /* of its samples: who has few goes first */
-    double left_s;    /* thread seconds to its check, for want of better its samples to there */
-    double per_spp_s; /* thread seconds per sample of all its pixels; 0 = not known */
-};
-
-struct pt_render_work {
-    struct pt_row *items; /* [rows of all blocks] */
-    uint32_t *order;      /* [rows of all blocks] item to be done n-th */
-    size_t count;
-    struct candidate *candidates;    /* [blocks] */
-    uint32_t *due;                   /* [blocks] */
-    uint8_t *final;                  /* [blocks] */
-    struct lull_decision *decisions; /* [blocks] */
-};
-
 int pt_render_threads(const struct pt_render *r)
 {
     return base_threads_count(r->threads) + job_worker_threads(r->config.job);
 }
 
-static struct pt_render_work *work_create(const struct lull_host_blocks *blocks)
+static int allocate_work(struct pt_render *r, struct base_err *err)
 {
-    size_t rows = 0, n = blocks->count;
+    struct pt_render_work *w = &r->work;
+    size_t rows = 0, n = r->blocks->count;
     for (uint32_t i = 0; i < n; i++)
-        rows += (size_t)(blocks->list[i].y1 - blocks->list[i].y0);
-    struct pt_render_work *w = calloc(1, sizeof *w);
-    if (!w)
-        return NULL;
+        rows += (size_t)(r->blocks->list[i].y1 - r->blocks->list[i].y0);
     w->items = calloc(rows, sizeof *w->items);
     w->order = calloc(rows, sizeof *w->order);
     w->candidates = calloc(n, sizeof *w->candidates);
     w->due = calloc(n, sizeof *w->due);
     w->final = calloc(n, sizeof *w->final);
     w->decisions = calloc(n, sizeof *w->decisions);
-    return w;
-}
-
-static void work_destroy(struct pt_render_work *w)
-{
-    if (!w)
-        return;
-    free(w->items);
-    free(w->order);
-    free(w->candidates);
-    free(w->due);
-    free(w->final);
-    free(w->decisions);
-    free(w);
+    const int all = w->items && w->order && w->candidates && w->due && w->final && w->decisions;
+    return all ? 0 : base_fail_nomem(err, "work list");
 }
 
 /* film_planes: PT_FILM_* of its film. */
@@ -129,11 +96,8 @@ int pt_render_create(const struct pt_render_config *config, const struct pt_scen
     int rc = begin_frame(r, planes, err);
     if (!rc)
         rc = pt_film_init(&r->film, r->blocks->x0, r->blocks->y0, r->blocks->x1, r->blocks->y1, planes, err);
-    if (!rc) {
-        struct pt_render_work *w = r->work = work_create(r->blocks);
-        if (!w || !w->items || !w->order || !w->candidates || !w->due || !w->final || !w->decisions)
-            rc = base_fail_nomem(err, "work list");
-    }
+    if (!rc)
+        rc = allocate_work(r, err);
     if (rc) {
         pt_render_destroy(r);
         return rc;
@@ -146,7 +110,12 @@ void pt_render_destroy(struct pt_render *r)
 {
     if (!r)
         return;
-    work_destroy(r->work);
+    free(r->work.items);
+    free(r->work.order);
+    free(r->work.candidates);
+    free(r->work.due);
+    free(r->work.final);
+    free(r->work.decisions);
     lull_host_end(r->frame);
     pt_film_release(&r->film);
     free(r);
@@ -215,7 +184,7 @@ static int octave_of(uint64_t spp)
 
 static int by_turn(const void *a, const void *b)
 {
-    const struct candidate *x = a, *y = b;
+    const struct pt_render_candidate *x = a, *y = b;
     if (x->octave != y->octave)
         return (x->octave > y->octave) - (x->octave < y->octave);
     if (x->left_s != y->left_s)
@@ -233,10 +202,10 @@ static uint32_t list_candidates(struct pt_render *r)
         if (b->reason != LULL_REASON_NONE || b->spp >= end)
             continue;
         double per_spp_s = b->spp > 0 ? b->thread_s / (double)b->spp : 0.0, left = (double)(end - b->spp);
-        r->work->candidates[n++] =
-            (struct candidate){i, octave_of(b->spp), left * (per_spp_s > 0.0 ? per_spp_s : 1.0), per_spp_s};
+        r->work.candidates[n++] =
+            (struct pt_render_candidate){i, octave_of(b->spp), left * (per_spp_s > 0.0 ? per_spp_s : 1.0), per_spp_s};
     }
-    qsort(r->work->candidates, n, sizeof r->work->candidates[0], by_turn);
+    qsort(r->work.candidates, n, sizeof r->work.candidates[0], by_turn);
     return n;
 }
 
@@ -251,9 +220,9 @@ static void shuffle(struct pt_render_work *w, uint32_t state)
     }
 }
 
-static void list_block(struct pt_render *r, const struct candidate *c, double step)
+static void list_block(struct pt_render *r, const struct pt_render_candidate *c, double step)
 {
-    struct pt_render_work *w = r->work;
+    struct pt_render_work *w = &r->work;
     const struct lull_host_block *b = &r->blocks->list[c->block];
     uint64_t end = goal(r, b), most = b->spp > LEAD_SPP ? b->spp : LEAD_SPP;
     most = step < (double)most ? (uint64_t)fmax(step, 1.0) : most;
@@ -268,13 +237,13 @@ static void list_block(struct pt_render *r, const struct candidate *c, double st
 /* Lists rows worth span_s wall seconds. Returns how many, 0 when every block is at its check. */
 static size_t list_items(struct pt_render *r, double span_s)
 {
-    struct pt_render_work *w = r->work;
+    struct pt_render_work *w = &r->work;
     double threads = pt_render_threads(r), rows = 0.0, per_spp_s = 0.0;
     const double enough = threads * ROWS_PER_THREAD * fmax(1.0, ROW_PIXELS / r->config.block_width);
     uint32_t chosen = 0, n = list_candidates(r);
     int known = 1;
     while (chosen < n && rows < enough) {
-        const struct candidate *c = &w->candidates[chosen++];
+        const struct pt_render_candidate *c = &w->candidates[chosen++];
         rows += r->blocks->list[c->block].y1 - r->blocks->list[c->block].y0;
         per_spp_s += c->per_spp_s;
         known &= c->per_spp_s > 0.0;
@@ -291,7 +260,7 @@ static size_t list_items(struct pt_render *r, double span_s)
 /* Returns the thread seconds of the slice. */
 static double gather(struct pt_render *r)
 {
-    const struct pt_render_work *w = r->work;
+    const struct pt_render_work *w = &r->work;
     double thread_s = 0.0;
     for (size_t k = 0; k < w->count; k++) {
         const struct pt_row *item = &w->items[k];
@@ -325,7 +294,7 @@ static int slice(struct pt_render *r, int *more, struct base_err *err)
     if (!*more)
         return 0;
     const struct pt_farm_slice rows = {
-        {r->scene, r->kernel, &r->config.integrator}, &r->film, r->work->items, r->work->order, r->work->count};
+        {r->scene, r->kernel, &r->config.integrator}, &r->film, r->work.items, r->work.order, r->work.count};
     uint64_t before = r->totals->samples;
     double start_s = base_clock_wall_s();
     int rc = pt_farm_sample(r->config.job, r->threads, &rows, err);
@@ -336,7 +305,7 @@ static int slice(struct pt_render *r, int *more, struct base_err *err)
     double thread_s = gather(r);
     r->samples_per_s = recent(r->samples_per_s, (double)(r->totals->samples - before) / fmax(wall_s, 1e-6));
     r->busy_threads = recent(r->busy_threads, thread_s / fmax(wall_s, 1e-6));
-    r->sampled_rows = (long)r->work->count;
+    r->sampled_rows = (long)r->work.count;
     return 0;
 }
 
@@ -352,7 +321,7 @@ static void warn_once(const struct pt_render *r, const struct pt_render_hooks *h
 /* Asks about the `count` blocks of work->due. A criterion that fails leaves every decision undecided. */
 static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hooks *hooks)
 {
-    const struct pt_render_work *w = r->work;
+    const struct pt_render_work *w = &r->work;
     struct lull_error e = {.struct_size = sizeof e};
     struct pt_host_view show;
     if (lull_host_ask(r->frame, pt_host_show(&r->film, r->blocks, &show), w->due, w->final, count, w->decisions, &e) !=
@@ -363,7 +332,7 @@ static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hook
 /* All active blocks are at their next check. */
 static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
 {
-    struct pt_render_work *w = r->work;
+    struct pt_render_work *w = &r->work;
     const uint32_t n = lull_host_due(r->frame, w->due, w->final);
     if (n == 0)
         return;
@@ -502,9 +471,9 @@ void pt_render_judge(struct pt_render *r, const struct pt_render_hooks *hooks)
     if (!r->criterion)
         return;
     for (uint32_t i = 0; i < r->blocks->count; i++) {
-        r->work->due[i] = i;
-        r->work->final[i] = 0;
+        r->work.due[i] = i;
+        r->work.final[i] = 0;
     }
     ask(r, r->blocks->count, hooks);
-    lull_host_note(r->frame, r->work->due, r->blocks->count, r->work->decisions);
+    lull_host_note(r->frame, r->work.due, r->blocks->count, r->work.decisions);
 }

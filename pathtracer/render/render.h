@@ -19,8 +19,8 @@
 #include "base/threads.h"
 #include "integ/integrator.h"
 #include "job/job.h"
+#include "render/farm.h"
 #include "render/host.h"
-#include "render/film.h"
 
 struct pt_render_config {
     int width, height; /* of the image, pixels */
@@ -40,6 +40,25 @@ struct pt_render_config {
     struct job *job;                 /* borrows; whose workers help to sample, NULL: none */
 };
 
+/* A block that is to be sampled. */
+struct pt_render_candidate {
+    uint32_t block;
+    int octave;       /* of its samples: who has few goes first */
+    double left_s;    /* thread seconds to its check, for want of better its samples to there */
+    double per_spp_s; /* thread seconds per sample of all its pixels; 0 = not known */
+};
+
+/* Scratch of the slices; owned. */
+struct pt_render_work {
+    struct pt_row *items; /* [rows of all blocks] */
+    uint32_t *order;      /* [rows of all blocks] item to be done n-th */
+    size_t count;
+    struct pt_render_candidate *candidates; /* [blocks] */
+    uint32_t *due;                          /* [blocks] */
+    uint8_t *final;                         /* [blocks] */
+    struct lull_decision *decisions;        /* [blocks] */
+};
+
 struct pt_render {
     struct pt_render_config config;
     const struct pt_scene *scene; /* borrows */
@@ -50,10 +69,10 @@ struct pt_render {
     struct lull_host_frame *frame;   /* owns; decides: blocks, limits, who is asked */
     struct lull_host_blocks *blocks; /* of the frame, as the totals */
     struct lull_host_totals *totals;
-    struct pt_render_work *work; /* owns; scratch of the slices */
-    double samples_per_s;        /* recent, 0 = not known yet */
-    double busy_threads;         /* likewise: thread seconds per wall second of sampling */
-    long sampled_rows;           /* what those threads had to share */
+    struct pt_render_work work;
+    double samples_per_s; /* recent, 0 = not known yet */
+    double busy_threads;  /* likewise: thread seconds per wall second of sampling */
+    long sampled_rows;    /* what those threads had to share */
 };
 
 enum pt_render_outcome {
