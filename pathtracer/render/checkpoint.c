@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-
 /*
  * magic[8], identity bytes, identity; film bytes, film arrays; the state of the frame (lull_host_save); crc32 of all before.
  * Counts are u64.

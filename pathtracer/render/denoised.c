@@ -34,8 +34,7 @@ int pt_denoised_make(const struct pt_render *r, enum pt_picture picture, const c
                                                 .cancelled = cancelled};
         const struct lull_host_picture made = {
             .struct_size = sizeof made, .rgb = out->rgb, .denoised = out->denoised, .weight = out->weight};
-        int32_t code = lull_host_denoise(r->frame, pt_host_show(&r->film, r->blocks, &view), &how, &made, &e);
-        rc = pt_host_result(code, &e, err);
+        rc = pt_host_result(lull_host_denoise(r->frame, pt_host_show(&r->film, r->blocks, &view), &how, &made, &e), &e, err);
     }
     for (size_t i = 0; !rc && i < n; i++)
         out->weight_mean += (double)out->weight[i] / (double)n;

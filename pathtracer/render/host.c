@@ -37,10 +37,9 @@ int pt_criterion_find(const char *spec, struct base_inputs *inputs, struct base_
     struct lull_search search = {.log = log_message, .log_context = &services};
     struct lull_error e = {.struct_size = sizeof e};
     struct lull_found found;
-    int32_t code = lull_open(&search, spec, &found, &e);
-    if (code != LULL_OK)
-        return pt_host_result(code, &e, err);
-    int rc = inputs ? base_inputs_add(inputs, found.path, err) : 0;
+    int rc = pt_host_result(lull_open(&search, spec, &found, &e), &e, err);
+    if (!rc && inputs)
+        rc = base_inputs_add(inputs, found.path, err);
     if (!rc)
         *out = found.criterion;
     return rc;
@@ -112,8 +111,7 @@ int pt_criterion_create(const struct lull_criterion *table, const struct lull_pa
                                           .log = log_message,
                                           .parallel_for = run_tasks,
                                           .release = free};
-    int32_t code = lull_host_create(&services, table, pairs, pair_count, out, &e);
-    return pt_host_result(code, &e, err);
+    return pt_host_result(lull_host_create(&services, table, pairs, pair_count, out, &e), &e, err);
 }
 
 /* --- showing the film ----------------------------------------------------------------------------------------------- */

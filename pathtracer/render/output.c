@@ -226,8 +226,7 @@ int pt_output_result(int32_t code, const struct lull_error *why, struct base_err
 int pt_output_stop_map(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
-    int32_t code = lull_host_stop_map(r->blocks, path, info->of.scene, &e);
-    return pt_output_result(code, &e, err);
+    return pt_output_result(lull_host_stop_map(r->blocks, path, info->of.scene, &e), &e, err);
 }
 
 /* --- report --------------------------------------------------------------------------------------------------------- */
@@ -308,8 +307,7 @@ int pt_output_report(const char *path, const struct pt_render *r, const struct p
         return write_report_so_far(path, r, info, err);
     const struct lull_host_report report = describe(r, info, effects);
     struct lull_error e = {.struct_size = sizeof e};
-    int32_t code = lull_host_report_write(r->frame, &report, path, &e);
-    return pt_output_result(code, &e, err);
+    return pt_output_result(lull_host_report_write(r->frame, &report, path, &e), &e, err);
 }
 
 /* --- page ----------------------------------------------------------------------------------------------------------- */

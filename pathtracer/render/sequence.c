@@ -317,11 +317,10 @@ static int lay_grid(struct recorder *r, struct base_err *err)
                                     .block_height = (uint32_t)c->block_height,
                                     .spp_min = 1,
                                     .spp_max = 1};
-    int32_t code = lull_host_begin(&grid, NULL, &r->whole, &e);
-    if (code != LULL_OK)
-        return pt_host_result(code, &e, err);
-    r->grid = lull_host_blocks_of(r->whole);
-    return 0;
+    int rc = pt_host_result(lull_host_begin(&grid, NULL, &r->whole, &e), &e, err);
+    if (!rc)
+        r->grid = lull_host_blocks_of(r->whole);
+    return rc;
 }
 
 /* What can refuse the recording comes before the folder, and its lock before the look at what an earlier run left there. */
