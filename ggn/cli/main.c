@@ -6,7 +6,7 @@
 #include "base/interrupt.h"
 #include "base/options.h"
 #include "cli/commands.h"
-#include "picture/colour_map.h"
+#include "picture/draw.h"
 
 struct command {
     const char *name;

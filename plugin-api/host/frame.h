@@ -9,7 +9,7 @@
 
 #include "base/err.h"
 #include "base/threads.h"
-#include "picture/font.h"
+#include "picture/draw.h"
 #include "src/process_state.h"
 
 enum { LULL_HOST_STEPS = 8 }; /* of a mask */

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "base/files.h"
-#include "picture/colour_map.h"
 #include "picture/png.h"
 #include "base/text.h"
 
@@ -33,11 +32,6 @@ static const uint8_t *ink(const uint8_t rgb[3])
     return 2 * rgb[0] + 5 * rgb[1] + rgb[2] > 8 * 120 ? black : white;
 }
 
-static void put(const struct pic_canvas *c, int x, int y, const uint8_t rgb[3])
-{
-    memcpy(c->rgb + 3 * ((size_t)y * (size_t)c->width + (size_t)x), rgb, 3);
-}
-
 /* digits: of the longest number, so that all are written in the same size. */
 static void paint_block(const struct pic_canvas *canvas, int x0, int y0, int x1, int y1, double value, double t, int digits)
 {
@@ -47,7 +41,7 @@ static void paint_block(const struct pic_canvas *canvas, int x0, int y0, int x1,
         edge[c] = (uint8_t)(colour[c] * 3 / 4);
     for (int y = y0; y < y1; y++)
         for (int x = x0; x < x1; x++)
-            put(canvas, x, y, x == x1 - 1 || y == y1 - 1 ? edge : colour);
+            memcpy(pic_pixel(canvas, x, y), x == x1 - 1 || y == y1 - 1 ? edge : colour, 3);
     char text[24];
     int length = format(value, text);
     for (int scale = 4; scale >= 1; scale--) {
@@ -65,12 +59,12 @@ static void paint_legend(const struct pic_canvas *canvas, int top, double low, d
     int margin = 8, left = margin, right = canvas->width - margin;
     for (int y = top; y < canvas->height; y++)
         for (int x = 0; x < canvas->width; x++)
-            put(canvas, x, y, paper);
+            memcpy(pic_pixel(canvas, x, y), paper, 3);
     for (int x = left; x < right; x++) {
         uint8_t colour[3];
         pic_colour(PIC_VIRIDIS, high > low ? (double)(x - left) / (double)(right - left - 1) : 0.5, colour);
         for (int y = top + 6; y < top + 20; y++)
-            put(canvas, x, y, colour);
+            memcpy(pic_pixel(canvas, x, y), colour, 3);
     }
     /* Ends and the middle of the logarithmic scale, as far as they fit. */
     const double at[3] = {0.0, 1.0, 0.5};

@@ -7,6 +7,12 @@
 
 enum { PIC_MAX_SIDE = 32768, PIC_MAX_PIXELS = 1 << 27 };
 
+/* Red, green, blue, white of Rec. 709. */
+#define PIC_REC709_PRIMARIES \
+    { \
+        0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f \
+    }
+
 struct pic_image {
     int32_t width, height, channels; /* channels in [1, 4] */
     int32_t is_float_file;           /* the file holds half or float: linear light unless the user says otherwise */

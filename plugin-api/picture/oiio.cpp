@@ -5,7 +5,6 @@ extern "C" {
 
 #include "picture/channels.h"
 #include "picture/oiio.h"
-#include "picture/primaries.h"
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>

@@ -37,6 +37,10 @@ int pic_read_layer(const char *path, const char *layer, struct pic_image *out, s
 int pic_read_header(const char *path, struct pic_window *window, struct pic_attribute *attributes, int count,
                     struct base_err *err);
 
+/* m: linear light of the primaries and the white that a file names, as CIE 1931 x, y, to that of Rec. 709, by way of XYZ,
+ * without chromatic adaptation. 0 when they span no colour space: numbers that are not finite, primaries on a line, a white
+ * outside of them. */
+int pic_primaries_to_rec709(const float primaries[8], double m[3][3]);
 /* Makes light of other primaries (image->has_primaries) light of Rec. 709; else it does nothing. It is the same light: a
  * white that differs is no white any more (no chromatic adaptation, as OpenEXR, tev and Mitsuba). Colours outside of
  * Rec. 709 get negative values. BASE_EINVAL when the file's primaries and white span no colour space. */

@@ -7,8 +7,7 @@
 #include <zlib.h>
 
 #include "base/files.h"
-#include "picture/colour_map.h"
-#include "picture/font.h"
+#include "picture/draw.h"
 #include "picture/png.h"
 #include "picture/read.h"
 
@@ -115,7 +114,7 @@ static int write_frame(struct sheet *s, struct base_err *err)
     return 0;
 }
 
-/* --- the sheet ---------------------------------------------------------------------------------------------------------- */
+/* --- the sheet --------------------------------------------------------------------------------------------------------- */
 
 static double scale_of(const struct sheet *s, double spp)
 {
@@ -143,11 +142,6 @@ static int measure(struct sheet *s, const char *path, struct base_err *err)
     return rc;
 }
 
-static uint8_t *pixel(const struct sheet *s, int32_t x, int32_t y)
-{
-    return s->canvas.rgb + 3 * ((size_t)y * (size_t)s->canvas.width + (size_t)x);
-}
-
 static void paint_scale(const struct sheet *s)
 {
     static const uint8_t ink[3] = {0, 0, 0};
@@ -156,7 +150,7 @@ static void paint_scale(const struct sheet *s)
     for (int32_t x = left; x < right; x++)
         for (int32_t y = top; y < top + BAR; y++)
             pic_colour(PIC_VIRIDIS, s->high > s->low ? (double)(x - left) / (double)(right - left - 1) : 0.5,
-                       pixel(s, x, y));
+                       pic_pixel(&s->canvas, x, y));
     snprintf(low, sizeof low, "%.0f spp", s->low);
     snprintf(high, sizeof high, "%.0f", s->high);
     pic_draw_text(&s->canvas, left, top + BAR + MARGIN, 2, ink, low);
@@ -179,8 +173,8 @@ static int add_frame(struct sheet *s, const char *path, struct base_err *err)
     for (int32_t y = 0; y < down && !rc; y++)
         for (int32_t x = 0; x < across; x++) {
             const size_t i = (size_t)(y / s->enlarge) * (size_t)s->width + (size_t)(x / s->enlarge);
-            memcpy(pixel(s, x, y), picture.u8 + 3 * i, 3);
-            pic_colour(PIC_VIRIDIS, scale_of(s, (double)spp.f32[i]), pixel(s, across + GAP + x, y));
+            memcpy(pic_pixel(&s->canvas, x, y), picture.u8 + 3 * i, 3);
+            pic_colour(PIC_VIRIDIS, scale_of(s, (double)spp.f32[i]), pic_pixel(&s->canvas, across + GAP + x, y));
         }
     if (!rc)
         rc = write_frame(s, err);

@@ -13,9 +13,8 @@
 #include <cmocka.h>
 
 #include "base/files.h"
-#include "picture/colour_map.h"
+#include "picture/draw.h"
 #include "picture/png.h"
-#include "picture/primaries.h"
 #include "picture/read.h"
 
 static char dir[] = "/tmp/base_picture_XXXXXX";

@@ -13,7 +13,7 @@
 
 #include "host/frame.h"
 #include "image/exr.h"
-#include "picture/colour_map.h"
+#include "picture/draw.h"
 #include "picture/read.h"
 #include "support/approve.h"
 

@@ -18,7 +18,7 @@
 #include "base/files.h"
 #include "base/version.h"
 #include "host/frame.h"
-#include "picture/colour_map.h"
+#include "picture/draw.h"
 #include "picture/read.h"
 #include "render/output.h"
 #include "support/approve.h"
