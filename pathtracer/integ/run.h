@@ -5,7 +5,7 @@
  * Rays go to the acceleration structure in packets, and what the hits need from memory is fetched for all of them before the
  * first is looked at: while one path would wait, others are worked on. Paths are in the order of their pixels throughout. Of
  * two surfaces at the very same distance the other rays of a packet may decide which is met: the bytes of an image depend on
- * the runs that rows are cut into (render/rows.c), never on thread or time.
+ * the runs that rows are cut into (render/farm.c), never on thread or time.
  */
 #ifndef PT_INTEG_RUN_H
 #define PT_INTEG_RUN_H
