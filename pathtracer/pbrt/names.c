@@ -1,72 +1,59 @@
+#define _GNU_SOURCE /* tdestroy */
 #include "pbrt/names.h"
 
+#include <search.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/err.h"
 
-/* FNV-1a, Fowler, Noll and Vo. */
-static uint32_t hash_of(const char *name)
+struct named {
+    const char *name; /* in `text`, or the one that is looked for */
+    int32_t value;
+    char text[];
+};
+
+static int by_name(const void *a, const void *b)
 {
-    uint32_t h = 2166136261u;
-    for (const unsigned char *c = (const unsigned char *)name; *c != '\0'; c++)
-        h = (h ^ *c) * 16777619u;
-    return h;
+    const struct named *x = a, *y = b;
+    return strcmp(x->name, y->name);
 }
 
-static struct pt_names_entry *slot_of(struct pt_names_entry *entries, size_t room, const char *name, uint32_t hash)
+static struct named *find(const struct pt_names *names, const char *name)
 {
-    size_t i = hash & (room - 1);
-    while (entries[i].name && (entries[i].hash != hash || strcmp(entries[i].name, name) != 0))
-        i = (i + 1) & (room - 1);
-    return &entries[i];
+    const struct named key = {.name = name};
+    struct named *const *node = tfind(&key, &names->tree, by_name);
+    return node ? *node : NULL;
 }
 
 int32_t pt_names_get(const struct pt_names *names, const char *name)
 {
-    if (names->room == 0)
-        return -1;
-    const struct pt_names_entry *e = slot_of(names->entries, names->room, name, hash_of(name));
-    return e->name ? e->value : -1;
-}
-
-static int grow(struct pt_names *names)
-{
-    size_t room = names->room > 0 ? names->room * 2 : 32;
-    struct pt_names_entry *entries = calloc(room, sizeof *entries);
-    if (!entries)
-        return BASE_ENOMEM;
-    for (size_t i = 0; i < names->room; i++)
-        if (names->entries[i].name)
-            *slot_of(entries, room, names->entries[i].name, names->entries[i].hash) = names->entries[i];
-    free(names->entries);
-    names->entries = entries;
-    names->room = room;
-    return 0;
+    const struct named *e = find(names, name);
+    return e ? e->value : -1;
 }
 
 int pt_names_set(struct pt_names *names, const char *name, int32_t value)
 {
-    uint32_t hash = hash_of(name);
-    struct pt_names_entry *e = names->room > 0 ? slot_of(names->entries, names->room, name, hash) : NULL;
-    if (e && e->name) {
+    struct named *e = find(names, name);
+    if (e) {
         e->value = value;
         return 0;
     }
-    if ((names->count + 1) * 4 > names->room * 3 && grow(names) != 0)
+    const size_t bytes = strlen(name) + 1;
+    e = malloc(sizeof *e + bytes);
+    if (!e)
         return BASE_ENOMEM;
-    char *copy = strdup(name);
-    if (!copy)
+    e->name = memcpy(e->text, name, bytes);
+    e->value = value;
+    if (!tsearch(e, &names->tree, by_name)) {
+        free(e);
         return BASE_ENOMEM;
-    *slot_of(names->entries, names->room, name, hash) = (struct pt_names_entry){copy, hash, value};
-    names->count++;
+    }
     return 0;
 }
 
 void pt_names_release(struct pt_names *names)
 {
-    for (size_t i = 0; i < names->room; i++)
-        free(names->entries[i].name);
-    free(names->entries);
-    *names = (struct pt_names){0};
+    tdestroy(names->tree, free);
+    names->tree = NULL;
 }

@@ -4,17 +4,10 @@
 #ifndef PT_PBRT_NAMES_H
 #define PT_PBRT_NAMES_H
 
-#include <stddef.h>
 #include <stdint.h>
 
-struct pt_names_entry {
-    char *name; /* owns; NULL = free slot */
-    uint32_t hash;
-    int32_t value;
-};
 struct pt_names {
-    struct pt_names_entry *entries; /* owns; open addressing, a power of two of slots, at most 3/4 full */
-    size_t count, room;
+    void *tree; /* owns; of search.h */
 };
 
 /* The number of `name`, -1 when there is none. */
