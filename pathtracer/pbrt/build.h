@@ -113,6 +113,9 @@ void pt_builder_release(struct pt_builder *b);
 /* Moves the arrays into the scene's arena and derives everything: effects, camera, acceleration structure, lights. */
 int pt_builder_finish(struct pt_builder *b);
 
+/* pbrt.c: reads `path` and all that it includes; on success the builder is ready for pt_builder_finish. */
+int pt_pbrt_read(struct pt_builder *b, const char *path);
+
 /* Appends a copy of *item; index, or -1 (the diag has failed). */
 int32_t pt_list_add(struct pt_builder *b, struct pt_list *list, const void *item);
 /* Joins a scene-relative file name to the main file's folder. */

@@ -6,7 +6,6 @@
 #include "base/clock.h"
 #include "geom/accel.h"
 #include "pbrt/build.h"
-#include "pbrt/pbrt.h"
 
 static const struct pt_load_options no_options;
 

@@ -127,6 +127,12 @@ static struct declaration split_declaration(const struct pt_token *t)
     return d;
 }
 
+int pt_params_declares(const struct pt_token *t)
+{
+    const struct declaration d = split_declaration(t);
+    return d.name < d.name_end;
+}
+
 static int read_declaration(struct pt_params *params, const struct pt_token *t, struct pt_param *out)
 {
     const struct declaration d = split_declaration(t);

@@ -60,6 +60,8 @@ void pt_params_release(struct pt_params *params);
 /* Remembers a string and returns its offset in text. */
 size_t pt_params_keep(struct pt_params *params, const char *text, size_t length);
 const char *pt_params_kind(const struct pt_params *params);
+/* Whether a string has two words, as those that declare a parameter. */
+int pt_params_declares(const struct pt_token *token);
 /* Reads the list that follows a directive. */
 int pt_params_read(struct pt_params *params, struct pt_lexer *lexer);
 /* Appends copies of all of `from` as inherited parameters (they give way to those already there). */

@@ -1,5 +1,4 @@
-#include "pbrt/pbrt.h"
-
+/* The pbrt directives: reads scene text and feeds the builder. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,7 +10,8 @@
 
 /* --- pieces of directives --------------------------------------------------------------------------------------------- */
 
-int pt_parser_read_string(struct parser *p, const char *what, char *out, size_t room)
+/* A quoted string, with or without brackets, of less than `room` bytes; `what` names it in errors. */
+static int read_string(struct parser *p, const char *what, char *out, size_t room)
 {
     struct pt_token t = pt_lexer_next(&p->lexer);
     if (t.kind == PT_TOKEN_BAD)
@@ -30,28 +30,28 @@ int pt_parser_read_string(struct parser *p, const char *what, char *out, size_t 
     return p->b->diag.rc;
 }
 
-int pt_parser_read_numbers(struct parser *p, const char *directive_name, double *out, int count)
+/* Those of the directive, with or without brackets. */
+static int read_numbers(struct parser *p)
 {
+    const struct directive *d = p->directive;
     int bracket = pt_lexer_peek(&p->lexer).kind == PT_TOKEN_OPEN;
     if (bracket)
         pt_lexer_next(&p->lexer);
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < d->numbers; i++) {
         struct pt_token t = pt_lexer_next(&p->lexer);
         if (t.kind == PT_TOKEN_BAD)
             return p->b->diag.rc;
         if (pt_lexer_has_ended(&p->lexer, &t))
-            return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "%s has %d numbers (expected %d)",
-                                directive_name, i, count);
-        if (t.kind != PT_TOKEN_WORD || !pt_number_parse(t.text, t.length, &out[i]))
-            return pt_diag_fail(&p->b->diag, t.loc, "%s: \"%.*s\" (expected %d numbers)", directive_name,
-                                t.length < 40 ? (int)t.length : 40, t.text, count);
+            return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "%s has %d numbers (expected %d)", d->name, i,
+                                d->numbers);
+        if (t.kind != PT_TOKEN_WORD || !pt_number_parse(t.text, t.length, &p->numbers[i]))
+            return pt_diag_fail(&p->b->diag, t.loc, "%s: \"%.*s\" (expected %d numbers)", d->name,
+                                t.length < 40 ? (int)t.length : 40, t.text, d->numbers);
     }
-    if (bracket) {
-        struct pt_token t = pt_lexer_next(&p->lexer);
-        if (t.kind != PT_TOKEN_CLOSE)
-            return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "%s: expected ] after %d numbers",
-                                directive_name, count);
-    }
+    struct pt_token t;
+    if (bracket && (t = pt_lexer_next(&p->lexer)).kind != PT_TOKEN_CLOSE)
+        return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "%s: expected ] after %d numbers", d->name,
+                            d->numbers);
     return 0;
 }
 
@@ -61,7 +61,7 @@ static int read_entity(struct parser *p, int target)
     char kind[NAME_MAX_BYTES];
     struct pt_params *params = &p->params;
     pt_params_clear(params, &p->b->diag, p->loc);
-    int rc = pt_parser_read_string(p, "name of what follows", kind, sizeof kind);
+    int rc = read_string(p, "name of what follows", kind, sizeof kind);
     if (rc)
         return rc;
     params->kind = pt_params_keep(params, kind, strlen(kind));
@@ -76,14 +76,15 @@ static int read_entity(struct parser *p, int target)
 /* Whether names that are given in such a block end with it. */
 static int has_names(const struct parser *p, char kind) { return p->b->is_v3 && (kind == 'A' || kind == 'O'); }
 
-static int push(struct parser *p, char kind)
+/* Opens the directive's block. */
+static int push(struct parser *p)
 {
-    struct frame f = {p->state, kind, p->loc, p->b->name_undo.count};
+    const struct frame f = {p->state, p->directive->block, p->loc, p->b->name_undo.count};
     if (p->frames.count >= STATE_DEPTH)
         return pt_diag_fail(&p->b->diag, p->loc, "blocks nested more than %d deep", STATE_DEPTH);
     if (pt_list_add(p->b, &p->frames, &f) < 0)
         return p->b->diag.rc;
-    p->b->name_scopes += has_names(p, kind);
+    p->b->name_scopes += has_names(p, f.kind);
     return 0;
 }
 
@@ -112,8 +113,10 @@ static int closes(const struct parser *p, char kind, char opened)
     return kind == opened || (has_names(p, kind) && has_names(p, opened));
 }
 
-static int pop(struct parser *p, char kind, const char *end_name)
+/* Closes it. */
+static int pop(struct parser *p)
 {
+    const char kind = p->directive->block, *end_name = p->directive->name;
     const struct frame *top = innermost(p);
     if (!top && p->b->is_v3) { /* pbrt-v3 says so and goes on */
         pt_diag_warn(&p->b->diag, p->loc, "%s without %s is ignored", end_name, begin_name(kind));
@@ -138,39 +141,23 @@ static int pop(struct parser *p, char kind, const char *end_name)
     return 0;
 }
 
-static int do_attribute_begin(struct parser *p) { return push(p, 'A'); }
-
-static int do_attribute_end(struct parser *p) { return pop(p, 'A', "AttributeEnd"); }
-
-static int do_transform_begin(struct parser *p) { return push(p, 'T'); }
-
-static int do_transform_end(struct parser *p) { return pop(p, 'T', "TransformEnd"); }
-
 static int do_object_begin(struct parser *p)
 {
-    char name[NAME_MAX_BYTES];
-    int rc = pt_parser_read_string(p, "object name", name, sizeof name);
-    if (!rc)
-        rc = pt_build_object_begin(p->b, name, p->loc);
-    return rc ? rc : push(p, 'O');
+    int rc = pt_build_object_begin(p->b, p->name, p->loc);
+    return rc ? rc : push(p);
 }
 
 static int do_object_end(struct parser *p)
 {
     if (p->b->open_object < 0)
         return pt_diag_fail(&p->b->diag, p->loc, "ObjectEnd without ObjectBegin");
-    int rc = pop(p, 'O', "ObjectEnd");
+    int rc = pop(p);
     if (!rc)
         p->b->open_object = -1;
     return rc;
 }
 
-static int do_object_instance(struct parser *p)
-{
-    char name[NAME_MAX_BYTES];
-    int rc = pt_parser_read_string(p, "object name", name, sizeof name);
-    return rc ? rc : pt_build_instance(p->b, name, p->loc);
-}
+static int do_object_instance(struct parser *p) { return pt_build_instance(p->b, p->name, p->loc); }
 
 static int do_reverse_orientation(struct parser *p)
 {
@@ -180,10 +167,12 @@ static int do_reverse_orientation(struct parser *p)
 
 /* --- header ----------------------------------------------------------------------------------------------------------- */
 
-static int read_header(struct parser *p, enum pt_header which, const char *name)
+static int do_header(struct parser *p)
 {
+    static const char *const names[PT_HEADER_COUNT] = {"Film", "Camera", "Sampler", "Integrator", "PixelFilter"};
+    const enum pt_header which = p->directive->header;
     if (p->in_world)
-        return pt_diag_fail(&p->b->diag, p->loc, "%s after WorldBegin", name);
+        return pt_diag_fail(&p->b->diag, p->loc, "%s after WorldBegin", names[which]);
     int rc = read_entity(p, -1);
     if (rc)
         return rc;
@@ -195,7 +184,7 @@ static int read_header(struct parser *p, enum pt_header which, const char *name)
 
 static int do_film(struct parser *p)
 {
-    int rc = read_header(p, PT_HEADER_FILM, "Film");
+    int rc = do_header(p);
     if (!rc && strcmp(pt_params_kind(&p->b->header[PT_HEADER_FILM]), "image") == 0)
         p->b->is_v3 = p->b->diag.is_v3 = 1;
     return rc;
@@ -204,7 +193,7 @@ static int do_film(struct parser *p)
 static int do_camera(struct parser *p)
 {
     struct pt_xform inverse[2];
-    int rc = read_header(p, PT_HEADER_CAMERA, "Camera");
+    int rc = do_header(p);
     if (rc)
         return rc;
     memcpy(p->b->camera_ctm, p->state.ctm, sizeof p->state.ctm);
@@ -214,12 +203,6 @@ static int do_camera(struct parser *p)
             return pt_diag_fail(&p->b->diag, p->loc, "the camera's transform is singular");
     return pt_parser_save_system(p, "camera", inverse);
 }
-
-static int do_sampler(struct parser *p) { return read_header(p, PT_HEADER_SAMPLER, "Sampler"); }
-
-static int do_integrator(struct parser *p) { return read_header(p, PT_HEADER_INTEGRATOR, "Integrator"); }
-
-static int do_pixel_filter(struct parser *p) { return read_header(p, PT_HEADER_FILTER, "PixelFilter"); }
 
 /* The choice is ours. */
 static int do_accelerator(struct parser *p)
@@ -279,38 +262,31 @@ static int do_make_named_material(struct parser *p)
 
 static int do_named_material(struct parser *p)
 {
-    char name[NAME_MAX_BYTES];
-    int rc = pt_parser_read_string(p, "material name", name, sizeof name);
-    if (rc)
-        return rc;
-    p->state.material = pt_build_named_material(p->b, p->loc, name, p->state.material);
+    p->state.material = pt_build_named_material(p->b, p->loc, p->name, p->state.material);
     return p->b->diag.rc;
 }
 
 static int do_texture(struct parser *p)
 {
-    char name[NAME_MAX_BYTES], type[64];
-    int rc = pt_parser_read_string(p, "texture name", name, sizeof name);
-    if (!rc)
-        rc = pt_parser_read_string(p, "texture type", type, sizeof type);
+    char type[64];
+    int rc = read_string(p, "texture type", type, sizeof type);
     if (!rc)
         rc = read_entity(p, PT_ATTR_TEXTURE);
-    return rc ? rc : pt_build_texture(p->b, name, type, &p->params);
+    return rc ? rc : pt_build_texture(p->b, p->name, type, &p->params);
 }
 
 static int do_make_named_medium(struct parser *p) { return pt_build_medium(p->b, &p->params); }
 
 static int do_medium_interface(struct parser *p)
 {
-    char inside[NAME_MAX_BYTES], outside[NAME_MAX_BYTES];
-    int rc = pt_parser_read_string(p, "medium name", inside, sizeof inside);
+    char outside[NAME_MAX_BYTES];
+    int rc = 0;
+    strcpy(outside, p->name);
+    if (pt_lexer_peek(&p->lexer).kind == PT_TOKEN_STRING)
+        rc = read_string(p, "medium name", outside, sizeof outside);
     if (rc)
         return rc;
-    strcpy(outside, inside);
-    if (pt_lexer_peek(&p->lexer).kind == PT_TOKEN_STRING &&
-        (rc = pt_parser_read_string(p, "medium name", outside, sizeof outside)) != 0)
-        return rc;
-    p->state.medium_in = pt_build_medium_ref(p->b, inside, p->loc);
+    p->state.medium_in = pt_build_medium_ref(p->b, p->name, p->loc);
     p->state.medium_out = pt_build_medium_ref(p->b, outside, p->loc);
     return p->b->diag.rc;
 }
@@ -342,7 +318,7 @@ static int do_attribute(struct parser *p)
 static int do_color_space(struct parser *p)
 {
     char name[64];
-    int rc = pt_parser_read_string(p, "colour space", name, sizeof name);
+    int rc = read_string(p, "colour space", name, sizeof name);
     if (rc)
         return rc;
     int space = pt_colour_space_named(name);
@@ -351,19 +327,6 @@ static int do_color_space(struct parser *p)
                             "unknown colour space \"%s\" (expected srgb, dci-p3, rec2020 or aces2065-1)", name);
     p->state.colour_space = space;
     return 0;
-}
-
-/* `"type name"`, as parameters have it; v4 has the name alone. */
-static int has_type(const struct pt_token *t)
-{
-    size_t at = 0;
-    while (at < t->length && (t->text[at] == ' ' || t->text[at] == '\t'))
-        at++;
-    while (at < t->length && t->text[at] != ' ' && t->text[at] != '\t')
-        at++;
-    while (at < t->length && (t->text[at] == ' ' || t->text[at] == '\t'))
-        at++;
-    return at < t->length;
 }
 
 /* A number, true, false or a string. `value`: NULL, or where a whole number from 0 to 2^31 - 1 goes. */
@@ -396,7 +359,7 @@ static int read_option(struct parser *p)
                                 "forcediffuse msereferenceimage msereferenceout pixelstats rendercoordsys wavefront ";
     char name[NAME_MAX_BYTES], plain[NAME_MAX_BYTES + 2] = " ";
     size_t n = 1;
-    int rc = pt_parser_read_string(p, "option", name, sizeof name);
+    int rc = read_string(p, "option", name, sizeof name);
     if (rc)
         return rc;
     for (const char *at = name; *at; at++)
@@ -417,7 +380,7 @@ static int read_option(struct parser *p)
 static int do_option(struct parser *p)
 {
     const struct pt_token first = pt_lexer_peek(&p->lexer);
-    if (first.kind != PT_TOKEN_STRING || !has_type(&first))
+    if (first.kind != PT_TOKEN_STRING || !pt_params_declares(&first)) /* v4 has the name alone */
         return read_option(p);
     pt_params_clear(&p->params, &p->b->diag, p->loc);
     int rc = pt_params_read(&p->params, &p->lexer);
@@ -432,58 +395,51 @@ static int do_option(struct parser *p)
     return rc;
 }
 
-static int include(struct parser *p, int scoped)
+static int do_include(struct parser *p)
 {
-    char name[NAME_MAX_BYTES], path[2 * NAME_MAX_BYTES];
-    int rc = pt_parser_read_string(p, "file name", name, sizeof name);
-    if (rc)
-        return rc;
-    pt_builder_path(p->b, name, path, sizeof path);
-    if (scoped && (rc = push(p, 'I')) != 0)
-        return rc;
-    return pt_lexer_include(&p->lexer, path, p->loc, scoped);
+    char path[2 * NAME_MAX_BYTES];
+    const int scoped = p->directive->block == 'I';
+    pt_builder_path(p->b, p->name, path, sizeof path);
+    int rc = scoped ? push(p) : 0;
+    return rc ? rc : pt_lexer_include(&p->lexer, path, p->loc, scoped);
 }
-
-static int do_include(struct parser *p) { return include(p, 0); }
-
-static int do_import(struct parser *p) { return include(p, 1); }
 
 /* --- the loop --------------------------------------------------------------------------------------------------------- */
 
 static const struct directive directives[] = {
-    {"Shape", do_shape, 1, READ_FOR_SHAPE},
-    {"AttributeBegin", do_attribute_begin, 1, READ_NOTHING},
-    {"AttributeEnd", do_attribute_end, 0, READ_NOTHING},
-    {"ObjectInstance", do_object_instance, 1, READ_NOTHING},
-    {"NamedMaterial", do_named_material, 1, READ_NOTHING},
-    {"Material", do_material, 1, READ_FOR_MATERIAL},
-    {"MakeNamedMaterial", do_make_named_material, 1, READ_FOR_MATERIAL},
-    {"Texture", do_texture, 1, READ_NOTHING},
-    {"ObjectBegin", do_object_begin, 1, READ_NOTHING},
-    {"ObjectEnd", do_object_end, 0, READ_NOTHING},
-    {"Include", do_include, 0, READ_NOTHING},
-    {"Import", do_import, 1, READ_NOTHING},
-    {"LightSource", do_light_source, 1, READ_FOR_LIGHT},
-    {"AreaLightSource", do_area_light_source, 1, READ_FOR_LIGHT},
-    {"TransformBegin", do_transform_begin, 0, READ_NOTHING},
-    {"TransformEnd", do_transform_end, 0, READ_NOTHING},
-    {"ReverseOrientation", do_reverse_orientation, 0, READ_NOTHING},
-    {"MakeNamedMedium", do_make_named_medium, 0, READ_FOR_MEDIUM},
-    {"MediumInterface", do_medium_interface, 0, READ_NOTHING},
-    {"Attribute", do_attribute, 0, READ_PLAIN},
-    {"ColorSpace", do_color_space, 0, READ_NOTHING},
-    {"Option", do_option, 0, READ_NOTHING},
-    {"Film", do_film, 0, READ_NOTHING},
-    {"Camera", do_camera, 0, READ_NOTHING},
-    {"Sampler", do_sampler, 0, READ_NOTHING},
-    {"Integrator", do_integrator, 0, READ_NOTHING},
-    {"SurfaceIntegrator", do_integrator, 0, READ_NOTHING},
-    {"VolumeIntegrator", do_accelerator, 0, READ_PLAIN},
-    {"Renderer", do_accelerator, 0, READ_PLAIN},
-    {"PixelFilter", do_pixel_filter, 0, READ_NOTHING},
-    {"Accelerator", do_accelerator, 0, READ_PLAIN},
-    {"WorldBegin", do_world_begin, 0, READ_NOTHING},
-    {"WorldEnd", do_world_end, 1, READ_NOTHING},
+    {"Shape", do_shape, .in_world = 1, .reads = READ_FOR_SHAPE},
+    {"AttributeBegin", push, .in_world = 1, .block = 'A'},
+    {"AttributeEnd", pop, .block = 'A'},
+    {"ObjectInstance", do_object_instance, .in_world = 1, .text = "object name"},
+    {"NamedMaterial", do_named_material, .in_world = 1, .text = "material name"},
+    {"Material", do_material, .in_world = 1, .reads = READ_FOR_MATERIAL},
+    {"MakeNamedMaterial", do_make_named_material, .in_world = 1, .reads = READ_FOR_MATERIAL},
+    {"Texture", do_texture, .in_world = 1, .text = "texture name"},
+    {"ObjectBegin", do_object_begin, .in_world = 1, .text = "object name", .block = 'O'},
+    {"ObjectEnd", do_object_end, .block = 'O'},
+    {"Include", do_include, .text = "file name"},
+    {"Import", do_include, .in_world = 1, .text = "file name", .block = 'I'},
+    {"LightSource", do_light_source, .in_world = 1, .reads = READ_FOR_LIGHT},
+    {"AreaLightSource", do_area_light_source, .in_world = 1, .reads = READ_FOR_LIGHT},
+    {"TransformBegin", push, .block = 'T'},
+    {"TransformEnd", pop, .block = 'T'},
+    {.name = "ReverseOrientation", .run = do_reverse_orientation},
+    {"MakeNamedMedium", do_make_named_medium, .reads = READ_FOR_MEDIUM},
+    {"MediumInterface", do_medium_interface, .text = "medium name"},
+    {"Attribute", do_attribute, .reads = READ_PLAIN},
+    {.name = "ColorSpace", .run = do_color_space},
+    {.name = "Option", .run = do_option},
+    {"Film", do_film, .header = PT_HEADER_FILM},
+    {"Camera", do_camera, .header = PT_HEADER_CAMERA},
+    {"Sampler", do_header, .header = PT_HEADER_SAMPLER},
+    {"Integrator", do_header, .header = PT_HEADER_INTEGRATOR},
+    {"SurfaceIntegrator", do_header, .header = PT_HEADER_INTEGRATOR},
+    {"VolumeIntegrator", do_accelerator, .reads = READ_PLAIN},
+    {"Renderer", do_accelerator, .reads = READ_PLAIN},
+    {"PixelFilter", do_header, .header = PT_HEADER_FILTER},
+    {"Accelerator", do_accelerator, .reads = READ_PLAIN},
+    {.name = "WorldBegin", .run = do_world_begin},
+    {"WorldEnd", do_world_end, .in_world = 1},
     {0},
 };
 
@@ -511,7 +467,11 @@ static int run_directive(struct parser *p, const struct pt_token *t)
                             t->length < 40 ? (int)t->length : 40, t->text);
     if (d->in_world && !p->in_world)
         return pt_diag_fail(&p->b->diag, t->loc, "%s before WorldBegin", d->name);
-    int rc = d->reads == READ_NOTHING ? 0 : read_entity(p, (int)d->reads - READ_FOR_SHAPE);
+    p->directive = d;
+    int rc = d->text                    ? read_string(p, d->text, p->name, sizeof p->name)
+             : d->numbers > 0           ? read_numbers(p)
+             : d->reads != READ_NOTHING ? read_entity(p, (int)d->reads - READ_FOR_SHAPE)
+                                        : 0;
     return rc ? rc : d->run(p);
 }
 

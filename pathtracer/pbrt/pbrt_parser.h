@@ -22,13 +22,16 @@ struct parser {
     struct pt_list frames;  /* struct frame */
     struct pt_list systems; /* struct pt_xform[2]: named coordinate systems */
     struct pt_names system_names;
-    struct pt_loc loc;         /* of the current directive */
-    struct pt_params params;   /* what it reads */
+    const struct directive *directive; /* the current one, its place, and what was read before it runs: */
+    struct pt_loc loc;
+    char name[NAME_MAX_BYTES];
+    double numbers[16];
+    struct pt_params params;
     struct pt_list attributes; /* struct pt_params *: owns what states point to */
     int in_world, ended;
 };
 
-/* What is read before a directive runs: nothing, or kind and parameters into parser.params, with those of an Attribute. */
+/* Whose parameters are read before a directive runs, with those of an Attribute. */
 enum directive_reads {
     READ_NOTHING,
     READ_PLAIN,
@@ -42,13 +45,16 @@ struct directive {
     const char *name;
     int (*run)(struct parser *p);
     int in_world; /* refused before WorldBegin */
+    /* what goes into parser.name, .numbers or .params first, or none of them: */
+    const char *text; /* a quoted string, called so in errors */
+    int numbers;      /* so many */
     enum directive_reads reads;
+    /* of directives that share their function: */
+    char block; /* frame.kind of what it opens or closes */
+    enum pt_header header;
+    int replaces; /* the transform instead of adding to it */
 };
 
-/* A quoted string, with or without brackets, of less than `room` bytes; `what` names it in errors. */
-int pt_parser_read_string(struct parser *p, const char *what, char *out, size_t room);
-/* `count` numbers, with or without brackets. */
-int pt_parser_read_numbers(struct parser *p, const char *directive_name, double *out, int count);
 /* Names a coordinate system. */
 int pt_parser_save_system(struct parser *p, const char *name, const struct pt_xform ctm[2]);
 /* The directives that concern transforms; ends with {0}. */

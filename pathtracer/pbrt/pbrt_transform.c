@@ -5,12 +5,12 @@
 #include "pbrt/pbrt_parser.h"
 
 /* A transform may flatten what comes (Scale 0 hides things in animations): who needs its inverse sees to that. */
-static int concat(struct parser *p, const struct pt_xform *t, int replace)
+static int concat(struct parser *p, const struct pt_xform *t)
 {
     for (int i = 0; i < 2; i++) {
         if ((p->state.active >> i & 1) == 0)
             continue;
-        struct pt_xform next = replace ? *t : pt_xform_mul(&p->state.ctm[i], t);
+        struct pt_xform next = p->directive->replaces ? *t : pt_xform_mul(&p->state.ctm[i], t);
         for (int k = 0; k < 12; k++)
             if (!isfinite(next.m[k / 4][k % 4]))
                 return pt_diag_fail(&p->b->diag, p->loc, "the transform is out of range (expected finite numbers)");
@@ -21,66 +21,48 @@ static int concat(struct parser *p, const struct pt_xform *t, int replace)
 
 static int do_identity(struct parser *p)
 {
-    struct pt_xform t = pt_xform_identity();
-    return concat(p, &t, 1);
+    const struct pt_xform t = pt_xform_identity();
+    return concat(p, &t);
 }
 
 static int do_translate(struct parser *p)
 {
-    double v[3] = {0};
-    int rc = pt_parser_read_numbers(p, "Translate", v, 3);
-    struct pt_xform t = pt_xform_translate(v[0], v[1], v[2]);
-    return rc ? rc : concat(p, &t, 0);
+    const struct pt_xform t = pt_xform_translate(p->numbers[0], p->numbers[1], p->numbers[2]);
+    return concat(p, &t);
 }
 
 static int do_scale(struct parser *p)
 {
-    double v[3] = {0};
-    int rc = pt_parser_read_numbers(p, "Scale", v, 3);
-    struct pt_xform t = pt_xform_scale(v[0], v[1], v[2]);
-    return rc ? rc : concat(p, &t, 0);
+    const struct pt_xform t = pt_xform_scale(p->numbers[0], p->numbers[1], p->numbers[2]);
+    return concat(p, &t);
 }
 
 static int do_rotate(struct parser *p)
 {
-    double v[4] = {0};
-    int rc = pt_parser_read_numbers(p, "Rotate", v, 4);
-    if (rc)
-        return rc;
+    const double *v = p->numbers;
     if (v[1] == 0 && v[2] == 0 && v[3] == 0)
         return pt_diag_fail(&p->b->diag, p->loc, "Rotate about the axis 0 0 0 (expected a direction)");
-    struct pt_xform t = pt_xform_rotate(v[0], v[1], v[2], v[3]);
-    return concat(p, &t, 0);
+    const struct pt_xform t = pt_xform_rotate(v[0], v[1], v[2], v[3]);
+    return concat(p, &t);
 }
 
 static int do_look_at(struct parser *p)
 {
-    double v[9] = {0};
     struct pt_xform t;
-    int rc = pt_parser_read_numbers(p, "LookAt", v, 9);
-    if (rc)
-        return rc;
-    if (!pt_xform_look_at(v, v + 3, v + 6, &t))
+    if (!pt_xform_look_at(p->numbers, p->numbers + 3, p->numbers + 6, &t))
         return pt_diag_fail(&p->b->diag, p->loc,
                             "LookAt is degenerate (expected eye and target apart, up not along the view)");
-    return concat(p, &t, 0);
+    return concat(p, &t);
 }
 
-static int do_matrix(struct parser *p, const char *name, int replace)
+static int do_transform(struct parser *p)
 {
-    double v[16] = {0};
     struct pt_xform t;
-    int rc = pt_parser_read_numbers(p, name, v, 16);
-    if (rc)
-        return rc;
-    if (!pt_xform_from16(v, &t))
-        return pt_diag_fail(&p->b->diag, p->loc, "%s is not affine (expected 0 0 0 1 as every fourth number)", name);
-    return concat(p, &t, replace);
+    if (!pt_xform_from16(p->numbers, &t))
+        return pt_diag_fail(&p->b->diag, p->loc, "%s is not affine (expected 0 0 0 1 as every fourth number)",
+                            p->directive->name);
+    return concat(p, &t);
 }
-
-static int do_transform(struct parser *p) { return do_matrix(p, "Transform", 1); }
-
-static int do_concat_transform(struct parser *p) { return do_matrix(p, "ConcatTransform", 0); }
 
 int pt_parser_save_system(struct parser *p, const char *name, const struct pt_xform ctm[2])
 {
@@ -90,22 +72,13 @@ int pt_parser_save_system(struct parser *p, const char *name, const struct pt_xf
     return 0;
 }
 
-static int do_coordinate_system(struct parser *p)
-{
-    char name[NAME_MAX_BYTES];
-    int rc = pt_parser_read_string(p, "name", name, sizeof name);
-    return rc ? rc : pt_parser_save_system(p, name, p->state.ctm);
-}
+static int do_coordinate_system(struct parser *p) { return pt_parser_save_system(p, p->name, p->state.ctm); }
 
 static int do_coord_sys_transform(struct parser *p)
 {
-    char name[NAME_MAX_BYTES];
-    int rc = pt_parser_read_string(p, "name", name, sizeof name);
-    if (rc)
-        return rc;
-    int32_t id = pt_names_get(&p->system_names, name);
+    const int32_t id = pt_names_get(&p->system_names, p->name);
     if (id < 0) { /* pbrt says so and goes on */
-        pt_diag_warn(&p->b->diag, p->loc, "unknown coordinate system \"%s\": the transform stays", name);
+        pt_diag_warn(&p->b->diag, p->loc, "unknown coordinate system \"%s\": the transform stays", p->name);
         return p->b->diag.rc;
     }
     const struct pt_xform(*systems)[2] = p->systems.items;
@@ -130,28 +103,23 @@ static int do_active_transform(struct parser *p)
 
 static int do_transform_times(struct parser *p)
 {
-    double v[2] = {0, 1};
-    int rc = pt_parser_read_numbers(p, "TransformTimes", v, 2);
-    if (rc)
-        return rc;
-    if (p->in_world || !(v[1] >= v[0]))
+    if (p->in_world || !(p->numbers[1] >= p->numbers[0]))
         return pt_diag_fail(&p->b->diag, p->loc, "TransformTimes must come before WorldBegin, start before end");
-    p->b->transform_times[0] = v[0];
-    p->b->transform_times[1] = v[1];
+    memcpy(p->b->transform_times, p->numbers, sizeof p->b->transform_times);
     return 0;
 }
 
 const struct directive pt_transform_directives[] = {
-    {.name = "Transform", .run = do_transform},
-    {.name = "ConcatTransform", .run = do_concat_transform},
-    {.name = "Translate", .run = do_translate},
-    {.name = "Rotate", .run = do_rotate},
-    {.name = "Scale", .run = do_scale},
-    {.name = "Identity", .run = do_identity},
-    {.name = "LookAt", .run = do_look_at},
-    {.name = "CoordinateSystem", .run = do_coordinate_system},
-    {.name = "CoordSysTransform", .run = do_coord_sys_transform},
+    {"Transform", do_transform, .numbers = 16, .replaces = 1},
+    {"ConcatTransform", do_transform, .numbers = 16},
+    {"Translate", do_translate, .numbers = 3},
+    {"Rotate", do_rotate, .numbers = 4},
+    {"Scale", do_scale, .numbers = 3},
+    {"Identity", do_identity, .replaces = 1},
+    {"LookAt", do_look_at, .numbers = 9},
+    {"CoordinateSystem", do_coordinate_system, .text = "name"},
+    {"CoordSysTransform", do_coord_sys_transform, .text = "name"},
     {.name = "ActiveTransform", .run = do_active_transform},
-    {.name = "TransformTimes", .run = do_transform_times},
+    {"TransformTimes", do_transform_times, .numbers = 2},
     {0},
 };

@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "pbrt/build.h"
-#include "pbrt/pbrt.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

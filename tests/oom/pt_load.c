@@ -9,7 +9,6 @@
 #include <cmocka.h>
 
 #include "pbrt/build.h"
-#include "pbrt/pbrt.h"
 #include "pbrt/ply.h"
 #include "support/fail_alloc.h"
 

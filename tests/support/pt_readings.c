@@ -10,7 +10,6 @@
 #include "picture/png.h"
 #include "picture/read.h"
 #include "pbrt/build.h"
-#include "pbrt/pbrt.h"
 #include "pbrt/ply.h"
 #include "render/checkpoint.h"
 #include "sequence/builder.h"
