@@ -229,7 +229,7 @@ struct pt_soup {
 };
 int pt_build_mesh(struct pt_builder *b, struct pt_params *p, const struct pt_soup *soup);
 /* Fails unless v, of the parameter "indices", is one of so many vertices. */
-int pt_build_check_index(struct pt_builder *b, const struct pt_params *p, double v, size_t vertex_count);
+int pt_build_check_index(const struct pt_params *p, double v, size_t vertex_count);
 /* build_tessellate.c: shapes that become triangles. */
 int pt_build_bilinear(struct pt_builder *b, struct pt_params *p);
 int pt_build_curve(struct pt_builder *b, struct pt_params *p);

@@ -75,14 +75,14 @@ static void set_crop(struct pt_builder *b, struct pt_params *p, const int file_s
     const double *window = pt_params_floats(p, "cropwindow", 1, &n);
     double edges[4] = {0, 1, 0, 1};
     if (window && n != 4)
-        pt_diag_fail(&b->diag, pt_params_find(p, "cropwindow")->loc, "cropwindow has %zu values (expected 4)", n);
+        pt_params_fail(p, "cropwindow", "cropwindow has %zu values (expected 4)", n);
     else if (window)
         memcpy(edges, window, sizeof edges);
     const double *bounds = pt_params_ints(p, "pixelbounds", &n);
     if (bounds && n != 4)
-        pt_diag_fail(&b->diag, pt_params_find(p, "pixelbounds")->loc, "pixelbounds has %zu values (expected 4)", n);
+        pt_params_fail(p, "pixelbounds", "pixelbounds has %zu values (expected 4)", n);
     else if (bounds && window)
-        pt_diag_warn(&b->diag, pt_params_find(p, "pixelbounds")->loc, "pixelbounds give way to the cropwindow");
+        pt_params_warn(p, "pixelbounds", "pixelbounds give way to the cropwindow");
     else if (bounds)
         for (int i = 0; i < 4; i++)
             edges[i] = bounds[i] / file_size[i / 2];
@@ -96,8 +96,8 @@ static void set_crop(struct pt_builder *b, struct pt_params *p, const int file_s
     d->crop[2] = at[1];
     d->crop[3] = at[3];
     if (at[0] >= at[1] || at[2] >= at[3])
-        pt_diag_fail(&b->diag, pt_params_loc(p, window ? "cropwindow" : "pixelbounds"),
-                     "the crop window holds no pixel (expected x0 < x1 and y0 < y1 in it)");
+        pt_params_fail(p, window ? "cropwindow" : "pixelbounds",
+                       "the crop window holds no pixel (expected x0 < x1 and y0 < y1 in it)");
 }
 
 /* Whatever the file says of exposure ends in one factor: v3 has a scale, v4 a sensor. */
@@ -107,14 +107,13 @@ static void build_film(struct pt_builder *b)
     struct pt_params *p = begin(b, PT_HEADER_FILM, "rgb");
     struct pt_scene_defaults *d = b->defaults;
     if (!is_one_of(pt_params_kind(p), kinds))
-        pt_diag_fail(&b->diag, p->loc, "unknown film \"%s\" (expected rgb, image, gbuffer or spectral)", pt_params_kind(p));
+        pt_params_fail(p, NULL, "unknown film \"%s\" (expected rgb, image, gbuffer or spectral)", pt_params_kind(p));
     int file_size[2] = {pt_params_int_in(p, "xresolution", b->is_v3 ? 640 : 1280, 1, MAX_SIDE),
                         pt_params_int_in(p, "yresolution", b->is_v3 ? 480 : 720, 1, MAX_SIDE)};
     d->width = b->options->width > 0 ? b->options->width : file_size[0];
     d->height = b->options->height > 0 ? b->options->height : file_size[1];
     if ((double)d->width * d->height > max_pixels)
-        pt_diag_fail(&b->diag, pt_params_loc(p, "xresolution"), "%d x %d pixels (expected at most 2^28 in all)", d->width,
-                     d->height);
+        pt_params_fail(p, "xresolution", "%d x %d pixels (expected at most 2^28 in all)", d->width, d->height);
     set_crop(b, p, file_size);
     snprintf(d->film_path, sizeof d->film_path, "%s", pt_params_string(p, "filename", ""));
     double scale = b->is_v3 ? pt_params_float_in(p, "scale", 1, 0, 1e12)
@@ -122,9 +121,9 @@ static void build_film(struct pt_builder *b)
     b->scene->radiance_scale = (float)scale;
     const char *sensor = pt_params_string(p, "sensor", "cie1931");
     if (strcmp(sensor, "cie1931") != 0)
-        pt_diag_warn(&b->diag, pt_params_find(p, "sensor")->loc, "sensor \"%s\" is rendered as an ideal one", sensor);
+        pt_params_warn(p, "sensor", "sensor \"%s\" is rendered as an ideal one", sensor);
     if (pt_params_find(p, "whitebalance") && pt_params_float(p, "whitebalance", 0) != 0)
-        pt_diag_warn(&b->diag, pt_params_find(p, "whitebalance")->loc, "white balance is ignored");
+        pt_params_warn(p, "whitebalance", "white balance is ignored");
     double limit = pt_params_float_in(p, "maxcomponentvalue", INFINITY, 1e-30, FLT_MAX);
     if (pt_params_find(p, "maxsampleluminance")) /* v3's, of a sample before the film's scale */
         limit = pt_params_float_in(p, "maxsampleluminance", limit, 1e-30, FLT_MAX) * (double)b->scene->radiance_scale;
@@ -154,12 +153,12 @@ static void build_filter(struct pt_builder *b)
         double alpha = pt_params_float_in(p, "alpha", 2, 1e-6, 1e6);
         sigma = pt_params_float_in(p, "sigma", b->is_v3 ? sqrt(0.5 / alpha) : 0.5, 1e-3, 1e3);
     } else if (strcmp(kind, "mitchell") == 0 || strcmp(kind, "sinc") == 0) {
-        pt_diag_warn(&b->diag, p->loc, "filter \"%s\" has negative lobes: a Gaussian of the same main lobe is used", kind);
+        pt_params_warn(p, NULL, "filter \"%s\" has negative lobes: a Gaussian of the same main lobe is used", kind);
         it->filter = PT_FILTER_GAUSSIAN;
         fallback = 2;
         pt_params_ignore(p, "B C tau");
     } else {
-        pt_diag_fail(&b->diag, p->loc, "unknown filter \"%s\" (expected box, triangle, gaussian, mitchell or sinc)", kind);
+        pt_params_fail(p, NULL, "unknown filter \"%s\" (expected box, triangle, gaussian, mitchell or sinc)", kind);
     }
     double x = pt_params_float_in(p, "xradius", fallback, 1e-3, 100),
            y = pt_params_float_in(p, "yradius", fallback, 1e-3, 100);
@@ -181,8 +180,7 @@ static void build_sampler(struct pt_builder *b)
     const char *kind = pt_params_kind(p);
     b->defaults->integrator.sampler = is_one_of(kind, random) ? PT_SAMPLER_INDEPENDENT : PT_SAMPLER_SOBOL;
     if (!is_one_of(kind, random) && !is_one_of(kind, low_discrepancy))
-        pt_diag_fail(&b->diag, p->loc, "unknown sampler \"%s\" (expected independent, sobol, zsobol, halton, stratified …)",
-                     kind);
+        pt_params_fail(p, NULL, "unknown sampler \"%s\" (expected independent, sobol, zsobol, halton, stratified …)", kind);
     int xs = pt_params_int_in(p, "xsamples", 4, 1, 65536), ys = pt_params_int_in(p, "ysamples", 4, 1, 16384);
     b->defaults->spp = pt_params_int_in(p, "pixelsamples", strcmp(kind, "stratified") == 0 ? xs * ys : 16, 1, 1 << 30);
     b->defaults->integrator.seed = (uint32_t)pt_params_int_in(p, "seed", (int)b->defaults->integrator.seed, 0, 2147483647);
@@ -199,14 +197,14 @@ static void build_integrator(struct pt_builder *b)
     struct pt_integrator *it = &b->defaults->integrator;
     const char *kind = pt_params_kind(p);
     if (is_one_of(kind, other))
-        pt_diag_warn(&b->diag, p->loc, "integrator \"%s\" is replaced by path tracing", kind);
+        pt_params_warn(p, NULL, "integrator \"%s\" is replaced by path tracing", kind);
     else if (!is_one_of(kind, same))
-        pt_diag_fail(&b->diag, p->loc, "unknown integrator \"%s\" (expected path, volpath …)", kind);
+        pt_params_fail(p, NULL, "unknown integrator \"%s\" (expected path, volpath …)", kind);
     it->max_depth = pt_params_int_in(p, "maxdepth", 5, -1, 1 << 20);
     it->rr_depth = 3;
     it->strategy = PT_STRATEGY_MIS;
     if (pt_params_bool(p, "regularize", 0))
-        pt_diag_warn(&b->diag, pt_params_find(p, "regularize")->loc, "regularize is ignored: the image is the unbiased one");
+        pt_params_warn(p, "regularize", "regularize is ignored: the image is the unbiased one");
     pt_params_ignore(p, "lightsampler lightsamplestrategy rrthreshold sampledirect samplelights samplebsdf iterations "
                         "numiterations photonsperiteration radius mutationsperpixel bootstrapsamples chains sigma "
                         "largestepprobability imagewritefrequency visualizestrategies visualizeweights pixelbounds seed "
@@ -216,7 +214,7 @@ static void build_integrator(struct pt_builder *b)
 
 /* --- camera ----------------------------------------------------------------------------------------------------------- */
 
-static void set_screen(struct pt_builder *b, struct pt_params *p, struct pt_camera *c)
+static void set_screen(struct pt_params *p, struct pt_camera *c)
 {
     double aspect = pt_params_float_in(p, "frameaspectratio", (double)c->width / c->height, 1e-4, 1e4);
     double x = aspect > 1 ? aspect : 1, y = aspect > 1 ? 1 : 1 / aspect;
@@ -224,7 +222,7 @@ static void set_screen(struct pt_builder *b, struct pt_params *p, struct pt_came
     size_t n;
     const double *given = pt_params_floats(p, "screenwindow", 1, &n);
     if (given && (n != 4 || given[0] == given[1] || given[2] == given[3])) {
-        pt_diag_fail(&b->diag, pt_params_find(p, "screenwindow")->loc, "screenwindow needs x0 x1 y0 y1 that span an area");
+        pt_params_fail(p, "screenwindow", "screenwindow needs x0 x1 y0 y1 that span an area");
         given = NULL;
     }
     for (int i = 0; i < 4; i++)
@@ -252,7 +250,7 @@ static void place_camera(struct pt_builder *b, struct pt_params *p, struct pt_ca
     c->animated = !pt_xform_equal(&world_to_camera[0], &world_to_camera[1]);
     for (int i = 0; i < 2; i++) {
         if (!pt_xform_invert(&world_to_camera[i], &to_world)) {
-            pt_diag_fail(&b->diag, p->loc, "the camera's transform is singular");
+            pt_params_fail(p, NULL, "the camera's transform is singular");
             return;
         }
         if (i == 0)
@@ -269,8 +267,7 @@ static double read_fov(struct pt_builder *b, struct pt_params *p)
     double fov = pt_params_float_in(p, "fov", 90, 1e-3, 179.9);
     double half = b->is_v3 ? pt_params_float(p, "halffov", 0) : 0;
     if (half > 179.9 / 2)
-        pt_diag_fail(&b->diag, pt_params_loc(p, "halffov"), "parameter \"halffov\" is %g (expected at most %g)", half,
-                     179.9 / 2);
+        pt_params_fail(p, "halffov", "parameter \"halffov\" is %g (expected at most %g)", half, 179.9 / 2);
     return half > 0 ? fmax(2 * half, 1e-3) : fov;
 }
 
@@ -284,18 +281,18 @@ static void build_camera(struct pt_builder *b)
     c->height = b->defaults->height;
     c->kind = strcmp(kind, "orthographic") == 0 ? PT_CAMERA_ORTHOGRAPHIC : PT_CAMERA_PERSPECTIVE;
     if (strcmp(kind, "realistic") == 0 || strcmp(kind, "spherical") == 0 || strcmp(kind, "environment") == 0) {
-        pt_diag_warn(&b->diag, p->loc, "camera \"%s\" is replaced by a perspective one", kind);
+        pt_params_warn(p, NULL, "camera \"%s\" is replaced by a perspective one", kind);
         pt_params_ignore(p, "lensfile aperturediameter focusdistance aperture mapping simpleweighting");
     } else if (c->kind == PT_CAMERA_PERSPECTIVE && strcmp(kind, "perspective") != 0) {
-        pt_diag_fail(&b->diag, p->loc, "unknown camera \"%s\" (expected perspective or orthographic)", kind);
+        pt_params_fail(p, NULL, "unknown camera \"%s\" (expected perspective or orthographic)", kind);
     }
     c->fov_deg = c->kind == PT_CAMERA_PERSPECTIVE ? (float)read_fov(b, p) : 0;
     if (b->options->view.fov_deg > 0) {
         if (c->kind == PT_CAMERA_ORTHOGRAPHIC)
-            pt_diag_fail(&b->diag, p->loc, "the camera is orthographic, which --fov cannot change");
+            pt_params_fail(p, NULL, "the camera is orthographic, which --fov cannot change");
         c->fov_deg = (float)b->options->view.fov_deg;
     }
-    set_screen(b, p, c);
+    set_screen(p, c);
     c->lens_radius = (float)pt_params_float_in(p, "lensradius", 0, 0, 1e9);
     c->focal_distance = (float)pt_params_float_in(p, "focaldistance", 1e6, 1e-9, 1e30);
     place_camera(b, p, c);

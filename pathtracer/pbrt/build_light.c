@@ -54,8 +54,8 @@ static void read_direction(struct context *c)
     pt_xform_vector(&c->ctm, d, w);
     double len = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
     if (!(len > 0) || !isfinite(len))
-        pt_diag_fail(&c->b->diag, pt_params_loc(c->p, pt_params_find(c->p, "to") ? "to" : "from"),
-                     "the light points nowhere (expected \"from\" and \"to\" apart)");
+        pt_params_fail(c->p, pt_params_find(c->p, "to") ? "to" : "from",
+                       "the light points nowhere (expected \"from\" and \"to\" apart)");
     else
         c->light->direction = v3((float)(w[0] / len), (float)(w[1] / len), (float)(w[2] / len));
 }
@@ -121,7 +121,7 @@ static int light_space(struct context *c)
 {
     struct pt_xform inverse;
     if (!pt_xform_invert(&c->ctm, &inverse))
-        return pt_diag_fail(&c->b->diag, c->p->loc, "singular transform of a light");
+        return pt_params_fail(c->p, NULL, "singular transform of a light");
     inverse = unscaled(inverse);
     struct pt_xform back = unscaled(c->ctm);
     double off = 0;
@@ -222,21 +222,20 @@ static void make_infinite(struct context *c)
         pt_diag_warn(&c->b->diag, loc, "environment map of %d x %d pixels is taken as latitude and longitude", map->width,
                      map->height);
     if (illuminance > 0)
-        pt_diag_warn(&c->b->diag, pt_params_loc(p, "illuminance"), "illuminance of an image light is ignored");
+        pt_params_warn(p, "illuminance", "illuminance of an image light is ignored");
     light_space(c);
 }
 
 static void make_projection(struct context *c)
 {
-    pt_diag_warn(&c->b->diag, c->p->loc, "light \"%s\" is replaced by a spot light without its image", pt_params_kind(c->p));
+    pt_params_warn(c->p, NULL, "light \"%s\" is replaced by a spot light without its image", pt_params_kind(c->p));
     pt_params_ignore(c->p, "fov mapname filename");
     make_spot(c);
 }
 
 static void make_goniometric(struct context *c)
 {
-    pt_diag_warn(&c->b->diag, c->p->loc, "light \"%s\" is replaced by a point light without its image",
-                 pt_params_kind(c->p));
+    pt_params_warn(c->p, NULL, "light \"%s\" is replaced by a point light without its image", pt_params_kind(c->p));
     pt_params_ignore(c->p, "mapname filename");
     make_point(c);
 }
@@ -264,7 +263,7 @@ int pt_build_light(struct pt_builder *b, struct pt_params *p)
     struct pt_xform at[2];
     pt_builder_at_shutter(b, b->state->ctm, at);
     if (!pt_xform_equal(&at[0], &at[1]))
-        pt_diag_warn(&b->diag, p->loc, "lights do not move: the transform at shutter open is used");
+        pt_params_warn(p, NULL, "lights do not move: the transform at shutter open is used");
     struct context c = {b, p, at[0], &light};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
         if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)

@@ -40,11 +40,11 @@ void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallba
     if (!v3_rule || !m->remap_roughness)
         return;
     if (m->roughness_u.texture || m->roughness_v.texture) {
-        pt_diag_warn(&b->diag,
-                     pt_params_loc(p, m->roughness_u.texture && pt_params_find(p, "uroughness")   ? "uroughness"
-                                      : m->roughness_v.texture && pt_params_find(p, "vroughness") ? "vroughness"
-                                                                                                  : "roughness"),
-                     "textured roughness is remapped by pbrt-v4's rule");
+        pt_params_warn(p,
+                       m->roughness_u.texture && pt_params_find(p, "uroughness")   ? "uroughness"
+                       : m->roughness_v.texture && pt_params_find(p, "vroughness") ? "vroughness"
+                                                                                   : "roughness",
+                       "textured roughness is remapped by pbrt-v4's rule");
         return;
     }
     /* v3 keeps 0 as a smooth surface. */
@@ -127,8 +127,7 @@ static void read_model(struct pt_making *c, const struct pt_bsdf_model *model)
             break;
         case PT_READ_UNSUPPORTED:
             if (pt_params_find(c->p, r->name) && pt_params_float(c->p, r->name, 0) != 0)
-                pt_diag_warn(&c->b->diag, pt_params_loc(c->p, r->name), "%s of a %s material is ignored", r->name,
-                             model->words);
+                pt_params_warn(c->p, r->name, "%s of a %s material is ignored", r->name, model->words);
             break;
         default: pt_params_ignore(c->p, r->name);
         }
@@ -166,7 +165,7 @@ void pt_build_mix_opacity(struct pt_making *c)
     int left = MAX_MIXED;
     count_mixed(c->b->materials.items, m, &left);
     if (left <= 0) {
-        pt_diag_fail(&c->b->diag, c->p->loc, "a mix of more than %d mixes", MAX_MIXED - 1);
+        pt_params_fail(c->p, NULL, "a mix of more than %d mixes", MAX_MIXED - 1);
         return;
     }
     struct pt_input a = opacity_of(c->b, m->mix_a), b = opacity_of(c->b, m->mix_b);
@@ -187,7 +186,7 @@ void pt_build_mix_opacity(struct pt_making *c)
     else if (!both.texture && !b.texture && !m->mix_amount.texture)
         m->mix_amount = pt_input_grey((double)(m->mix_amount.value.x * b.value.x / both.value.x));
     else
-        pt_diag_warn(&c->b->diag, c->p->loc, "textured opacity within a mix is taken as that of all of it");
+        pt_params_warn(c->p, NULL, "textured opacity within a mix is taken as that of all of it");
     c->info->has_opacity = 1;
     c->info->opacity = both;
 }
@@ -211,7 +210,7 @@ static void make_interface(struct pt_making *c) { (void)c; }
 /* Not simulated: a coated diffuse surface of about its colour. */
 static void make_subsurface(struct pt_making *c)
 {
-    pt_diag_warn(&c->b->diag, c->p->loc, "material \"%s\" is replaced by a coated diffuse one", c->kind);
+    pt_params_warn(c->p, NULL, "material \"%s\" is replaced by a coated diffuse one", c->kind);
     c->m->reflectance = pt_build_reflectance(c, "reflectance", 0.6f);
     pt_build_roughness(c->b, c->p, 0, 0, c->m);
     c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.33);
@@ -221,7 +220,7 @@ static void make_subsurface(struct pt_making *c)
 
 static void make_hair(struct pt_making *c)
 {
-    pt_diag_warn(&c->b->diag, c->p->loc, "material \"hair\" is replaced by a diffuse one");
+    pt_params_warn(c->p, NULL, "material \"hair\" is replaced by a diffuse one");
     c->m->reflectance = pt_build_reflectance(c, "color", 0.2f);
     if (pt_params_find(c->p, "reflectance"))
         c->m->reflectance = pt_build_reflectance(c, "reflectance", 0.2f);
@@ -230,7 +229,7 @@ static void make_hair(struct pt_making *c)
 
 static void make_measured(struct pt_making *c)
 {
-    pt_diag_warn(&c->b->diag, c->p->loc, "material \"measured\" is replaced by a coated diffuse one");
+    pt_params_warn(c->p, NULL, "material \"measured\" is replaced by a coated diffuse one");
     c->m->reflectance = pt_input_grey(0.5);
     c->m->roughness_u = c->m->roughness_v = pt_input_grey(0.1);
     c->m->thickness = pt_input_grey(0.01);

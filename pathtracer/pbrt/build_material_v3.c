@@ -29,7 +29,7 @@ static void make_matte(struct pt_making *c)
     c->m->reflectance = pt_build_reflectance(c, "Kd", 0.5f);
     struct pt_input sigma = pt_build_float_input(c->b, c->p, "sigma", 0);
     if (sigma.texture || sigma.value.x != 0)
-        pt_diag_warn(&c->b->diag, pt_params_loc(c->p, "sigma"), "sigma of a matte material is ignored: plain diffuse");
+        pt_params_warn(c->p, "sigma", "sigma of a matte material is ignored: plain diffuse");
 }
 
 /* Ks of these v3 models is the strength of the coat; the coat here is glass of index 1.5 (as pbrt-v4's own upgrade does). */
@@ -51,7 +51,7 @@ static struct pt_input read_share(struct pt_making *c, const char *name, float f
     if (in.texture)
         return pt_input_luminance(c->b, in);
     if (in.value.x != in.value.y || in.value.y != in.value.z)
-        pt_diag_warn(&c->b->diag, pt_params_loc(c->p, name), "a coloured %s is taken as a grey one", name);
+        pt_params_warn(c->p, name, "a coloured %s is taken as a grey one", name);
     return pt_input_grey((double)v3_luminance(in.value));
 }
 
@@ -59,7 +59,7 @@ static struct pt_input read_share(struct pt_making *c, const char *name, float f
 static void say_clear(struct pt_making *c, struct pt_input kt)
 {
     if (kt.texture || v3_luminance(kt.value) < 0.999f)
-        pt_diag_warn(&c->b->diag, pt_params_loc(c->p, "Kt"), "Kt of an uber material without Kd is taken as 1");
+        pt_params_warn(c->p, "Kt", "Kt of an uber material without Kd is taken as 1");
 }
 
 /* A sum of four lobes there. Here it is the one that stands alone, or else a coated diffuse surface. */
@@ -84,8 +84,7 @@ static void make_uber(struct pt_making *c)
         c->m->roughness_u = c->m->roughness_v = pt_input_grey(0);
     } else {
         if (!is_black(kr) || !is_black(kt))
-            pt_diag_warn(&c->b->diag, pt_params_loc(c->p, is_black(kr) ? "Kt" : "Kr"),
-                         "Kr and Kt of an uber material with Kd are ignored");
+            pt_params_warn(c->p, is_black(kr) ? "Kt" : "Kr", "Kr and Kt of an uber material with Kd are ignored");
         c->m->reflectance = kd;
         if (!is_black(ks) || !is_black(kr))
             clear_coat(c);
@@ -119,8 +118,7 @@ static void make_glass(struct pt_making *c)
     pt_build_roughness(c->b, c->p, 0, 1, c->m);
     c->m->eta = (float)index_of(c, 1.5);
     if (kr.texture || kt.texture || v3_luminance(kr.value) < 0.999f || v3_luminance(kt.value) < 0.999f)
-        pt_diag_warn(&c->b->diag, pt_params_loc(c->p, pt_params_find(c->p, "Kr") ? "Kr" : "Kt"),
-                     "Kr and Kt of glass are taken as 1");
+        pt_params_warn(c->p, pt_params_find(c->p, "Kr") ? "Kr" : "Kt", "Kr and Kt of glass are taken as 1");
 }
 
 static void make_translucent(struct pt_making *c)
@@ -131,7 +129,7 @@ static void make_translucent(struct pt_making *c)
     c->m->transmittance = pt_input_product(c->b, kd, pt_build_reflectance(c, "transmit", 0.5f));
     pt_build_roughness(c->b, c->p, 0.1, 1, c->m);
     if (!is_black(ks))
-        pt_diag_warn(&c->b->diag, pt_params_loc(c->p, "Ks"), "Ks of a translucent material is ignored");
+        pt_params_warn(c->p, "Ks", "Ks of a translucent material is ignored");
 }
 
 /* pbrt-v3 mixes matte where there is no material of that name. */
@@ -151,7 +149,7 @@ static void make_mix(struct pt_making *c)
     struct pt_param *first = pt_params_find(c->p, "namedmaterial1"), *second = pt_params_find(c->p, "namedmaterial2");
     c->m->kind = PT_MATERIAL_MIX;
     if (!first || !second || first->type != PT_PARAM_STRING || second->type != PT_PARAM_STRING) {
-        pt_diag_fail(&c->b->diag, c->p->loc, "mix needs \"string namedmaterial1\" and \"string namedmaterial2\"");
+        pt_params_fail(c->p, NULL, "mix needs \"string namedmaterial1\" and \"string namedmaterial2\"");
         return;
     }
     c->m->mix_b = mixed(c, "namedmaterial1");
@@ -164,14 +162,14 @@ static void make_mix(struct pt_making *c)
 
 static void make_kd_subsurface(struct pt_making *c)
 {
-    pt_diag_warn(&c->b->diag, c->p->loc, "material \"%s\" is replaced by a diffuse one", c->kind);
+    pt_params_warn(c->p, NULL, "material \"%s\" is replaced by a diffuse one", c->kind);
     c->m->reflectance = pt_build_reflectance(c, "Kd", 0.5f);
     pt_params_ignore(c->p, "Kr Kt mfp eta scale uroughness vroughness roughness remaproughness g sigma_a sigma_s name");
 }
 
 static void make_disney(struct pt_making *c)
 {
-    pt_diag_warn(&c->b->diag, c->p->loc, "material \"%s\" is replaced by a coated diffuse one", c->kind);
+    pt_params_warn(c->p, NULL, "material \"%s\" is replaced by a coated diffuse one", c->kind);
     c->m->reflectance = pt_build_reflectance(c, "color", 0.5f);
     pt_build_roughness(c->b, c->p, 0.5, 0, c->m);
     c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.5);
@@ -182,7 +180,7 @@ static void make_disney(struct pt_making *c)
 
 static void make_fourier(struct pt_making *c)
 {
-    pt_diag_warn(&c->b->diag, c->p->loc, "material \"%s\" (a measured table) is replaced by a coated diffuse one", c->kind);
+    pt_params_warn(c->p, NULL, "material \"%s\" (a measured table) is replaced by a coated diffuse one", c->kind);
     c->m->reflectance = pt_input_grey(0.5);
     c->m->roughness_u = c->m->roughness_v = pt_input_grey(0.05);
     pt_params_ignore(c->p, "bsdffile");

@@ -148,7 +148,7 @@ static void read_coefficients(struct pt_builder *b, struct pt_params *p, int is_
             known = 1;
         }
     if (!known)
-        pt_diag_warn(&b->diag, pt_params_find(p, "preset")->loc, "unknown medium preset \"%s\": whole milk is used", preset);
+        pt_params_warn(p, "preset", "unknown medium preset \"%s\": whole milk is used", preset);
     pt_build_colour(b, p, "sigma_a", PT_USE_UNBOUNDED, &m->sigma_a);
     pt_build_colour(b, p, "sigma_s", PT_USE_UNBOUNDED, &m->sigma_s);
     m->g = (float)pt_params_float_in(p, "g", 0, -0.9999, 0.9999);
@@ -167,7 +167,7 @@ static void read_coefficients(struct pt_builder *b, struct pt_params *p, int is_
  * must not be lost to the rounding of the way. */
 static const double most_paths = 1e5;
 
-static void bound_density(struct pt_builder *b, struct pt_params *p, const struct pt_xform *box, struct pt_medium *m)
+static void bound_density(struct pt_params *p, const struct pt_xform *box, struct pt_medium *m)
 {
     double size = 0, most = 0;
     for (int i = 0; i < 9; i++)
@@ -177,7 +177,7 @@ static void bound_density(struct pt_builder *b, struct pt_params *p, const struc
     double paths = most * (double)v3_max(v3_add(m->sigma_a, m->sigma_s)) * sqrt(size);
     if (!(paths > most_paths))
         return;
-    pt_diag_warn(&b->diag, p->loc, "a grid medium of %.3g mean free paths across is taken as one of %g", paths, most_paths);
+    pt_params_warn(p, NULL, "a grid medium of %.3g mean free paths across is taken as one of %g", paths, most_paths);
     float scale = (float)(most_paths / paths);
     m->sigma_a = v3_scale(m->sigma_a, scale);
     m->sigma_s = v3_scale(m->sigma_s, scale);
@@ -193,10 +193,10 @@ static int place_grid(struct pt_builder *b, struct pt_params *p, struct pt_mediu
     pt_params_point(p, "p1", p1);
     pt_builder_at_shutter(b, b->state->ctm, at);
     if (!pt_xform_equal(&at[0], &at[1]))
-        pt_diag_warn(&b->diag, p->loc, "grid media do not move: the transform at shutter open is used");
+        pt_params_warn(p, NULL, "grid media do not move: the transform at shutter open is used");
     if (!(p0[0] != p1[0] && p0[1] != p1[1] && p0[2] != p1[2]))
-        return pt_diag_fail(&b->diag, pt_params_loc(p, pt_params_find(p, "p1") ? "p1" : "p0"),
-                            "the box of a grid medium is empty (expected p0 and p1 apart in all axes)");
+        return pt_params_fail(p, pt_params_find(p, "p1") ? "p1" : "p0",
+                              "the box of a grid medium is empty (expected p0 and p1 apart in all axes)");
     for (int i = 0; i < 3; i++)
         if (p0[i] > p1[i]) { /* any two corners name the box; the densities always run upwards */
             double swap = p0[i];
@@ -209,9 +209,9 @@ static int place_grid(struct pt_builder *b, struct pt_params *p, struct pt_mediu
     box = pt_xform_mul(&at[0], &box);
     box = pt_builder_to_render(b, &box);
     if (!pt_xform_invert(&box, &inverse))
-        return pt_diag_fail(&b->diag, p->loc, "singular transform of a medium");
+        return pt_params_fail(p, NULL, "singular transform of a medium");
     m->from_render = pt_xform_to_mat34(&inverse);
-    bound_density(b, p, &box, m);
+    bound_density(p, &box, m);
     return 0;
 }
 
@@ -260,17 +260,15 @@ static int read_grid(struct pt_builder *b, struct pt_params *p, struct pt_medium
     if (b->diag.rc)
         return b->diag.rc;
     if (!density)
-        return pt_diag_fail(&b->diag, p->loc, "a grid medium needs \"float density\"");
+        return pt_params_fail(p, NULL, "a grid medium needs \"float density\"");
     if (n != expected)
-        return pt_diag_fail(&b->diag, pt_params_find(p, "density")->loc, "density has %zu values (expected nx·ny·nz = %zu)",
-                            n, expected);
+        return pt_params_fail(p, "density", "density has %zu values (expected nx·ny·nz = %zu)", n, expected);
     float *kept = pt_arena_alloc(&b->scene->arena, n, sizeof *kept);
     if (!kept)
         return pt_diag_nomem(&b->diag, "a grid medium");
     for (size_t i = 0; i < n; i++) {
         if (density[i] < 0)
-            return pt_diag_fail(&b->diag, pt_params_find(p, "density")->loc, "density %zu is %g (expected 0 or more)", i,
-                                density[i]);
+            return pt_params_fail(p, "density", "density %zu is %g (expected 0 or more)", i, density[i]);
         kept[i] = (float)density[i];
     }
     m->density = kept;
@@ -283,14 +281,13 @@ int pt_build_medium(struct pt_builder *b, struct pt_params *p)
     struct pt_medium m = {.kind = PT_MEDIUM_HOMOGENEOUS};
     const char *name = pt_params_kind(p), *type = pt_params_string(p, "type", "homogeneous");
     if (name[0] == '\0')
-        return pt_diag_fail(&b->diag, p->loc, "MakeNamedMedium with an empty name");
+        return pt_params_fail(p, NULL, "MakeNamedMedium with an empty name");
     int is_grid = strcmp(type, "uniformgrid") == 0 || strcmp(type, "heterogeneous") == 0;
     int stand_in = strcmp(type, "rgbgrid") == 0 || strcmp(type, "cloud") == 0 || strcmp(type, "nanovdb") == 0;
     if (!is_grid && !stand_in && strcmp(type, "homogeneous") != 0)
-        return pt_diag_fail(&b->diag, pt_params_loc(p, "type"),
-                            "unknown medium type \"%.63s\" (expected homogeneous or uniformgrid)", type);
+        return pt_params_fail(p, "type", "unknown medium type \"%.63s\" (expected homogeneous or uniformgrid)", type);
     if (stand_in) {
-        pt_diag_warn(&b->diag, pt_params_loc(p, "type"), "medium type \"%s\" is replaced by empty space", type);
+        pt_params_warn(p, "type", "medium type \"%s\" is replaced by empty space", type);
         for (size_t i = 0; i < p->count; i++)
             p->items[i].used = 1;
     } else {

@@ -66,7 +66,7 @@ static struct placement place(struct pt_builder *b, const struct pt_params *p, c
         struct pt_object_info *info = (struct pt_object_info *)b->object_infos.items + b->open_object;
         double *origin = info->origin;
         if (pl.animated)
-            pt_diag_warn(&b->diag, p->loc, "a moving shape within an object stays at its place at shutter open");
+            pt_params_warn(p, NULL, "a moving shape within an object stays at its place at shutter open");
         pl.animated = 0;
         if (((struct pt_object *)b->objects.items)[b->open_object].shape_count == 0 && info->used.line == 0)
             find_origin(&pl.at[0], box, origin);
@@ -154,7 +154,7 @@ static struct pt_shape common(struct pt_builder *b, struct pt_params *p)
     if (shape.has_alpha)
         pt_builder_effect(b, PT_FX_ALPHA | (shape.alpha.texture ? PT_FX_TEXTURE : 0u), p->loc);
     if (pt_params_find(p, "shadowalpha"))
-        pt_diag_warn(&b->diag, pt_params_find(p, "shadowalpha")->loc, "shadowalpha is ignored: shadows follow alpha");
+        pt_params_warn(p, "shadowalpha", "shadowalpha is ignored: shadows follow alpha");
     pt_params_ignore(p, "shadowalpha");
     return shape;
 }
@@ -175,7 +175,7 @@ static int add_shape(struct pt_builder *b, struct pt_params *p, const struct pla
     if (s->area.on && (b->open_object >= 0 || pl->animated))
         pt_diag_warn(&b->diag, s->area.loc, "area lights in objects and on moving shapes do not emit");
     else if (s->area.on && is_interface(b, shape->material)) /* as in pbrt-v4: rays go through it */
-        pt_diag_warn(&b->diag, p->loc, "an area light of interface material does not emit");
+        pt_params_warn(p, NULL, "an area light of interface material does not emit");
     else if (s->area.on && !v3_is_black(s->area.emission))
         shape->light = pt_build_shape_light(b, &s->area, area);
     if (is_interface(b, shape->material))
@@ -263,8 +263,7 @@ static int store_mesh(struct pt_builder *b, struct pt_params *p, const struct pt
         return pt_diag_nomem(&b->diag, "a mesh");
     vertices = (struct pt_vertex *)(((uintptr_t)vertices + sizeof *vertices - 1) & ~(uintptr_t)(sizeof *vertices - 1));
     if (!store_positions(soup, t, vertices))
-        return pt_diag_fail(&b->diag, pt_params_loc(p, soup->pd ? "P" : "filename"),
-                            "a vertex is not finite after its transform");
+        return pt_params_fail(p, soup->pd ? "P" : "filename", "a vertex is not finite after its transform");
     if (has_n)
         store_normals(soup, &inverse, b->state->reverse_orientation, vertices);
     for (size_t i = 0; has_uv && i < n; i++) {
@@ -281,13 +280,13 @@ int pt_build_mesh(struct pt_builder *b, struct pt_params *p, const struct pt_sou
     struct pt_mesh mesh;
     struct box box = {{0}, {0}};
     if (soup->triangle_count == 0 || soup->vertex_count == 0) {
-        pt_diag_warn(&b->diag, p->loc, "a mesh without triangles is left out");
+        pt_params_warn(p, NULL, "a mesh without triangles is left out");
         pt_params_ignore(p, "alpha shadowalpha");
         pt_params_check_used(p);
         return b->diag.rc;
     }
     if (soup->vertex_count > INT32_MAX || soup->triangle_count > INT32_MAX)
-        return pt_diag_fail(&b->diag, p->loc, "a mesh of %zu triangles is too large", soup->triangle_count);
+        return pt_params_fail(p, NULL, "a mesh of %zu triangles is too large", soup->triangle_count);
     for (size_t i = 0; i < soup->vertex_count; i++) {
         const double v[3] = {value(soup->pd, soup->pf, 3 * i), value(soup->pd, soup->pf, 3 * i + 1),
                              value(soup->pd, soup->pf, 3 * i + 2)};
@@ -305,12 +304,12 @@ int pt_build_mesh(struct pt_builder *b, struct pt_params *p, const struct pt_sou
     return add_shape(b, p, &pl, &shape, b->state->area.on && b->state->area.power > 0 ? mesh_area(&mesh) : 0);
 }
 
-int pt_build_check_index(struct pt_builder *b, const struct pt_params *p, double v, size_t vertex_count)
+int pt_build_check_index(const struct pt_params *p, double v, size_t vertex_count)
 {
     if (v >= 0 && v < (double)vertex_count)
         return 0;
-    return pt_diag_fail(&b->diag, pt_params_loc(p, "indices"), "index %.0f out of range (expected 0 to %zu)", v,
-                        vertex_count > 0 ? vertex_count - 1 : 0);
+    return pt_params_fail(p, "indices", "index %.0f out of range (expected 0 to %zu)", v,
+                          vertex_count > 0 ? vertex_count - 1 : 0);
 }
 
 /* Whole numbers of a list as vertex indices in [0, vertex_count); malloc'ed, NULL on failure. */
@@ -321,11 +320,11 @@ static uint32_t *read_indices(struct pt_builder *b, struct pt_params *p, size_t 
     if (b->diag.rc)
         return NULL;
     if (!given && vertex_count != 3) {
-        pt_diag_fail(&b->diag, p->loc, "a trianglemesh of %zu vertices needs \"integer indices\"", vertex_count);
+        pt_params_fail(p, NULL, "a trianglemesh of %zu vertices needs \"integer indices\"", vertex_count);
         return NULL;
     }
     if (n % 3 != 0) {
-        pt_diag_fail(&b->diag, pt_params_find(p, "indices")->loc, "%zu indices (expected a multiple of 3)", n);
+        pt_params_fail(p, "indices", "%zu indices (expected a multiple of 3)", n);
         return NULL;
     }
     uint32_t *indices = malloc((n > 0 ? n : 1) * sizeof *indices);
@@ -335,7 +334,7 @@ static uint32_t *read_indices(struct pt_builder *b, struct pt_params *p, size_t 
     }
     for (size_t i = 0; i < n; i++) {
         double v = given ? given[i] : (double)i;
-        if (pt_build_check_index(b, p, v, vertex_count) != 0) {
+        if (pt_build_check_index(p, v, vertex_count) != 0) {
             free(indices);
             return NULL;
         }
@@ -362,16 +361,14 @@ static int make_triangle_mesh(struct pt_builder *b, struct pt_params *p)
         return pt_build_mesh(b, p, &(struct pt_soup){0});
     }
     if (!soup.pd)
-        return pt_diag_fail(&b->diag, p->loc, "a trianglemesh needs \"point3 P\"");
+        return pt_params_fail(p, NULL, "a trianglemesh needs \"point3 P\"");
     soup.nd = pt_params_floats(p, "N", 3, &n_count);
     const char *uv_name = pt_params_find(p, "uv") ? "uv" : pt_params_find(p, "st") ? "st" : "UV";
     soup.uvd = pt_params_floats(p, uv_name, 2, &uv_count);
     if (soup.nd && n_count != soup.vertex_count)
-        return pt_diag_fail(&b->diag, pt_params_find(p, "N")->loc, "%zu normals for %zu vertices", n_count,
-                            soup.vertex_count);
+        return pt_params_fail(p, "N", "%zu normals for %zu vertices", n_count, soup.vertex_count);
     if (soup.uvd && uv_count != soup.vertex_count)
-        return pt_diag_fail(&b->diag, pt_params_find(p, uv_name)->loc, "%zu texture coordinates for %zu vertices", uv_count,
-                            soup.vertex_count);
+        return pt_params_fail(p, uv_name, "%zu texture coordinates for %zu vertices", uv_count, soup.vertex_count);
     uint32_t *indices = read_indices(b, p, soup.vertex_count, &index_count);
     if (!indices)
         return b->diag.rc;
@@ -393,7 +390,7 @@ static int make_ply_mesh(struct pt_builder *b, struct pt_params *p)
     struct base_err err = {0};
     const char *name = pt_params_string(p, "filename", NULL);
     if (!name)
-        return pt_diag_fail(&b->diag, p->loc, "a plymesh needs \"string filename\"");
+        return pt_params_fail(p, NULL, "a plymesh needs \"string filename\"");
     struct pt_loc loc = pt_params_find(p, "filename")->loc;
     pt_builder_path(b, name, path, sizeof path);
     int rc = b->source->read(b->source->data, path, &bytes, &size, &err);
@@ -406,7 +403,7 @@ static int make_ply_mesh(struct pt_builder *b, struct pt_params *p)
         pt_diag_warn(&b->diag, loc, "%s: texture coordinates per face corner are ignored (expected those of vertices)",
                      path);
     if (pt_params_find(p, "displacement")) {
-        pt_diag_warn(&b->diag, pt_params_find(p, "displacement")->loc, "displacement of a plymesh's vertices is ignored");
+        pt_params_warn(p, "displacement", "displacement of a plymesh's vertices is ignored");
         pt_params_ignore(p, "displacement edgelength");
     }
     struct pt_soup soup = {.vertex_count = ply.vertex_count,
@@ -450,8 +447,8 @@ static int make_sphere(struct pt_builder *b, struct pt_params *p)
     double zmin = pt_params_float(p, "zmin", -r), zmax = pt_params_float(p, "zmax", r);
     double z0 = fmax(fmin(zmin, zmax), -r), z1 = fmin(fmax(zmin, zmax), r);
     if (!(z0 < z1))
-        return pt_diag_fail(&b->diag, pt_params_loc(p, pt_params_find(p, "zmin") ? "zmin" : "zmax"),
-                            "nothing of the sphere of radius %g is between zmin %g and zmax %g", r, zmin, zmax);
+        return pt_params_fail(p, pt_params_find(p, "zmin") ? "zmin" : "zmax",
+                              "nothing of the sphere of radius %g is between zmin %g and zmax %g", r, zmin, zmax);
     struct pt_quadric q = {.kind = PT_QUADRIC_SPHERE, .radius = (float)r, .z_min = (float)z0, .z_max = (float)z1};
     return add_quadric(b, p, &q);
 }
@@ -461,7 +458,7 @@ static int make_disk(struct pt_builder *b, struct pt_params *p)
     double r = pt_params_float_in(p, "radius", 1, 1e-30, 1e30), h = pt_params_float(p, "height", 0);
     double inner = pt_params_float_in(p, "innerradius", 0, 0, 1e30);
     if (!(inner < r))
-        return pt_diag_fail(&b->diag, pt_params_loc(p, "innerradius"), "innerradius %g is not below radius %g", inner, r);
+        return pt_params_fail(p, "innerradius", "innerradius %g is not below radius %g", inner, r);
     struct pt_quadric q = {
         .kind = PT_QUADRIC_DISK, .radius = (float)r, .inner_radius = (float)inner, .z_min = (float)h, .z_max = (float)h};
     return add_quadric(b, p, &q);
@@ -472,8 +469,7 @@ static int make_cylinder(struct pt_builder *b, struct pt_params *p)
     double r = pt_params_float_in(p, "radius", 1, 1e-30, 1e30);
     double z0 = pt_params_float(p, "zmin", -1), z1 = pt_params_float(p, "zmax", 1);
     if (z0 == z1)
-        return pt_diag_fail(&b->diag, pt_params_loc(p, pt_params_find(p, "zmin") ? "zmin" : "zmax"),
-                            "zmin and zmax are both %g", z0);
+        return pt_params_fail(p, pt_params_find(p, "zmin") ? "zmin" : "zmax", "zmin and zmax are both %g", z0);
     struct pt_quadric q = {
         .kind = PT_QUADRIC_CYLINDER, .radius = (float)r, .z_min = (float)fmin(z0, z1), .z_max = (float)fmax(z0, z1)};
     return add_quadric(b, p, &q);
@@ -483,7 +479,7 @@ static int make_cylinder(struct pt_builder *b, struct pt_params *p)
 
 static int make_nurbs(struct pt_builder *b, struct pt_params *p)
 {
-    pt_diag_warn(&b->diag, p->loc, "shape \"%s\" is left out", pt_params_kind(p));
+    pt_params_warn(p, NULL, "shape \"%s\" is left out", pt_params_kind(p));
     return b->diag.rc;
 }
 

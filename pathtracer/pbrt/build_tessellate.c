@@ -126,14 +126,13 @@ int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
         return b->diag.rc;
     if (!P || (!indices && vertices != 4) || (indices && count % 4 != 0) || (uv && uv_count != vertices) ||
         (N && n_count != vertices))
-        return pt_diag_fail(&b->diag, pt_params_loc(p, "P"),
-                            "a bilinearmesh needs \"point3 P\", four indices per patch, uv and N per vertex");
+        return pt_params_fail(p, "P", "a bilinearmesh needs \"point3 P\", four indices per patch, uv and N per vertex");
     if (!indices) {
         indices = identity;
         count = 4;
     }
     for (size_t i = 0; i < count; i++)
-        if (pt_build_check_index(b, p, indices[i], vertices) != 0)
+        if (pt_build_check_index(p, indices[i], vertices) != 0)
             return b->diag.rc;
     for (size_t i = 0; i < count && !N; i += 4) {
         const double *c[4];
@@ -165,7 +164,7 @@ int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
         ok = ok && add_grid(&g, first, cuts + 1, cuts + 1);
     }
     if (pt_params_find(p, "emissionfilename"))
-        pt_diag_warn(&b->diag, pt_params_find(p, "emissionfilename")->loc, "the image of an emitting patch is ignored");
+        pt_params_warn(p, "emissionfilename", "the image of an emitting patch is ignored");
     pt_params_ignore(p, "emissionfilename faceIndices");
     return finish(&g, ok, b, p);
 }
@@ -275,12 +274,11 @@ int pt_build_curve(struct pt_builder *b, struct pt_params *p)
     if (b->diag.rc)
         return b->diag.rc;
     if (!spline && strcmp(basis, "bezier") != 0)
-        return pt_diag_fail(&b->diag, pt_params_loc(p, "basis"),
-                            "unknown curve basis \"%.40s\" (expected bezier or bspline)", basis);
+        return pt_params_fail(p, "basis", "unknown curve basis \"%.40s\" (expected bezier or bspline)", basis);
     if (!P || count < corners || (count - corners) % step != 0)
-        return pt_diag_fail(&b->diag, pt_params_loc(p, "P"),
-                            "a curve of degree %d needs %zu points and %zu more per segment", degree, corners, step);
-    pt_diag_warn(&b->diag, p->loc, "curves are rendered as tubes of %d sides", (int)CURVE_SIDES);
+        return pt_params_fail(p, "P", "a curve of degree %d needs %zu points and %zu more per segment", degree, corners,
+                              step);
+    pt_params_warn(p, NULL, "curves are rendered as tubes of %d sides", (int)CURVE_SIDES);
     size_t segments = (count - corners) / step + 1;
     pt_vec3 axis = v3(0, 0, 1);
     struct pt_frame frame = {0};
@@ -321,7 +319,7 @@ int pt_build_height_field(struct pt_builder *b, struct pt_params *p)
     if (b->diag.rc)
         return b->diag.rc;
     if (!z || nu < 2 || nv < 2 || count != (size_t)nu * (size_t)nv)
-        return pt_diag_fail(&b->diag, p->loc, "a heightfield needs nu, nv and nu·nv heights");
+        return pt_params_fail(p, NULL, "a heightfield needs nu, nv and nu·nv heights");
     for (int y = 0; y < nv && ok; y++)
         for (int x = 0; x < nu && ok; x++) {
             const double q[3] = {x / (double)(nu - 1), y / (double)(nv - 1), z[(size_t)y * (size_t)nu + (size_t)x]};
@@ -348,7 +346,7 @@ int pt_build_revolved(struct pt_builder *b, struct pt_params *p)
     pt_params_point(p, "p1", p1);
     pt_params_point(p, "p2", p2);
     if (!b->diag.rc)
-        pt_diag_warn(&b->diag, p->loc, "shape \"%s\" is rendered as %d triangles", kind, (int)(2 * AROUND * ALONG));
+        pt_params_warn(p, NULL, "shape \"%s\" is rendered as %d triangles", kind, (int)(2 * AROUND * ALONG));
     for (int j = 0; j <= ALONG && ok; j++)
         for (int i = 0; i <= AROUND && ok; i++) {
             double v = (double)j / ALONG, u = (double)i / AROUND, a = u * phi, c = cos(a), s = sin(a);

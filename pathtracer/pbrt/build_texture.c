@@ -247,11 +247,10 @@ static void read_mapping(struct context *c, struct pt_texture *t)
     if (strcmp(mapping, "uv") != 0) {
         static const char *const known[] = {"spherical", "cylindrical", "planar", NULL};
         if (base_word_index(known, mapping, strlen(mapping)) < 0)
-            pt_diag_fail(&c->b->diag, pt_params_find(p, "mapping")->loc,
-                         "unknown mapping \"%.40s\" (expected uv, spherical, cylindrical or planar)", mapping);
+            pt_params_fail(p, "mapping", "unknown mapping \"%.40s\" (expected uv, spherical, cylindrical or planar)",
+                           mapping);
         else
-            pt_diag_warn(&c->b->diag, pt_params_find(p, "mapping")->loc, "mapping \"%s\" is replaced by the shape's own uv",
-                         mapping);
+            pt_params_warn(p, "mapping", "mapping \"%s\" is replaced by the shape's own uv", mapping);
     }
     t->su = (float)pt_params_float(p, "uscale", 1);
     t->sv = (float)pt_params_float(p, "vscale", 1);
@@ -300,7 +299,7 @@ static void make_mix(struct context *c, struct pt_texture *t)
 
 static void make_direction_mix(struct context *c, struct pt_texture *t)
 {
-    pt_diag_warn(&c->b->diag, c->p->loc, "texture \"directionmix\" is replaced by an even mix");
+    pt_params_warn(c->p, NULL, "texture \"directionmix\" is replaced by an even mix");
     pt_params_ignore(c->p, "dir");
     make_mix(c, t);
 }
@@ -312,8 +311,7 @@ static void make_checkerboard(struct context *c, struct pt_texture *t)
     t->in[1] = input(c, "tex2", 0);
     read_mapping(c, t);
     if (pt_params_int_in(c->p, "dimension", 2, 2, 3) == 3)
-        pt_diag_warn(&c->b->diag, pt_params_loc(c->p, "dimension"),
-                     "a checkerboard of dimension 3 is drawn on the shape's uv instead");
+        pt_params_warn(c->p, "dimension", "a checkerboard of dimension 3 is drawn on the shape's uv instead");
     pt_params_ignore(c->p, "aamode");
 }
 
@@ -333,8 +331,7 @@ static int reads_nearest(struct context *c)
     const char *name = pt_params_string(c->p, "filter", "bilinear");
     int filter = base_word_index(filters, name, strlen(name));
     if (filter < 0)
-        pt_diag_fail(&c->b->diag, pt_params_loc(c->p, "filter"),
-                     "unknown filter \"%.40s\" (expected point, bilinear, trilinear or ewa)", name);
+        pt_params_fail(c->p, "filter", "unknown filter \"%.40s\" (expected point, bilinear, trilinear or ewa)", name);
     return filter == 0;
 }
 
@@ -352,8 +349,7 @@ static void make_imagemap(struct context *c, struct pt_texture *t)
         pt_params_ignore(p, "gamma");
     t->wrap = base_word_index(wraps, wrap, strlen(wrap));
     if (t->wrap < 0)
-        pt_diag_fail(&c->b->diag, pt_params_find(p, "wrap")->loc, "unknown wrap \"%.40s\" (expected repeat, black or clamp)",
-                     wrap);
+        pt_params_fail(p, "wrap", "unknown wrap \"%.40s\" (expected repeat, black or clamp)", wrap);
     t->is_nearest = reads_nearest(c);
     t->scale = (float)pt_params_float(p, "scale", 1);
     t->invert = pt_params_bool(p, "invert", 0);
@@ -379,7 +375,7 @@ static void make_stand_in(struct context *c, struct pt_texture *t)
 {
     const char *kind = pt_params_kind(c->p);
     struct pt_input inside = input(c, "inside", 1), outside = input(c, "outside", 0);
-    pt_diag_warn(&c->b->diag, c->p->loc, "texture \"%s\" is replaced by a constant", kind);
+    pt_params_warn(c->p, NULL, "texture \"%s\" is replaced by a constant", kind);
     t->kind = PT_TEXTURE_CONSTANT;
     t->in[0] = strcmp(kind, "dots") == 0 && !inside.texture && !outside.texture
                    ? (struct pt_input){0, v3_scale(v3_add(inside.value, outside.value), 0.5f)}
@@ -422,8 +418,7 @@ int pt_build_texture(struct pt_builder *b, const char *name, const char *class_n
     int is_float = strcmp(class_name, "float") == 0;
     if (!is_float && strcmp(class_name, "spectrum") != 0 && strcmp(class_name, "color") != 0 &&
         strcmp(class_name, "rgb") != 0)
-        return pt_diag_fail(&b->diag, p->loc, "texture \"%s\" of type \"%s\" (expected float or spectrum)", name,
-                            class_name);
+        return pt_params_fail(p, NULL, "texture \"%s\" of type \"%s\" (expected float or spectrum)", name, class_name);
     struct context c = {b, p, is_float};
     /* What is not rendered has a stand-in, with a warning, so that scenes of other renderers load. */
     struct pt_texture t = {.kind = -1, .scale = 1, .su = 1, .sv = 1, .channel = 0};
@@ -439,7 +434,7 @@ int pt_build_texture(struct pt_builder *b, const char *name, const char *class_n
     int left = MAX_LOOKUPS;
     count_lookups(b->textures.items, &t, &left);
     if (left == 0)
-        return pt_diag_fail(&b->diag, p->loc, "texture \"%.63s\" is made of more than %d others", name, MAX_LOOKUPS - 1);
+        return pt_params_fail(p, NULL, "texture \"%.63s\" is made of more than %d others", name, MAX_LOOKUPS - 1);
     int32_t id = pt_list_add(b, &b->textures, &t);
     return id < 0 ? b->diag.rc : pt_builder_name(b, is_float ? &b->float_textures : &b->colour_textures, name, id);
 }

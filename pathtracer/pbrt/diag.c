@@ -13,14 +13,16 @@ static void make_one_line(char *text)
             *c = '?';
 }
 
-static int fail_v(struct pt_diag *diag, int code, struct pt_loc loc, const char *format, va_list args)
+int pt_diag_fail_code(struct pt_diag *diag, int code, struct pt_loc loc, const char *format, ...)
 {
     if (diag->rc)
         return diag->rc;
-    char text[TEXT_MAX];
+    char text[TEXT_MAX], file[160];
+    va_list args;
+    va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
+    va_end(args);
     make_one_line(text);
-    char file[160];
     snprintf(file, sizeof file, "%s", loc.file ? loc.file : "");
     make_one_line(file);
     diag->rc = code;
@@ -31,24 +33,6 @@ static int fail_v(struct pt_diag *diag, int code, struct pt_loc loc, const char 
     else
         base_fail(diag->err, code, "%s", text);
     return code;
-}
-
-int pt_diag_fail(struct pt_diag *diag, struct pt_loc loc, const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    int rc = fail_v(diag, BASE_EINVAL, loc, format, args);
-    va_end(args);
-    return rc;
-}
-
-int pt_diag_fail_code(struct pt_diag *diag, int code, struct pt_loc loc, const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    int rc = fail_v(diag, code, loc, format, args);
-    va_end(args);
-    return rc;
 }
 
 int pt_diag_nomem(struct pt_diag *diag, const char *what)

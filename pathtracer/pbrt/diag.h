@@ -28,12 +28,11 @@ struct pt_diag {
     struct pt_names reported; /* owns: texts of the warnings given, each once */
 };
 
-/* Records `file:line:column: text` with BASE_EINVAL unless something failed before. Control characters become '?', so the
- * text is one line. Returns the sticky code. */
-int pt_diag_fail(struct pt_diag *diag, struct pt_loc loc, const char *format, ...) __attribute__((format(printf, 3, 4)));
-/* The same with another code (BASE_ENOMEM, BASE_EIO). */
+/* Records `file:line:column: text` with a code unless something failed before. Control characters become '?', so the text is
+ * one line. Returns the sticky code. */
 int pt_diag_fail_code(struct pt_diag *diag, int code, struct pt_loc loc, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
+#define pt_diag_fail(diag, loc, ...) pt_diag_fail_code(diag, BASE_EINVAL, loc, __VA_ARGS__)
 /* Out of memory while making `what`. */
 int pt_diag_nomem(struct pt_diag *diag, const char *what);
 /* Something is approximated or ignored: `file:line: warning: text`, a note, each text once. A failure when strict. */

@@ -337,7 +337,7 @@ void pt_params_check_used(struct pt_params *params)
 
 struct pt_loc pt_params_loc(const struct pt_params *params, const char *name)
 {
-    const struct pt_param *p = pt_params_find(params, name);
+    const struct pt_param *p = name ? pt_params_find(params, name) : NULL;
     return p ? p->loc : params->loc;
 }
 

@@ -72,8 +72,11 @@ void pt_params_check_used(struct pt_params *params);
 
 /* The parameter called `name`, or NULL; does not mark it. */
 struct pt_param *pt_params_find(const struct pt_params *params, const char *name);
-/* Its place; that of the directive when absent. */
+/* Its place; that of the directive when absent, and for NULL. */
 struct pt_loc pt_params_loc(const struct pt_params *params, const char *name);
+/* Messages with that place. */
+#define pt_params_fail(params, name, ...) pt_diag_fail((params)->diag, pt_params_loc(params, name), __VA_ARGS__)
+#define pt_params_warn(params, name, ...) pt_diag_warn((params)->diag, pt_params_loc(params, name), __VA_ARGS__)
 const char *pt_param_name(const struct pt_params *params, const struct pt_param *param);
 /* 1 when it has so many values; else fails. */
 int pt_param_has(const struct pt_params *params, const struct pt_param *param, size_t count);

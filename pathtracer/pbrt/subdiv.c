@@ -253,11 +253,10 @@ int pt_build_loop_subdiv(struct pt_builder *b, struct pt_params *p)
     if (b->diag.rc)
         return b->diag.rc;
     if (!P || !indices || corners == 0 || corners % 3 != 0)
-        return pt_diag_fail(&b->diag, p->loc, "a loopsubdiv needs \"point3 P\" and three \"integer indices\" per triangle");
+        return pt_params_fail(p, NULL, "a loopsubdiv needs \"point3 P\" and three \"integer indices\" per triangle");
     /* Before any memory is taken: each level has four times the triangles. */
     if (corners / 3 > max_triangles >> (2 * levels))
-        return pt_diag_fail(&b->diag, pt_params_loc(p, "levels"), "%zu triangles subdivided %d times are too many",
-                            corners / 3, levels);
+        return pt_params_fail(p, "levels", "%zu triangles subdivided %d times are too many", corners / 3, levels);
     m = (struct mesh){vertices, corners / 3, malloc(vertices * 3 * sizeof *m.p), malloc(corners * sizeof *m.v)};
     if (!m.p || !m.v) {
         pt_diag_nomem(&b->diag, "a subdivision surface");
@@ -265,7 +264,7 @@ int pt_build_loop_subdiv(struct pt_builder *b, struct pt_params *p)
     }
     memcpy(m.p, P, vertices * 3 * sizeof *m.p);
     for (size_t i = 0; i < corners; i++) {
-        if (pt_build_check_index(b, p, indices[i], vertices) != 0)
+        if (pt_build_check_index(p, indices[i], vertices) != 0)
             goto out;
         m.v[i] = (uint32_t)indices[i];
     }
