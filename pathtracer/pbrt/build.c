@@ -20,20 +20,6 @@ void pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_sce
     b->camera_medium = b->open_object = b->default_material = -1;
     b->transform_times[1] = b->shutter[1] = 1;
     b->camera_ctm[0] = b->camera_ctm[1] = pt_xform_identity();
-    b->images.size = sizeof(struct pt_image_map);
-    b->textures.size = sizeof(struct pt_texture);
-    b->materials.size = sizeof(struct pt_material);
-    b->material_infos.size = sizeof(struct pt_material_info);
-    b->meshes.size = sizeof(struct pt_mesh);
-    b->quadrics.size = sizeof(struct pt_quadric);
-    b->world_shapes.size = b->object_shapes.size = sizeof(struct pt_shape);
-    b->objects.size = sizeof(struct pt_object);
-    b->instances.size = sizeof(struct pt_instance);
-    b->lights.size = sizeof(struct pt_light);
-    b->media.size = sizeof(struct pt_medium);
-    b->medium_infos.size = sizeof(struct pt_medium_info);
-    b->name_undo.size = sizeof(struct pt_name_undo);
-    b->object_infos.size = sizeof(struct pt_object_info);
 }
 
 void pt_builder_release(struct pt_builder *b)
@@ -58,13 +44,14 @@ void pt_builder_release(struct pt_builder *b)
     pt_diag_release(&b->diag);
 }
 
-int32_t pt_list_add(struct pt_builder *b, struct pt_list *list, const void *item)
+int32_t pt_list_add_bytes(struct pt_builder *b, struct pt_list *list, const void *item, size_t size)
 {
-    if (list->count >= INT32_MAX || !pt_grow(&list->items, &list->room, list->count, list->size)) {
+    if (list->count >= INT32_MAX || !pt_grow(&list->items, &list->room, list->count, size)) {
         pt_diag_nomem(&b->diag, "the scene");
         return -1;
     }
-    memcpy((char *)list->items + list->count * list->size, item, list->size);
+    list->size = size;
+    memcpy((char *)list->items + list->count * size, item, size);
     return (int32_t)list->count++;
 }
 
@@ -142,7 +129,7 @@ static void *move(struct pt_builder *b, struct pt_list *list, int32_t *count)
     else if (list->count > 0)
         pt_diag_nomem(&b->diag, "the scene");
     free(list->items);
-    *list = (struct pt_list){.size = list->size};
+    *list = (struct pt_list){0};
     return kept;
 }
 

@@ -16,7 +16,7 @@
 #include "pbrt/xform.h"
 #include "scene/scene.h"
 
-/* Growing array; items owned. */
+/* Growing array; items owned, each of `size` bytes. */
 struct pt_list {
     void *items;
     size_t count, room, size;
@@ -117,7 +117,8 @@ int pt_builder_finish(struct pt_builder *b);
 int pt_pbrt_read(struct pt_builder *b, const char *path);
 
 /* Appends a copy of *item; index, or -1 (the diag has failed). */
-int32_t pt_list_add(struct pt_builder *b, struct pt_list *list, const void *item);
+#define pt_list_add(b, list, item) pt_list_add_bytes(b, list, item, sizeof *(item))
+int32_t pt_list_add_bytes(struct pt_builder *b, struct pt_list *list, const void *item, size_t size);
 /* Joins a scene-relative file name to the main file's folder. */
 void pt_builder_path(struct pt_builder *b, const char *name, char *path, size_t room);
 /* Names a material or texture. pbrt-v3 keeps these in the graphics state, pbrt-v4 has one meaning for all of the scene. */

@@ -369,60 +369,18 @@ int pt_build_materials_check(struct pt_builder *b)
 }
 
 /* What v3's materials know and its shapes do not. */
-static int is_of_materials(const char *name)
-{
-    static const char *const names[] = {"Kd",
-                                        "Ks",
-                                        "Kr",
-                                        "Kt",
-                                        "amount",
-                                        "anisotropic",
-                                        "beta_m",
-                                        "beta_n",
-                                        "bsdffile",
-                                        "bumpmap",
-                                        "clearcoat",
-                                        "clearcoatgloss",
-                                        "color",
-                                        "difftrans",
-                                        "eta",
-                                        "eumelanin",
-                                        "flatness",
-                                        "g",
-                                        "index",
-                                        "k",
-                                        "metallic",
-                                        "mfp",
-                                        "namedmaterial1",
-                                        "namedmaterial2",
-                                        "opacity",
-                                        "pheomelanin",
-                                        "reflect",
-                                        "remaproughness",
-                                        "roughness",
-                                        "scale",
-                                        "scatterdistance",
-                                        "sheen",
-                                        "sheentint",
-                                        "sigma",
-                                        "sigma_a",
-                                        "sigma_s",
-                                        "spectrans",
-                                        "speculartint",
-                                        "thin",
-                                        "transmit",
-                                        "uroughness",
-                                        "vroughness",
-                                        NULL};
-    return base_word_index(names, name, strlen(name)) >= 0;
-}
+static const char of_materials[] =
+    "Kd Ks Kr Kt amount anisotropic beta_m beta_n bsdffile bumpmap clearcoat clearcoatgloss color difftrans eta eumelanin "
+    "flatness g index k metallic mfp namedmaterial1 namedmaterial2 opacity pheomelanin reflect remaproughness roughness "
+    "scale "
+    "scatterdistance sheen sheentint sigma sigma_a sigma_s spectrans speculartint thin transmit uroughness vroughness";
 
 int32_t pt_build_shape_material(struct pt_builder *b, int32_t id, struct pt_params *shape)
 {
     struct pt_params both = {0};
     size_t asked = 0, taken = 0;
     for (size_t i = 0; i < shape->count; i++)
-        asked += (size_t)is_of_materials(pt_param_name(shape, &shape->items[i]));
+        asked += (size_t)pt_name_is_in(of_materials, pt_param_name(shape, &shape->items[i]));
     if (asked == 0)
         return id;
     const struct pt_params *own = id >= 0 ? info_of(b, id)->params : NULL;
@@ -435,7 +393,7 @@ int32_t pt_build_shape_material(struct pt_builder *b, int32_t id, struct pt_para
     int32_t made = b->diag.rc ? -1 : build(b, pt_params_kind(&both), &both);
     for (size_t i = 0; i < shape->count && made >= 0; i++) {
         const char *name = pt_param_name(shape, &shape->items[i]);
-        if (!is_of_materials(name) || !pt_params_find(&both, name)->used)
+        if (!pt_name_is_in(of_materials, name) || !pt_params_find(&both, name)->used)
             continue;
         shape->items[i].used = 1;
         taken++;

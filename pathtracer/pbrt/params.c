@@ -305,7 +305,7 @@ int pt_params_append(struct pt_params *params, const struct pt_params *from)
 
 /* --- use -------------------------------------------------------------------------------------------------------------- */
 
-static int in_list(const char *names, const char *name)
+int pt_name_is_in(const char *names, const char *name)
 {
     size_t n = strlen(name);
     for (const char *at = strstr(names, name); n > 0 && at; at = strstr(at + 1, name))
@@ -317,7 +317,7 @@ static int in_list(const char *names, const char *name)
 void pt_params_ignore(struct pt_params *params, const char *names)
 {
     for (size_t i = 0; i < params->count; i++)
-        if (in_list(names, pt_param_name(params, &params->items[i])))
+        if (pt_name_is_in(names, pt_param_name(params, &params->items[i])))
             params->items[i].used = 1;
 }
 
@@ -328,7 +328,7 @@ void pt_params_check_used(struct pt_params *params)
         const char *name = pt_param_name(params, p);
         if (p->used || p->inherited)
             continue;
-        if (params->diag->is_v3 || in_list(known_names, name))
+        if (params->diag->is_v3 || pt_name_is_in(known_names, name))
             pt_diag_warn(params->diag, p->loc, "parameter \"%s\" has no effect on \"%s\"", name, pt_params_kind(params));
         else
             pt_diag_fail(params->diag, p->loc, "unknown parameter \"%s\" of \"%s\"", name, pt_params_kind(params));

@@ -80,6 +80,8 @@ struct pt_loc pt_params_loc(const struct pt_params *params, const char *name);
 const char *pt_param_name(const struct pt_params *params, const struct pt_param *param);
 /* 1 when it has so many values; else fails. */
 int pt_param_has(const struct pt_params *params, const struct pt_param *param, size_t count);
+/* Whether `name` is one of `names`, which are separated by blanks. */
+int pt_name_is_in(const char *names, const char *name);
 /* Marks as used what is known and has no effect here. Names are separated by blanks. */
 void pt_params_ignore(struct pt_params *params, const char *names);
 

@@ -355,21 +355,19 @@ static int read_option_value(struct parser *p, const char *name, uint32_t *value
 /* pbrt-v4's: a name, of which it ignores case, '-' and '_', and one value. */
 static int read_option(struct parser *p)
 {
-    static const char known[] = " disablepixeljitter disabletexturefiltering disablewavelengthjitter displacementedgescale "
-                                "forcediffuse msereferenceimage msereferenceout pixelstats rendercoordsys wavefront ";
-    char name[NAME_MAX_BYTES], plain[NAME_MAX_BYTES + 2] = " ";
-    size_t n = 1;
+    static const char known[] = "disablepixeljitter disabletexturefiltering disablewavelengthjitter displacementedgescale "
+                                "forcediffuse msereferenceimage msereferenceout pixelstats rendercoordsys wavefront";
+    char name[NAME_MAX_BYTES], plain[NAME_MAX_BYTES] = "";
+    size_t n = 0;
     int rc = read_string(p, "option", name, sizeof name);
     if (rc)
         return rc;
     for (const char *at = name; *at; at++)
         if (*at != '-' && *at != '_' && *at != ' ' && *at != '\t')
             plain[n++] = *at >= 'A' && *at <= 'Z' ? (char)(*at - 'A' + 'a') : *at;
-    plain[n] = ' ';
-    plain[n + 1] = '\0';
-    if (strcmp(plain, " seed ") == 0)
+    if (strcmp(plain, "seed") == 0)
         return read_option_value(p, name, &p->b->defaults->integrator.seed);
-    if (n == 1 || !strstr(known, plain))
+    if (!pt_name_is_in(known, plain))
         return pt_diag_fail(&p->b->diag, p->loc, "unknown option \"%.40s\"", name);
     rc = read_option_value(p, name, NULL);
     if (!rc)
@@ -526,9 +524,6 @@ int pt_pbrt_read(struct pt_builder *b, const char *path)
     p->lexer.diag = &b->diag;
     p->lexer.arena = &b->scene->arena;
     p->lexer.is_directive = is_directive;
-    p->frames.size = sizeof(struct frame);
-    p->systems.size = sizeof(struct pt_xform[2]);
-    p->attributes.size = sizeof(struct pt_params *);
     p->state = (struct pt_state){
         .ctm = {pt_xform_identity(), pt_xform_identity()}, .active = 3, .material = -1, .medium_in = -1, .medium_out = -1};
     b->state = &p->state;

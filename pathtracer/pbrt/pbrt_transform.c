@@ -66,7 +66,7 @@ static int do_transform(struct parser *p)
 
 int pt_parser_save_system(struct parser *p, const char *name, const struct pt_xform ctm[2])
 {
-    int32_t id = pt_list_add(p->b, &p->systems, ctm);
+    int32_t id = pt_list_add(p->b, &p->systems, (const struct pt_xform(*)[2])ctm);
     if (id < 0 || pt_names_set(&p->system_names, name, id) != 0)
         return pt_diag_nomem(&p->b->diag, "coordinate systems");
     return 0;
