@@ -181,7 +181,7 @@ struct pt_making {
     struct pt_material *m;
     struct pt_material_info *info;
 };
-/* v3 kinds; 0 when making->kind is none of them. */
+/* v3 kinds, and what stands in for kinds that are not simulated; 0 when making->kind is none of them. */
 int pt_build_material_v3(struct pt_making *making);
 /* A reflectance that may be textured; the fallback, grey, when absent. */
 struct pt_input pt_build_reflectance(struct pt_making *making, const char *name, float fallback);

@@ -1,5 +1,4 @@
-/* Materials of pbrt-v4: the scattering models by their tables, mix and interface, and what stands in for those that are not
- * simulated. */
+/* Materials of pbrt-v4: the scattering models by their tables, mix and interface. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -191,11 +190,12 @@ void pt_build_mix_opacity(struct pt_making *c)
     c->info->opacity = both;
 }
 
-static void make_mix(struct pt_making *c)
+static void read_mix(struct pt_making *c)
 {
     struct pt_param *list = pt_params_find(c->p, "materials");
+    c->m->kind = PT_MATERIAL_MIX;
     if (!list || list->type != PT_PARAM_STRING || list->count != 2) {
-        pt_diag_fail(&c->b->diag, list ? list->loc : c->p->loc, "mix needs \"string materials\" with two names");
+        pt_params_fail(c->p, "materials", "mix needs \"string materials\" with two names");
         return;
     }
     list->used = 1;
@@ -205,68 +205,24 @@ static void make_mix(struct pt_making *c)
     pt_build_mix_opacity(c);
 }
 
-static void make_interface(struct pt_making *c) { (void)c; }
-
-/* Not simulated: a coated diffuse surface of about its colour. */
-static void make_subsurface(struct pt_making *c)
-{
-    pt_params_warn(c->p, NULL, "material \"%s\" is replaced by a coated diffuse one", c->kind);
-    c->m->reflectance = pt_build_reflectance(c, "reflectance", 0.6f);
-    pt_build_roughness(c->b, c->p, 0, 0, c->m);
-    c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.33);
-    pt_params_ignore(c->p, "mfp sigma_a sigma_s scale g name filename");
-    c->m->thickness = pt_input_grey(0.01);
-}
-
-static void make_hair(struct pt_making *c)
-{
-    pt_params_warn(c->p, NULL, "material \"hair\" is replaced by a diffuse one");
-    c->m->reflectance = pt_build_reflectance(c, "color", 0.2f);
-    if (pt_params_find(c->p, "reflectance"))
-        c->m->reflectance = pt_build_reflectance(c, "reflectance", 0.2f);
-    pt_params_ignore(c->p, "sigma_a eumelanin pheomelanin eta beta_m beta_n alpha");
-}
-
-static void make_measured(struct pt_making *c)
-{
-    pt_params_warn(c->p, NULL, "material \"measured\" is replaced by a coated diffuse one");
-    c->m->reflectance = pt_input_grey(0.5);
-    c->m->roughness_u = c->m->roughness_v = pt_input_grey(0.1);
-    c->m->thickness = pt_input_grey(0.01);
-    pt_params_ignore(c->p, "filename");
-}
-
-/* What is simulated goes before what stands in for the rest. 0: perhaps a kind of v3. */
+/* 0: perhaps a kind of v3, or one that is not simulated. */
 static int build_v4(struct pt_making *c)
 {
-    static const struct {
-        const char *name;
-        int32_t kind;
-        void (*make)(struct pt_making *c);
-    } others[] = {
-        {"mix", PT_MATERIAL_MIX, make_mix},
-        {"interface", PT_MATERIAL_INTERFACE, make_interface},
-        {"none", PT_MATERIAL_INTERFACE, make_interface},
-        {"", PT_MATERIAL_INTERFACE, make_interface},
-        {"subsurface", PT_BSDF_COATED_DIFFUSE, make_subsurface},
-        {"hair", PT_BSDF_DIFFUSE, make_hair},
-        {"measured", PT_BSDF_COATED_DIFFUSE, make_measured},
-    };
-    if (strcmp(c->kind, "mix") == 0 && pt_params_find(c->p, "namedmaterial1"))
-        return 0; /* v3's */
+    static const char *const interface[] = {"interface", "none", "", NULL};
     for (int32_t i = 0; i < PT_BSDF_COUNT; i++)
         if (strcmp(pt_bsdf_models[i].file_name, c->kind) == 0) {
             c->m->kind = i;
             read_model(c, &pt_bsdf_models[i]);
             return 1;
         }
-    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++)
-        if (strcmp(others[i].name, c->kind) == 0) {
-            c->m->kind = others[i].kind;
-            others[i].make(c);
-            return 1;
-        }
-    return 0;
+    if (strcmp(c->kind, "mix") == 0 && !pt_params_find(c->p, "namedmaterial1")) { /* else v3's */
+        read_mix(c);
+        return 1;
+    }
+    if (base_word_index(interface, c->kind, strlen(c->kind)) < 0)
+        return 0;
+    c->m->kind = PT_MATERIAL_INTERFACE;
+    return 1;
 }
 
 static int32_t add(struct pt_builder *b, const struct pt_material *m, const struct pt_material_info *info)

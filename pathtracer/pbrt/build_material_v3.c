@@ -1,4 +1,4 @@
-/* pbrt-v3's materials in terms of v4's. */
+/* pbrt-v3's materials in terms of v4's, and what stands in for materials that are not simulated. */
 #include <string.h>
 
 #include "pbrt/build.h"
@@ -160,55 +160,67 @@ static void make_mix(struct pt_making *c)
     pt_build_mix_opacity(c);
 }
 
-static void make_kd_subsurface(struct pt_making *c)
+/* What is not simulated: a diffuse surface of about its colour, mostly with a coat. */
+struct stand_in {
+    const char *name, *note; /* note: what the warning says besides */
+    const char *colours[2];  /* parameters, of which the last one that is given counts */
+    float grey;              /* else */
+    double roughness, index; /* index: by default, and roughness, too; 0: nothing is read of either */
+    int is_coated, is_of_v3; /* of v3: has a bumpmap */
+    const char *ignored;
+};
+
+static void stand_in(struct pt_making *c, const struct stand_in *s)
 {
-    pt_params_warn(c->p, NULL, "material \"%s\" is replaced by a diffuse one", c->kind);
-    c->m->reflectance = pt_build_reflectance(c, "Kd", 0.5f);
-    pt_params_ignore(c->p, "Kr Kt mfp eta scale uroughness vroughness roughness remaproughness g sigma_a sigma_s name");
+    pt_params_warn(c->p, NULL, "material \"%s\"%s is replaced by a %sdiffuse one", c->kind, s->note,
+                   s->is_coated ? "coated " : "");
+    c->m->reflectance = pt_input_grey((double)s->grey);
+    for (int i = 0; i < 2 && s->colours[i]; i++)
+        if (i == 0 || pt_params_find(c->p, s->colours[i]))
+            c->m->reflectance = pt_build_reflectance(c, s->colours[i], s->grey);
+    c->m->roughness_u = c->m->roughness_v = pt_input_grey(s->roughness);
+    if (s->index > 0) {
+        pt_build_roughness(c->b, c->p, s->roughness, 0, c->m);
+        c->m->eta = (float)pt_build_index(c->b, c->p, "eta", s->index);
+    }
+    pt_params_ignore(c->p, s->ignored);
+    if (s->is_coated)
+        clear_coat(c);
 }
 
-static void make_disney(struct pt_making *c)
-{
-    pt_params_warn(c->p, NULL, "material \"%s\" is replaced by a coated diffuse one", c->kind);
-    c->m->reflectance = pt_build_reflectance(c, "color", 0.5f);
-    pt_build_roughness(c->b, c->p, 0.5, 0, c->m);
-    c->m->eta = (float)pt_build_index(c->b, c->p, "eta", 1.5);
-    pt_params_ignore(c->p, "metallic speculartint anisotropic sheen sheentint clearcoat clearcoatgloss spectrans "
-                           "scatterdistance thin flatness difftrans");
-    clear_coat(c);
-}
-
-static void make_fourier(struct pt_making *c)
-{
-    pt_params_warn(c->p, NULL, "material \"%s\" (a measured table) is replaced by a coated diffuse one", c->kind);
-    c->m->reflectance = pt_input_grey(0.5);
-    c->m->roughness_u = c->m->roughness_v = pt_input_grey(0.05);
-    pt_params_ignore(c->p, "bsdffile");
-    clear_coat(c);
-}
+static const char not_of_kd[] = "Kr Kt mfp eta scale uroughness vroughness roughness remaproughness g sigma_a sigma_s name",
+                  not_of_disney[] = "metallic speculartint anisotropic sheen sheentint clearcoat clearcoatgloss spectrans "
+                                    "scatterdistance thin flatness difftrans";
+static const struct stand_in stand_ins[] = {
+    {"subsurface", "", {"reflectance"}, 0.6f, 0, 1.33, 1, 0, "mfp sigma_a sigma_s scale g name filename"},
+    {"hair", "", {"color", "reflectance"}, 0.2f, 0, 0, 0, 0, "sigma_a eumelanin pheomelanin eta beta_m beta_n alpha"},
+    {"measured", "", {NULL}, 0.5f, 0.1, 0, 1, 0, "filename"},
+    {"kdsubsurface", "", {"Kd"}, 0.5f, 0, 0, 0, 1, not_of_kd},
+    {"disney", "", {"color"}, 0.5f, 0.5, 1.5, 1, 1, not_of_disney},
+    {"fourier", " (a measured table)", {NULL}, 0.5f, 0.05, 0, 1, 1, "bsdffile"},
+};
 
 int pt_build_material_v3(struct pt_making *c)
 {
     static const struct {
         const char *name;
         void (*make)(struct pt_making *c);
-    } kinds[] = {{"matte", make_matte},
-                 {"plastic", make_plastic},
-                 {"substrate", make_plastic},
-                 {"uber", make_uber},
-                 {"metal", make_metal},
-                 {"mirror", make_mirror},
-                 {"glass", make_glass},
-                 {"translucent", make_translucent},
-                 {"mix", make_mix},
-                 {"shinymetal", make_shiny_metal},
-                 {"kdsubsurface", make_kd_subsurface},
-                 {"disney", make_disney},
-                 {"fourier", make_fourier}};
+    } kinds[] = {{"matte", make_matte},       {"plastic", make_plastic},
+                 {"substrate", make_plastic}, {"uber", make_uber},
+                 {"metal", make_metal},       {"mirror", make_mirror},
+                 {"glass", make_glass},       {"translucent", make_translucent},
+                 {"mix", make_mix},           {"shinymetal", make_shiny_metal}};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
         if (strcmp(kinds[i].name, c->kind) == 0) {
             kinds[i].make(c);
             c->m->bump = pt_build_bump(c->b, c->p, "bumpmap");
+            return 1;
+        }
+    for (size_t i = 0; i < sizeof stand_ins / sizeof stand_ins[0]; i++)
+        if (strcmp(stand_ins[i].name, c->kind) == 0) {
+            stand_in(c, &stand_ins[i]);
+            if (stand_ins[i].is_of_v3)
+                c->m->bump = pt_build_bump(c->b, c->p, "bumpmap");
             return 1;
         }
     return 0;
