@@ -12,53 +12,50 @@ struct grower {
     double *p, *n, *uv; /* owns */
     uint32_t *indices;  /* owns */
     size_t vertices, p_room, n_room, uv_room, corners, index_room;
+    int failed; /* out of memory: what is added is lost */
 };
 
-static int push(double **array, size_t *room, size_t at, const double *v, size_t count)
+static void push(struct grower *g, double **array, size_t *room, size_t at, const double *v, size_t count)
 {
-    for (size_t i = 0; i < count; i++) {
-        if (!pt_grow((void **)array, room, at + i, sizeof **array))
-            return 0;
-        (*array)[at + i] = v[i];
+    for (size_t i = 0; i < count && !g->failed; i++) {
+        g->failed = !pt_grow((void **)array, room, at + i, sizeof **array);
+        if (!g->failed)
+            (*array)[at + i] = v[i];
     }
-    return 1;
 }
 
-static int add_vertex(struct grower *g, const double p[3], const double *n, double u, double v)
+static void add_vertex(struct grower *g, const double p[3], const double *n, double u, double v)
 {
     const double uv[2] = {u, v};
-    if (g->vertices >= INT32_MAX || !push(&g->p, &g->p_room, 3 * g->vertices, p, 3) ||
-        (n && !push(&g->n, &g->n_room, 3 * g->vertices, n, 3)) || !push(&g->uv, &g->uv_room, 2 * g->vertices, uv, 2))
-        return 0;
-    g->vertices++;
-    return 1;
+    g->failed |= g->vertices >= INT32_MAX;
+    push(g, &g->p, &g->p_room, 3 * g->vertices, p, 3);
+    if (n)
+        push(g, &g->n, &g->n_room, 3 * g->vertices, n, 3);
+    push(g, &g->uv, &g->uv_room, 2 * g->vertices++, uv, 2);
 }
 
 /* Quad a b / c d as two triangles of one orientation. */
-static int add_quad(struct grower *g, size_t a, size_t b, size_t c, size_t d)
+static void add_quad(struct grower *g, size_t a, size_t b, size_t c, size_t d)
 {
     const size_t corners[6] = {a, b, d, a, d, c};
-    for (int i = 0; i < 6; i++) {
-        if (!pt_grow((void **)&g->indices, &g->index_room, g->corners, sizeof *g->indices))
-            return 0;
-        g->indices[g->corners++] = (uint32_t)corners[i];
+    for (int i = 0; i < 6 && !g->failed; i++) {
+        g->failed = !pt_grow((void **)&g->indices, &g->index_room, g->corners, sizeof *g->indices);
+        if (!g->failed)
+            g->indices[g->corners++] = (uint32_t)corners[i];
     }
-    return 1;
 }
 
 /* Quads between nx by ny vertices from `first` on. */
-static int add_grid(struct grower *g, size_t first, size_t nx, size_t ny)
+static void add_grid(struct grower *g, size_t first, size_t nx, size_t ny)
 {
     for (size_t y = 0; y + 1 < ny; y++)
         for (size_t x = 0; x + 1 < nx; x++) {
             size_t a = first + y * nx + x;
-            if (!add_quad(g, a, a + 1, a + nx, a + nx + 1))
-                return 0;
+            add_quad(g, a, a + 1, a + nx, a + nx + 1);
         }
-    return 1;
 }
 
-static int finish(struct grower *g, int ok, struct pt_builder *b, struct pt_params *p)
+static int finish(struct grower *g, struct pt_builder *b, struct pt_params *p)
 {
     struct pt_soup soup = {.vertex_count = g->vertices,
                            .triangle_count = g->corners / 3,
@@ -66,7 +63,7 @@ static int finish(struct grower *g, int ok, struct pt_builder *b, struct pt_para
                            .nd = g->n,
                            .uvd = g->uv,
                            .indices = g->indices};
-    if (!ok)
+    if (g->failed)
         pt_diag_nomem(&b->diag, "a shape");
     else
         pt_build_mesh(b, p, &soup);
@@ -79,9 +76,11 @@ static int finish(struct grower *g, int ok, struct pt_builder *b, struct pt_para
 
 /* --- bilinear patches ------------------------------------------------------------------------------------------------- */
 
-static double lerp2(const double *c00, const double *c10, const double *c01, const double *c11, double u, double v, size_t k)
+/* Between what four corners have, `size` numbers each. */
+static void lerp2(const double *const c[4], double u, double v, size_t size, double *out)
 {
-    return (1 - v) * ((1 - u) * c00[k] + u * c10[k]) + v * ((1 - u) * c01[k] + u * c11[k]);
+    for (size_t k = 0; k < size; k++)
+        out[k] = (1 - v) * ((1 - u) * c[0][k] + u * c[1][k]) + v * ((1 - u) * c[2][k] + u * c[3][k]);
 }
 
 /* Whether what four corners have, `size` numbers each, runs evenly over the patch, so that two triangles have it exactly. */
@@ -121,7 +120,7 @@ int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
     const double *P = pt_params_floats(p, "P", 3, &vertices), *indices = pt_params_ints(p, "indices", &count);
     const double *uv = pt_params_floats(p, "uv", 2, &uv_count), *N = pt_params_floats(p, "N", 3, &n_count);
     struct grower g = {0};
-    int ok = 1, bent = 0;
+    int bent = 0;
     if (b->diag.rc)
         return b->diag.rc;
     if (!P || (!indices && vertices != 4) || (indices && count % 4 != 0) || (uv && uv_count != vertices) ||
@@ -140,8 +139,8 @@ int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
             c[k] = P + 3 * (size_t)indices[i + k];
         bent |= !is_even(c, 3);
     }
-    for (size_t i = 0; i < count && ok; i += 4) {
-        const double *c[4], *t[4], *n[4] = {NULL, NULL, NULL, NULL};
+    for (size_t i = 0; i < count; i += 4) {
+        const double *c[4], *t[4], *n[4];
         for (size_t k = 0; k < 4; k++) {
             double v = indices[i + k];
             c[k] = P + 3 * (size_t)v;
@@ -149,24 +148,23 @@ int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
             n[k] = N ? N + 3 * (size_t)v : NULL;
         }
         size_t cuts = is_even(c, 3) && is_even(t, 2) && (!N || is_even(n, 3)) ? 1 : 8, first = g.vertices;
-        for (size_t y = 0; y <= cuts && ok; y++)
-            for (size_t x = 0; x <= cuts && ok; x++) {
-                double u = (double)x / (double)cuts, v = (double)y / (double)cuts, q[3], m[3] = {0, 0, 0};
-                for (size_t k = 0; k < 3; k++) {
-                    q[k] = lerp2(c[0], c[1], c[2], c[3], u, v, k);
-                    m[k] = N ? lerp2(n[0], n[1], n[2], n[3], u, v, k) : 0;
-                }
-                if (bent)
+        for (size_t y = 0; y <= cuts; y++)
+            for (size_t x = 0; x <= cuts; x++) {
+                double u = (double)x / (double)cuts, v = (double)y / (double)cuts, q[3], m[3], st[2];
+                lerp2(c, u, v, 3, q);
+                lerp2(t, u, v, 2, st);
+                if (N)
+                    lerp2(n, u, v, 3, m);
+                else
                     patch_normal(c, u, v, m);
-                ok = add_vertex(&g, q, N || bent ? m : NULL, lerp2(t[0], t[1], t[2], t[3], u, v, 0),
-                                lerp2(t[0], t[1], t[2], t[3], u, v, 1));
+                add_vertex(&g, q, N || bent ? m : NULL, st[0], st[1]);
             }
-        ok = ok && add_grid(&g, first, cuts + 1, cuts + 1);
+        add_grid(&g, first, cuts + 1, cuts + 1);
     }
     if (pt_params_find(p, "emissionfilename"))
         pt_params_warn(p, "emissionfilename", "the image of an emitting patch is ignored");
     pt_params_ignore(p, "emissionfilename faceIndices");
-    return finish(&g, ok, b, p);
+    return finish(&g, b, p);
 }
 
 /* --- curves: tubes of six sides --------------------------------------------------------------------------------------- */
@@ -246,25 +244,28 @@ static void turn_frame(struct pt_frame *f, pt_vec3 axis)
     *f = (struct pt_frame){s, v3_cross(axis, s), axis};
 }
 
-/* u runs along the curve, v around it. */
-static int add_ring(struct grower *g, const double p[3], const struct pt_frame *f, double width, double u)
+/* u runs along the curve, v around it. Quads join it to the ring before, unless it is the first of its segment. */
+static void add_ring(struct grower *g, const double p[3], const struct pt_frame *f, double width, double u, int is_first)
 {
+    const size_t before = g->vertices - CURVE_SIDES;
     for (int i = 0; i < CURVE_SIDES; i++) {
         double a = 2 * BASE_PI * i / CURVE_SIDES;
         pt_vec3 out = v3_add(v3_scale(f->s, (float)cos(a)), v3_scale(f->t, (float)sin(a)));
         const double n[3] = {(double)out.x, (double)out.y, (double)out.z};
         const double q[3] = {p[0] + width / 2 * n[0], p[1] + width / 2 * n[1], p[2] + width / 2 * n[2]};
-        if (!add_vertex(g, q, n, u, (double)i / CURVE_SIDES))
-            return 0;
+        add_vertex(g, q, n, u, (double)i / CURVE_SIDES);
     }
-    return 1;
+    for (size_t i = 0; i < CURVE_SIDES && !is_first; i++) {
+        size_t a = before + i, next = before + (i + 1) % CURVE_SIDES;
+        add_quad(g, a, next, a + CURVE_SIDES, next + CURVE_SIDES);
+    }
 }
 
 int pt_build_curve(struct pt_builder *b, struct pt_params *p)
 {
     size_t count;
     const char *basis = pt_params_string(p, "basis", "bezier");
-    int degree = pt_params_int_in(p, "degree", 3, 2, 3), spline = strcmp(basis, "bspline") == 0, ok = 1;
+    int degree = pt_params_int_in(p, "degree", 3, 2, 3), spline = strcmp(basis, "bspline") == 0;
     const double *P = pt_params_floats(p, "P", 3, &count);
     double width = pt_params_float_in(p, "width", 1, 0, 1e30), w0 = pt_params_float_in(p, "width0", width, 0, 1e30),
            w1 = pt_params_float_in(p, "width1", width, 0, 1e30);
@@ -282,14 +283,14 @@ int pt_build_curve(struct pt_builder *b, struct pt_params *p)
     size_t segments = (count - corners) / step + 1;
     pt_vec3 axis = v3(0, 0, 1);
     struct pt_frame frame = {0};
-    for (size_t i = 0; i < segments && ok; i++) {
+    for (size_t i = 0; i < segments && !g.failed; i++) {
         double c[12];
         if (spline)
             spline_to_bezier(P + 3 * i, degree, c);
         else
             memcpy(c, P + 3 * i * step, corners * 3 * sizeof *c);
         /* Each segment has rings of its own, because u is 0 where it begins, as in pbrt. */
-        for (int k = 0; k <= CURVE_CUTS && ok; k++) {
+        for (int k = 0; k <= CURVE_CUTS; k++) {
             double t = (double)k / CURVE_CUTS, v = ((double)i + t) / (double)segments, q[3], d[3] = {0, 0, 0};
             bezier(c, degree, t, q, d);
             direct(c, degree, t, d, &axis);
@@ -297,15 +298,10 @@ int pt_build_curve(struct pt_builder *b, struct pt_params *p)
                 frame = pt_frame_from_normal(axis);
             else
                 turn_frame(&frame, axis);
-            ok = add_ring(&g, q, &frame, (1 - v) * w0 + v * w1, t);
+            add_ring(&g, q, &frame, (1 - v) * w0 + v * w1, t, k == 0);
         }
     }
-    for (size_t ring = 0; ok && (ring + 1) * CURVE_SIDES < g.vertices; ring++)
-        for (size_t i = 0; i < CURVE_SIDES && ok && (ring + 1) % (CURVE_CUTS + 1) != 0; i++) {
-            size_t a = ring * CURVE_SIDES + i, next = ring * CURVE_SIDES + (i + 1) % CURVE_SIDES;
-            ok = add_quad(&g, a, next, a + CURVE_SIDES, next + CURVE_SIDES);
-        }
-    return finish(&g, ok, b, p);
+    return finish(&g, b, p);
 }
 
 /* --- height fields and surfaces of revolution (v3) -------------------------------------------------------------------- */
@@ -313,20 +309,20 @@ int pt_build_curve(struct pt_builder *b, struct pt_params *p)
 int pt_build_height_field(struct pt_builder *b, struct pt_params *p)
 {
     size_t count;
-    int nu = pt_params_int_in(p, "nu", 0, 2, 1 << 14), nv = pt_params_int_in(p, "nv", 0, 2, 1 << 14), ok = 1;
+    int nu = pt_params_int_in(p, "nu", 0, 2, 1 << 14), nv = pt_params_int_in(p, "nv", 0, 2, 1 << 14);
     const double *z = pt_params_floats(p, pt_params_find(p, "Pz") ? "Pz" : "P", 1, &count);
     struct grower g = {0};
     if (b->diag.rc)
         return b->diag.rc;
     if (!z || nu < 2 || nv < 2 || count != (size_t)nu * (size_t)nv)
         return pt_params_fail(p, NULL, "a heightfield needs nu, nv and nu·nv heights");
-    for (int y = 0; y < nv && ok; y++)
-        for (int x = 0; x < nu && ok; x++) {
+    for (int y = 0; y < nv; y++)
+        for (int x = 0; x < nu; x++) {
             const double q[3] = {x / (double)(nu - 1), y / (double)(nv - 1), z[(size_t)y * (size_t)nu + (size_t)x]};
-            ok = add_vertex(&g, q, NULL, q[0], q[1]);
+            add_vertex(&g, q, NULL, q[0], q[1]);
         }
-    ok = ok && add_grid(&g, 0, (size_t)nu, (size_t)nv);
-    return finish(&g, ok, b, p);
+    add_grid(&g, 0, (size_t)nu, (size_t)nv);
+    return finish(&g, b, p);
 }
 
 enum { AROUND = 64, ALONG = 16 };
@@ -342,13 +338,12 @@ int pt_build_revolved(struct pt_builder *b, struct pt_params *p)
     double z0 = fmin(zmin, zmax), z1 = fmax(zmin, zmax);
     double p1[3] = {0, 0, 0}, p2[3] = {1, 1, 1};
     struct grower g = {0};
-    int ok = 1;
     pt_params_point(p, "p1", p1);
     pt_params_point(p, "p2", p2);
     if (!b->diag.rc)
         pt_params_warn(p, NULL, "shape \"%s\" is rendered as %d triangles", kind, (int)(2 * AROUND * ALONG));
-    for (int j = 0; j <= ALONG && ok; j++)
-        for (int i = 0; i <= AROUND && ok; i++) {
+    for (int j = 0; j <= ALONG; j++)
+        for (int i = 0; i <= AROUND; i++) {
             double v = (double)j / ALONG, u = (double)i / AROUND, a = u * phi, c = cos(a), s = sin(a);
             double at[3] = {0, 0, 0}, along[3] = {0, 0, 0}; /* where phi is 0 */
             if (kind[0] == 'h') {
@@ -373,8 +368,8 @@ int pt_build_revolved(struct pt_builder *b, struct pt_params *p)
             const double d[3] = {kind[0] == 'h' ? -q[1] : -s, kind[0] == 'h' ? q[0] : c, 0};
             double n[3];
             cross(d, e, n);
-            ok = add_vertex(&g, q, n, u, v);
+            add_vertex(&g, q, n, u, v);
         }
-    ok = ok && add_grid(&g, 0, AROUND + 1, ALONG + 1);
-    return finish(&g, ok, b, p);
+    add_grid(&g, 0, AROUND + 1, ALONG + 1);
+    return finish(&g, b, p);
 }
