@@ -48,7 +48,7 @@ void pt_params_clear(struct pt_params *params, struct pt_diag *diag, struct pt_l
 {
     params->diag = diag;
     params->loc = loc;
-    params->count = params->number_count = params->string_count = params->text_count = 0;
+    params->count = params->number_count = params->text_count = 0;
     params->kind = pt_params_keep(params, "", 0);
 }
 
@@ -56,7 +56,6 @@ void pt_params_release(struct pt_params *params)
 {
     free(params->items);
     free(params->numbers);
-    free(params->strings);
     free(params->text);
     *params = (struct pt_params){0};
 }
@@ -94,7 +93,7 @@ int pt_param_has(const struct pt_params *params, const struct pt_param *param, s
 
 const char *pt_params_string_at(const struct pt_params *params, const struct pt_param *param, size_t i)
 {
-    return params->text + params->strings[param->first + i];
+    return params->text + (size_t)params->numbers[param->first + i];
 }
 
 /* Tokens are quoted in messages up to this length. */
@@ -157,17 +156,13 @@ static int add_number(struct pt_params *params, struct pt_param *p, double value
         return pt_diag_nomem(params->diag, "parameters");
     params->numbers[params->number_count++] = value;
     p->count++;
-    return 0;
+    return params->diag->rc;
 }
 
-static int add_string(struct pt_params *params, struct pt_param *p, const struct pt_token *t)
+static int add_string(struct pt_params *params, struct pt_param *p, const char *text, size_t length)
 {
-    if (!pt_grow((void **)&params->strings, &params->string_room, params->string_count, sizeof *params->strings))
-        return pt_diag_nomem(params->diag, "parameters");
-    params->strings[params->string_count++] = pt_params_keep(params, t->text, t->length);
     p->is_text = 1;
-    p->count++;
-    return params->diag->rc;
+    return add_number(params, p, (double)pt_params_keep(params, text, length));
 }
 
 static int is_word(const struct pt_token *t, const char *word)
@@ -191,7 +186,7 @@ static int add_value(struct pt_params *params, struct pt_param *p, const struct 
     if (p->type == PT_PARAM_SPECTRUM && p->count > 0 && p->is_text != text)
         return pt_diag_fail(params->diag, t->loc, "\"spectrum %s\" mixes names and numbers", name);
     if (text)
-        return add_string(params, p, t);
+        return add_string(params, p, t->text, t->length);
     double value;
     if (!pt_number_parse(t->text, t->length, &value))
         return pt_diag_fail(params->diag, t->loc, "value of \"%s\" is \"%.*s\" (expected a finite number)", name,
@@ -208,23 +203,18 @@ static int values_end(const struct pt_lexer *lexer, const struct pt_param *p, co
     return d.kind >= 0 && d.name < d.name_end;
 }
 
-/* One value, or several in brackets. Names and numbers are stored apart, and a spectrum may have either. */
+/* One value, or several in brackets. */
 static int read_values(struct pt_params *params, struct pt_lexer *lexer, struct pt_param *p)
 {
     struct pt_token t = pt_lexer_next(lexer);
     if (t.kind == PT_TOKEN_CLOSE || values_end(lexer, p, &t))
         return pt_diag_fail(params->diag, p->loc, "parameter \"%s\" has no value", pt_param_name(params, p));
-    p->first = wants_text(p->type) ? params->string_count : params->number_count;
-    if (t.kind == PT_TOKEN_WORD || t.kind == PT_TOKEN_STRING) {
-        if (t.kind == PT_TOKEN_STRING)
-            p->first = p->type == PT_PARAM_BOOL ? p->first : params->string_count;
+    p->first = params->number_count;
+    if (t.kind == PT_TOKEN_WORD || t.kind == PT_TOKEN_STRING)
         return add_value(params, p, &t);
-    }
     if (t.kind == PT_TOKEN_BAD)
         return params->diag->rc;
     struct pt_loc open = t.loc;
-    if (pt_lexer_peek(lexer).kind == PT_TOKEN_STRING && p->type == PT_PARAM_SPECTRUM)
-        p->first = params->string_count;
     for (;;) {
         t = pt_lexer_next(lexer);
         if (t.kind == PT_TOKEN_CLOSE)
@@ -288,15 +278,13 @@ int pt_params_append(struct pt_params *params, const struct pt_params *from)
         p.inherited = 1;
         p.used = 0;
         p.count = 0;
-        p.first = src->is_text ? params->string_count : params->number_count;
+        p.first = params->number_count;
         for (size_t k = 0; k < src->count && !params->diag->rc; k++) {
-            if (src->is_text) {
-                const char *s = pt_params_string_at(from, src, k);
-                struct pt_token t = {.text = s, .length = strlen(s)};
-                add_string(params, &p, &t);
-            } else {
+            const char *s = src->is_text ? pt_params_string_at(from, src, k) : NULL;
+            if (s)
+                add_string(params, &p, s, strlen(s));
+            else
                 add_number(params, &p, from->numbers[src->first + k]);
-            }
         }
         add_param(params, &p);
     }

@@ -36,7 +36,7 @@ struct pt_param {
     int used;
     int inherited;       /* from an Attribute directive: not an error when unused */
     int colour_space;    /* 1 + enum pt_colour_space, where an Attribute was given; 0: that of the directive */
-    size_t first, count; /* range in numbers, or in strings */
+    size_t first, count; /* range in numbers */
     struct pt_loc loc;
 };
 
@@ -46,10 +46,8 @@ struct pt_params {
     size_t kind;            /* offset in text of what the directive names: "trianglemesh", "diffuse" … */
     struct pt_param *items; /* owns */
     size_t count, room;
-    double *numbers; /* owns */
+    double *numbers; /* owns; of a string its offset in text */
     size_t number_count, number_room;
-    size_t *strings; /* owns: offsets in text */
-    size_t string_count, string_room;
     char *text; /* owns: names and strings, each with its end mark */
     size_t text_count, text_room;
 };

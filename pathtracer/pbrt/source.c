@@ -3,8 +3,6 @@
 #include <limits.h>
 #include <stdint.h>
 #include <stdlib.h>
-#include <string.h>
-#include <strings.h>
 #include <zlib.h>
 
 #include "base/files.h"
@@ -90,42 +88,17 @@ static int note_file(void *data, const char *path, struct base_err *err)
 
 static int read_file(void *data, const char *path, char **bytes, size_t *size, struct base_err *err)
 {
-    char *raw = NULL;
-    size_t n = 0, length = strlen(path);
+    char *packed = NULL;
+    size_t n = 0;
     int rc = note_file(data, path, err);
+    if (!rc && !base_file_has_ending(path, "gz"))
+        return base_file_read(path, max_file_bytes, bytes, size, err);
     if (!rc)
-        rc = base_file_read(path, max_file_bytes, &raw, &n, err);
-    if (rc || length < 3 || strcasecmp(path + length - 3, ".gz") != 0) {
-        if (!rc) {
-            *bytes = raw;
-            *size = n;
-        }
-        return rc;
-    }
-    rc = pt_source_unpack(path, raw, n, bytes, size, err);
-    free(raw);
+        rc = base_file_read(path, max_file_bytes, &packed, &n, err);
+    if (!rc)
+        rc = pt_source_unpack(path, packed, n, bytes, size, err);
+    free(packed);
     return rc;
 }
 
 struct pt_source pt_source_files(struct base_inputs *inputs) { return (struct pt_source){read_file, note_file, inputs, 1}; }
-
-static int read_single(void *data, const char *path, char **bytes, size_t *size, struct base_err *err)
-{
-    const struct pt_source_single *single = data;
-    if (strcmp(path, single->path) != 0)
-        return base_fail(err, BASE_EIO, "%s: No such file or directory", path);
-    char *copy = malloc(single->size + 1);
-    if (!copy)
-        return base_fail_nomem(err, path);
-    if (single->size > 0)
-        memcpy(copy, single->text, single->size);
-    copy[single->size] = '\0';
-    *bytes = copy;
-    *size = single->size;
-    return 0;
-}
-
-struct pt_source pt_source_from_memory(const struct pt_source_single *single)
-{
-    return (struct pt_source){read_single, NULL, (void *)(uintptr_t)single, 0};
-}

@@ -1,6 +1,4 @@
-/*
- * Where the bytes of scene files come from: the disk, or memory in tests and fuzzers.
- */
+/* Where the bytes of scene files come from: the disk, or memory in tests and fuzzers. */
 #ifndef PT_PBRT_SOURCE_H
 #define PT_PBRT_SOURCE_H
 
@@ -26,12 +24,5 @@ struct pt_source pt_source_files(struct base_inputs *inputs);
  * something else follows the last. */
 int pt_source_unpack(const char *name, const char *packed, size_t packed_size, char **bytes, size_t *size,
                      struct base_err *err);
-
-/* A file system of one file, `path` with text[0, size), that it borrows; every other path does not exist. */
-struct pt_source_single {
-    const char *path, *text;
-    size_t size;
-};
-struct pt_source pt_source_from_memory(const struct pt_source_single *single);
 
 #endif

@@ -11,6 +11,7 @@
 #include "pbrt/build.h"
 #include "pbrt/ply.h"
 #include "support/fail_alloc.h"
+#include "support/pt_memory_source.h"
 
 static const char text[] =
     "Film \"rgb\" \"integer xresolution\" 8 Camera \"perspective\" WorldBegin\n"

@@ -16,6 +16,7 @@
 #include "sequence/manifest.h"
 #include "support/pt_fake.h"
 #include "support/pt_identity.h"
+#include "support/pt_memory_source.h"
 
 static const char settings[] = "seed=1\n";
 

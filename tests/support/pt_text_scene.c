@@ -12,6 +12,7 @@
 
 #include "pbrt/load.h"
 #include "support/pt_captured.h"
+#include "support/pt_memory_source.h"
 
 static int load(const char *text, int strict, int *warnings, struct pt_scene **scene, struct pt_scene_defaults *defaults,
                 struct base_err *err)
