@@ -201,23 +201,22 @@ static int is_spectrum(const struct pt_param *param)
 void pt_build_conductor(struct pt_builder *b, struct pt_params *p, const char *eta_name, const char *k_name,
                         pt_vec3 *eta_rgb, pt_vec3 *k_rgb)
 {
-    struct pt_param *eta = pt_params_find(p, eta_name), *k = pt_params_find(p, k_name);
-    struct pt_spd eta_spd, k_spd;
-    pt_spd_named("metal-Cu-eta", &eta_spd);
-    pt_spd_named("metal-Cu-k", &k_spd);
-    if (eta)
-        eta->used = 1;
-    if (k)
-        k->used = 1;
-    if (is_spectrum(eta))
-        read_spectrum(b, p, eta, 1, &eta_spd);
-    if (is_spectrum(k))
-        read_spectrum(b, p, k, 1, &k_spd);
-    pt_spd_conductor_rgb(&eta_spd, &k_spd, eta_rgb, k_rgb);
-    if (eta && !is_spectrum(eta))
-        pt_build_colour(b, p, eta_name, PT_USE_UNBOUNDED, eta_rgb);
-    if (k && !is_spectrum(k))
-        pt_build_colour(b, p, k_name, PT_USE_UNBOUNDED, k_rgb);
+    static const char *const copper[2] = {"metal-Cu-eta", "metal-Cu-k"};
+    const char *const names[2] = {eta_name, k_name};
+    pt_vec3 *const rgb[2] = {eta_rgb, k_rgb};
+    struct pt_spd spd[2];
+    for (int i = 0; i < 2; i++) {
+        struct pt_param *param = pt_params_find(p, names[i]);
+        pt_spd_named(copper[i], &spd[i]);
+        if (is_spectrum(param)) {
+            param->used = 1;
+            read_spectrum(b, p, param, 1, &spd[i]);
+        }
+    }
+    pt_spd_conductor_rgb(&spd[0], &spd[1], eta_rgb, k_rgb);
+    for (int i = 0; i < 2; i++)
+        if (!is_spectrum(pt_params_find(p, names[i])))
+            pt_build_colour(b, p, names[i], PT_USE_UNBOUNDED, rgb[i]);
     /* An index of 0 divides by zero in Fresnel's equations. */
     *eta_rgb = v3_most(*eta_rgb, v3_splat(1e-3f));
 }

@@ -88,14 +88,9 @@ static void set_crop(struct pt_builder *b, struct pt_params *p, const int file_s
             edges[i] = bounds[i] / file_size[i / 2];
     sort_pair(edges);
     sort_pair(edges + 2);
-    int at[4];
-    for (int i = 0; i < 4; i++)
-        at[i] = (int)ceil(fmin(fmax(edges[i], 0), 1) * size[i / 2] - 1e-6);
-    d->crop[0] = at[0];
-    d->crop[1] = at[2];
-    d->crop[2] = at[1];
-    d->crop[3] = at[3];
-    if (at[0] >= at[1] || at[2] >= at[3])
+    for (int i = 0; i < 4; i++) /* x0 x1 y0 y1 there, x0 y0 x1 y1 here */
+        d->crop[i % 2 * 2 + i / 2] = (int)ceil(fmin(fmax(edges[i], 0), 1) * size[i / 2] - 1e-6);
+    if (d->crop[0] >= d->crop[2] || d->crop[1] >= d->crop[3])
         pt_params_fail(p, window ? "cropwindow" : "pixelbounds",
                        "the crop window holds no pixel (expected x0 < x1 and y0 < y1 in it)");
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "base/options.h"
 #include "pbrt/number.h"
 #include "scene/arena.h"
 
@@ -47,6 +48,7 @@ struct reader {
     uint64_t vertex_total; /* that the header promises: faces may come first */
     size_t index_room;
     int has[R_CORNER_UVS + 1];
+    float *column[R_V + 1]; /* where the first vertex's value of a role goes, NULL: nowhere */
 };
 
 /* --- header ----------------------------------------------------------------------------------------------------------- */
@@ -158,7 +160,8 @@ static int read_header(struct reader *r)
     struct element *e = NULL;
     int has_format = 0;
     const uint16_t probe = 1;
-    const int little = *(const uint8_t *)&probe == 1;
+    const int is_big = *(const uint8_t *)&probe == 0;
+    static const char *const formats[] = {"binary_little_endian", "binary_big_endian", "ascii", NULL};
     r->newline = newline_of(r->at, r->end);
     if (!next_line(r, line, sizeof line) || strcmp(line, "ply") != 0)
         return base_fail(r->err, BASE_EINVAL, "%s: not a PLY file", r->name);
@@ -169,10 +172,11 @@ static int read_header(struct reader *r)
         if (strcmp(words[0], "end_header") == 0)
             return has_format ? 0 : base_fail(r->err, BASE_EINVAL, "%s: PLY header without a format", r->name);
         if (strcmp(words[0], "format") == 0 && n >= 2) {
+            const int format = base_word_index(formats, words[1], strlen(words[1]));
             has_format = 1;
-            r->ascii = strcmp(words[1], "ascii") == 0;
-            r->swap = strcmp(words[1], little ? "binary_big_endian" : "binary_little_endian") == 0;
-            if (!r->ascii && !r->swap && strcmp(words[1], little ? "binary_little_endian" : "binary_big_endian") != 0)
+            r->ascii = format == 2;
+            r->swap = format != is_big;
+            if (format < 0)
                 rc = base_fail(r->err, BASE_EINVAL, "%s: unknown PLY format \"%.30s\"", r->name, words[1]);
         } else if (strcmp(words[0], "element") == 0) {
             rc = read_element(r, words, n);
@@ -263,30 +267,13 @@ static int read_value(struct reader *r, enum ply_type type, double *out)
 
 /* --- elements --------------------------------------------------------------------------------------------------------- */
 
-static int store_vertex_value(struct reader *r, uint64_t i, enum role role, double v)
+static int store_vertex_value(struct reader *r, uint64_t i, enum role role, float v)
 {
-    struct pt_ply *p = r->ply;
-    switch (role) {
-    case R_X:
-    case R_Y:
-    case R_Z:
-        if (!isfinite((float)v))
-            return base_fail(r->err, BASE_EINVAL, "%s: vertex %llu is not finite", r->name, (unsigned long long)i);
-        p->positions[3 * i + (uint64_t)(role - R_X)] = (float)v;
-        break;
-    case R_NX:
-    case R_NY:
-    case R_NZ:
-        if (p->normals)
-            p->normals[3 * i + (uint64_t)(role - R_NX)] = (float)v;
-        break;
-    case R_U:
-    case R_V:
-        if (p->uvs)
-            p->uvs[2 * i + (uint64_t)(role - R_U)] = isfinite((float)v) ? (float)v : 0.0f;
-        break;
-    default: break;
-    }
+    const int is_uv = role >= R_U;
+    if (role <= R_Z && !isfinite(v))
+        return base_fail(r->err, BASE_EINVAL, "%s: vertex %llu is not finite", r->name, (unsigned long long)i);
+    if (r->column[role])
+        r->column[role][i * (is_uv ? 2 : 3)] = is_uv && !isfinite(v) ? 0.0f : v;
     return 0;
 }
 
@@ -346,17 +333,24 @@ static size_t least_bytes(const struct reader *r, const struct element *e)
 static int begin_vertices(struct reader *r, const struct element *e)
 {
     struct pt_ply *p = r->ply;
+    const struct {
+        int role, size;
+        float **array;
+    } kinds[] = {{R_X, 3, &p->positions}, {R_NX, 3, &p->normals}, {R_U, 2, &p->uvs}};
     if (!r->has[R_X] || !r->has[R_Y] || !r->has[R_Z])
         return base_fail(r->err, BASE_EINVAL, "%s: PLY vertices without x, y and z", r->name);
     if (e->count > INT32_MAX)
         return base_fail(r->err, BASE_EINVAL, "%s: %llu vertices are too many", r->name, (unsigned long long)e->count);
-    const size_t n = e->count > 0 ? (size_t)e->count : 1;
-    const int has_normals = r->has[R_NX] && r->has[R_NY] && r->has[R_NZ], has_uvs = r->has[R_U] && r->has[R_V];
-    p->positions = calloc(n, 3 * sizeof(float));
-    p->normals = has_normals ? calloc(n, 3 * sizeof(float)) : NULL;
-    p->uvs = has_uvs ? calloc(n, 2 * sizeof(float)) : NULL;
-    if (!p->positions || (has_normals && !p->normals) || (has_uvs && !p->uvs))
-        return base_fail_nomem(r->err, r->name);
+    for (int i = 0; i < 3; i++) {
+        const int role = kinds[i].role, size = kinds[i].size;
+        if (!r->has[role] || !r->has[role + 1] || !r->has[role + size - 1])
+            continue;
+        float *array = *kinds[i].array = calloc(e->count > 0 ? (size_t)e->count : 1, (size_t)size * sizeof *array);
+        if (!array)
+            return base_fail_nomem(r->err, r->name);
+        for (int k = 0; k < size; k++)
+            r->column[role + k] = array + k;
+    }
     p->vertex_count = (uint32_t)e->count;
     return 0;
 }
@@ -375,8 +369,8 @@ static int read_items(struct reader *r, const struct element *e)
             double v;
             if (p->count_type != T_NONE)
                 rc = read_list(r, p);
-            else if ((rc = read_value(r, p->type, &v)) == 0 && is_vertex)
-                rc = store_vertex_value(r, i, p->role, v);
+            else if ((rc = read_value(r, p->type, &v)) == 0 && is_vertex && p->role != R_SKIP)
+                rc = store_vertex_value(r, i, p->role, (float)v);
             if (rc)
                 return rc;
         }

@@ -23,17 +23,15 @@ struct topology {
 };
 
 struct edge {
-    uint32_t low, high;
+    uint64_t ends; /* the lower vertex, then the higher */
     int32_t half;
 };
 
 static int compare_edges(const void *a, const void *b)
 {
     const struct edge *x = a, *y = b;
-    if (x->low != y->low)
-        return x->low < y->low ? -1 : 1;
-    if (x->high != y->high)
-        return x->high < y->high ? -1 : 1;
+    if (x->ends != y->ends)
+        return x->ends < y->ends ? -1 : 1;
     return x->half < y->half ? -1 : x->half > y->half;
 }
 
@@ -53,12 +51,12 @@ static int build_topology(const struct mesh *m, struct topology *t)
     }
     for (size_t i = 0; i < n; i++) {
         uint32_t a = m->v[i], b = m->v[next_half((int32_t)i)];
-        edges[i] = (struct edge){a < b ? a : b, a < b ? b : a, (int32_t)i};
+        edges[i] = (struct edge){(uint64_t)(a < b ? a : b) << 32 | (a < b ? b : a), (int32_t)i};
         t->twin[i] = -1;
     }
     qsort(edges, n, sizeof *edges, compare_edges);
     for (size_t i = 0; i + 1 < n; i++)
-        if (edges[i].low == edges[i + 1].low && edges[i].high == edges[i + 1].high) {
+        if (edges[i].ends == edges[i + 1].ends) {
             t->twin[edges[i].half] = edges[i + 1].half;
             t->twin[edges[i + 1].half] = edges[i].half;
             i++;
@@ -116,16 +114,18 @@ static void weighted_boundary(const struct mesh *m, size_t v, uint32_t a, uint32
         out[k] = (1 - 2 * beta) * m->p[3 * v + k] + beta * (m->p[3 * (size_t)a + k] + m->p[3 * (size_t)b + k]);
 }
 
-static void even_vertex(const struct mesh *m, const struct topology *t, size_t v, double out[3])
+/* Where vertex v goes on the next level, or on the limit surface; gives its ring as ring_of does. */
+static int move_vertex(const struct mesh *m, const struct topology *t, size_t v, int to_limit, uint32_t ring[RING_MAX],
+                       int *boundary, double out[3])
 {
-    uint32_t ring[RING_MAX];
-    int boundary, count = ring_of(m, t, v, ring, &boundary);
+    const int count = ring_of(m, t, v, ring, boundary);
     if (count < 2)
         memcpy(out, m->p + 3 * v, 3 * sizeof *out);
-    else if (boundary)
-        weighted_boundary(m, v, ring[0], ring[count - 1], 1.0 / 8, out);
+    else if (*boundary)
+        weighted_boundary(m, v, ring[0], ring[count - 1], to_limit ? 1.0 / 5 : 1.0 / 8, out);
     else
-        weighted_ring(m, v, ring, count, count == 6 ? 1.0 / 16 : loop_beta(count), out);
+        weighted_ring(m, v, ring, count, to_limit ? 1 / (count + 3 / (8 * loop_beta(count))) : loop_beta(count), out);
+    return count;
 }
 
 static void odd_vertex(const struct mesh *m, const struct topology *t, int32_t h, double out[3])
@@ -155,8 +155,11 @@ static int subdivide(struct mesh *m)
         r.v = malloc(r.triangles * 3 * sizeof *r.v);
         ok = r.p && r.v;
     }
-    for (size_t i = 0; ok && i < m->vertices; i++)
-        even_vertex(m, &t, i, r.p + 3 * i);
+    for (size_t i = 0; ok && i < m->vertices; i++) {
+        uint32_t ring[RING_MAX];
+        int boundary;
+        move_vertex(m, &t, i, 0, ring, &boundary, r.p + 3 * i);
+    }
     size_t at = m->vertices;
     /* Of the two halves of an edge the later one finds the vertex that the earlier one made. */
     for (size_t h = 0; ok && h < halves; h++) {
@@ -220,15 +223,9 @@ static double *to_limit(struct mesh *m)
     int ok = normals && p && build_topology(m, &t);
     for (size_t v = 0; ok && v < m->vertices; v++) {
         uint32_t ring[RING_MAX];
-        int boundary, count = ring_of(m, &t, v, ring, &boundary);
-        memcpy(p + 3 * v, m->p + 3 * v, 3 * sizeof *p);
-        if (count < 2)
-            continue;
-        if (boundary)
-            weighted_boundary(m, v, ring[0], ring[count - 1], 1.0 / 5, p + 3 * v);
-        else
-            weighted_ring(m, v, ring, count, 1 / (count + 3 / (8 * (count == 6 ? 1.0 / 16 : loop_beta(count)))), p + 3 * v);
-        limit_normal(m, ring, count, boundary, v, normals + 3 * v);
+        int boundary, count = move_vertex(m, &t, v, 1, ring, &boundary, p + 3 * v);
+        if (count >= 2)
+            limit_normal(m, ring, count, boundary, v, normals + 3 * v);
     }
     free(t.twin);
     free(t.start);
