@@ -2,7 +2,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/colour.h"
 #include "base/pi.h"
 #include "pbrt/build.h"
 #include "shade/texture.h"
@@ -144,19 +143,15 @@ static int32_t float_rgb(struct pt_builder *b, int32_t id)
         ready = ((const float *)map.pixels)[i] >= 0;
     if (ready)
         return id;
-    float *pixels = pt_arena_alloc(&b->scene->arena, n, 3 * sizeof *pixels);
+    pt_vec3 *pixels = pt_arena_alloc(&b->scene->arena, n, sizeof *pixels);
     if (!pixels) {
         pt_diag_nomem(&b->diag, "an environment map");
         return -1;
     }
     for (size_t i = 0; i < n; i++)
-        for (int k = 0; k < 3; k++) {
-            size_t at = i * (size_t)map.channels + (size_t)(map.channels >= 3 ? k : 0);
-            float v = map.type == PT_PIXEL_FLOAT     ? ((const float *)map.pixels)[at]
-                      : map.type == PT_PIXEL_U8_SRGB ? base_srgb_linear_f32[((const uint8_t *)map.pixels)[at]]
-                                                     : (float)((const uint8_t *)map.pixels)[at] / 255.0f;
-            pixels[3 * i + (size_t)k] = fmaxf(v, 0);
-        }
+        pixels[i] =
+            v3_most(pt_image_texel(&map, PT_WRAP_CLAMP, PT_CHANNEL_RGB, (int64_t)i % map.width, (int64_t)i / map.width),
+                    v3_splat(0));
     map.type = PT_PIXEL_FLOAT;
     map.channels = 3;
     map.pixels = pixels;

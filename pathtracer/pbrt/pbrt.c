@@ -81,7 +81,7 @@ static int push(struct parser *p)
 {
     const struct frame f = {p->state, p->directive->block, p->loc, p->b->name_undo.count};
     if (p->frames.count >= STATE_DEPTH)
-        return pt_diag_fail(&p->b->diag, p->loc, "blocks nested more than %d deep", STATE_DEPTH);
+        return pt_parser_fail(p, "blocks nested more than %d deep", STATE_DEPTH);
     if (pt_list_add(p->b, &p->frames, &f) < 0)
         return p->b->diag.rc;
     p->b->name_scopes += has_names(p, f.kind);
@@ -99,12 +99,12 @@ static const struct frame *innermost(const struct parser *p)
     return p->frames.count > 0 ? (const struct frame *)p->frames.items + p->frames.count - 1 : NULL;
 }
 
-static int fail_open(struct parser *p, const char *name)
+static int fail_open(struct parser *p)
 {
     const struct frame *top = innermost(p);
     const int elsewhere = strcmp(top->loc.file, p->loc.file) != 0;
-    return pt_diag_fail(&p->b->diag, p->loc, "%s where the %s of %s%s%d is still open", name, begin_name(top->kind),
-                        elsewhere ? top->loc.file : "line ", elsewhere ? ":" : "", top->loc.line);
+    return pt_parser_fail(p, "%s where the %s of %s%s%d is still open", p->directive->name, begin_name(top->kind),
+                          elsewhere ? top->loc.file : "line ", elsewhere ? ":" : "", top->loc.line);
 }
 
 /* In pbrt-v3 an object is an attribute block, too, and the end of either closes the one that was opened last. */
@@ -119,13 +119,13 @@ static int pop(struct parser *p)
     const char kind = p->directive->block, *end_name = p->directive->name;
     const struct frame *top = innermost(p);
     if (!top && p->b->is_v3) { /* pbrt-v3 says so and goes on */
-        pt_diag_warn(&p->b->diag, p->loc, "%s without %s is ignored", end_name, begin_name(kind));
+        pt_parser_warn(p, "%s without %s is ignored", end_name, begin_name(kind));
         return p->b->diag.rc;
     }
     if (!top || top->kind == 'I')
-        return pt_diag_fail(&p->b->diag, p->loc, "%s without %s", end_name, begin_name(kind));
+        return pt_parser_fail(p, "%s without %s", end_name, begin_name(kind));
     if (!closes(p, kind, top->kind))
-        return fail_open(p, end_name);
+        return fail_open(p);
     /* In v4 TransformBegin is an old name of AttributeBegin, which belongs into the world. */
     if (kind == 'T' && (p->b->is_v3 || !p->in_world)) {
         memcpy(p->state.ctm, top->state.ctm, sizeof p->state.ctm);
@@ -150,7 +150,7 @@ static int do_object_begin(struct parser *p)
 static int do_object_end(struct parser *p)
 {
     if (p->b->open_object < 0)
-        return pt_diag_fail(&p->b->diag, p->loc, "ObjectEnd without ObjectBegin");
+        return pt_parser_fail(p, "ObjectEnd without ObjectBegin");
     int rc = pop(p);
     if (!rc)
         p->b->open_object = -1;
@@ -172,7 +172,7 @@ static int do_header(struct parser *p)
     static const char *const names[PT_HEADER_COUNT] = {"Film", "Camera", "Sampler", "Integrator", "PixelFilter"};
     const enum pt_header which = p->directive->header;
     if (p->in_world)
-        return pt_diag_fail(&p->b->diag, p->loc, "%s after WorldBegin", names[which]);
+        return pt_parser_fail(p, "%s after WorldBegin", names[which]);
     int rc = read_entity(p, -1);
     if (rc)
         return rc;
@@ -200,7 +200,7 @@ static int do_camera(struct parser *p)
     p->b->camera_medium = p->state.medium_out;
     for (int i = 0; i < 2; i++)
         if (!pt_xform_invert(&p->state.ctm[i], &inverse[i]))
-            return pt_diag_fail(&p->b->diag, p->loc, "the camera's transform is singular");
+            return pt_parser_fail(p, "the camera's transform is singular");
     return pt_parser_save_system(p, "camera", inverse);
 }
 
@@ -214,9 +214,9 @@ static int do_accelerator(struct parser *p)
 static int do_world_begin(struct parser *p)
 {
     if (p->in_world)
-        return pt_diag_fail(&p->b->diag, p->loc, "WorldBegin occurs twice");
+        return pt_parser_fail(p, "WorldBegin occurs twice");
     if (innermost(p))
-        return fail_open(p, "WorldBegin");
+        return fail_open(p);
     p->in_world = 1;
     p->state.ctm[0] = p->state.ctm[1] = pt_xform_identity();
     p->state.active = 3;
@@ -227,7 +227,7 @@ static int do_world_begin(struct parser *p)
 static int do_world_end(struct parser *p)
 {
     p->ended = 1;
-    return innermost(p) && !p->b->is_v3 ? fail_open(p, "WorldEnd") : 0;
+    return innermost(p) && !p->b->is_v3 ? fail_open(p) : 0;
 }
 
 /* --- world ------------------------------------------------------------------------------------------------------------ */
@@ -256,7 +256,7 @@ static int do_make_named_material(struct parser *p)
 {
     const char *name = pt_params_kind(&p->params), *type = pt_params_string(&p->params, "type", NULL);
     if (!type)
-        return pt_diag_fail(&p->b->diag, p->loc, "MakeNamedMaterial \"%s\" without \"string type\"", name);
+        return pt_parser_fail(p, "MakeNamedMaterial \"%s\" without \"string type\"", name);
     return pt_build_make_named_material(p->b, name, type, &p->params);
 }
 
@@ -298,8 +298,7 @@ static int do_attribute(struct parser *p)
     const char *kind = pt_params_kind(&p->params);
     int rc, target = base_word_index(targets, kind, strlen(kind));
     if (target < 0)
-        return pt_diag_fail(&p->b->diag, p->loc, "Attribute \"%s\" (expected shape, light, material, medium or texture)",
-                            kind);
+        return pt_parser_fail(p, "Attribute \"%s\" (expected shape, light, material, medium or texture)", kind);
     for (size_t i = 0; i < p->params.count; i++)
         p->params.items[i].colour_space = 1 + p->state.colour_space;
     /* New values win over those set before. */
@@ -323,8 +322,7 @@ static int do_color_space(struct parser *p)
         return rc;
     int space = pt_colour_space_named(name);
     if (space < 0)
-        return pt_diag_fail(&p->b->diag, p->loc,
-                            "unknown colour space \"%s\" (expected srgb, dci-p3, rec2020 or aces2065-1)", name);
+        return pt_parser_fail(p, "unknown colour space \"%s\" (expected srgb, dci-p3, rec2020 or aces2065-1)", name);
     p->state.colour_space = space;
     return 0;
 }
@@ -368,10 +366,10 @@ static int read_option(struct parser *p)
     if (strcmp(plain, "seed") == 0)
         return read_option_value(p, name, &p->b->defaults->integrator.seed);
     if (!pt_name_is_in(known, plain))
-        return pt_diag_fail(&p->b->diag, p->loc, "unknown option \"%.40s\"", name);
+        return pt_parser_fail(p, "unknown option \"%.40s\"", name);
     rc = read_option_value(p, name, NULL);
     if (!rc)
-        pt_diag_warn(&p->b->diag, p->loc, "Option \"%s\" is ignored", name);
+        pt_parser_warn(p, "Option \"%s\" is ignored", name);
     return rc ? rc : p->b->diag.rc;
 }
 
@@ -441,25 +439,22 @@ static const struct directive directives[] = {
     {0},
 };
 
-static const struct directive *find_directive(const struct directive *list, const struct pt_token *t)
+static const struct directive *find_directive(const struct pt_token *t)
 {
-    for (; list->name && t->kind == PT_TOKEN_WORD; list++)
-        if (strlen(list->name) == t->length && memcmp(list->name, t->text, t->length) == 0)
-            return list;
+    const struct directive *const lists[] = {directives, pt_transform_directives};
+    for (int i = 0; i < 2 && t->kind == PT_TOKEN_WORD; i++)
+        for (const struct directive *d = lists[i]; d->name; d++)
+            if (strlen(d->name) == t->length && memcmp(d->name, t->text, t->length) == 0)
+                return d;
     return NULL;
 }
 
-static int is_directive(const struct pt_token *t)
-{
-    return find_directive(directives, t) || find_directive(pt_transform_directives, t);
-}
+static int is_directive(const struct pt_token *t) { return find_directive(t) != NULL; }
 
 static int run_directive(struct parser *p, const struct pt_token *t)
 {
     p->loc = t->loc;
-    const struct directive *d = find_directive(directives, t);
-    if (!d)
-        d = find_directive(pt_transform_directives, t);
+    const struct directive *d = find_directive(t);
     if (!d)
         return pt_diag_fail(&p->b->diag, t->loc, "unknown directive \"%.*s\" (expected Shape, Material, AttributeBegin …)",
                             t->length < 40 ? (int)t->length : 40, t->text);

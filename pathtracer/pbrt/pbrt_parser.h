@@ -55,6 +55,9 @@ struct directive {
     int replaces; /* the transform instead of adding to it */
 };
 
+/* Messages with the place of the directive. */
+#define pt_parser_fail(p, ...) pt_diag_fail(&(p)->b->diag, (p)->loc, __VA_ARGS__)
+#define pt_parser_warn(p, ...) pt_diag_warn(&(p)->b->diag, (p)->loc, __VA_ARGS__)
 /* Names a coordinate system. */
 int pt_parser_save_system(struct parser *p, const char *name, const struct pt_xform ctm[2]);
 /* The directives that concern transforms; ends with {0}. */

@@ -13,7 +13,7 @@ static int concat(struct parser *p, const struct pt_xform *t)
         struct pt_xform next = p->directive->replaces ? *t : pt_xform_mul(&p->state.ctm[i], t);
         for (int k = 0; k < 12; k++)
             if (!isfinite(next.m[k / 4][k % 4]))
-                return pt_diag_fail(&p->b->diag, p->loc, "the transform is out of range (expected finite numbers)");
+                return pt_parser_fail(p, "the transform is out of range (expected finite numbers)");
         p->state.ctm[i] = next;
     }
     return 0;
@@ -41,7 +41,7 @@ static int do_rotate(struct parser *p)
 {
     const double *v = p->numbers;
     if (v[1] == 0 && v[2] == 0 && v[3] == 0)
-        return pt_diag_fail(&p->b->diag, p->loc, "Rotate about the axis 0 0 0 (expected a direction)");
+        return pt_parser_fail(p, "Rotate about the axis 0 0 0 (expected a direction)");
     const struct pt_xform t = pt_xform_rotate(v[0], v[1], v[2], v[3]);
     return concat(p, &t);
 }
@@ -50,8 +50,7 @@ static int do_look_at(struct parser *p)
 {
     struct pt_xform t;
     if (!pt_xform_look_at(p->numbers, p->numbers + 3, p->numbers + 6, &t))
-        return pt_diag_fail(&p->b->diag, p->loc,
-                            "LookAt is degenerate (expected eye and target apart, up not along the view)");
+        return pt_parser_fail(p, "LookAt is degenerate (expected eye and target apart, up not along the view)");
     return concat(p, &t);
 }
 
@@ -59,8 +58,7 @@ static int do_transform(struct parser *p)
 {
     struct pt_xform t;
     if (!pt_xform_from16(p->numbers, &t))
-        return pt_diag_fail(&p->b->diag, p->loc, "%s is not affine (expected 0 0 0 1 as every fourth number)",
-                            p->directive->name);
+        return pt_parser_fail(p, "%s is not affine (expected 0 0 0 1 as every fourth number)", p->directive->name);
     return concat(p, &t);
 }
 
@@ -78,7 +76,7 @@ static int do_coord_sys_transform(struct parser *p)
 {
     const int32_t id = pt_names_get(&p->system_names, p->name);
     if (id < 0) { /* pbrt says so and goes on */
-        pt_diag_warn(&p->b->diag, p->loc, "unknown coordinate system \"%s\": the transform stays", p->name);
+        pt_parser_warn(p, "unknown coordinate system \"%s\": the transform stays", p->name);
         return p->b->diag.rc;
     }
     const struct pt_xform(*systems)[2] = p->systems.items;
@@ -104,7 +102,7 @@ static int do_active_transform(struct parser *p)
 static int do_transform_times(struct parser *p)
 {
     if (p->in_world || !(p->numbers[1] >= p->numbers[0]))
-        return pt_diag_fail(&p->b->diag, p->loc, "TransformTimes must come before WorldBegin, start before end");
+        return pt_parser_fail(p, "TransformTimes must come before WorldBegin, start before end");
     memcpy(p->b->transform_times, p->numbers, sizeof p->b->transform_times);
     return 0;
 }
