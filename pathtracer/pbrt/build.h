@@ -167,31 +167,12 @@ struct pt_input pt_input_mix(struct pt_builder *b, struct pt_input x, struct pt_
 /* The luminance of colours, exact for images and what is mixed of them by a number. */
 struct pt_input pt_input_luminance(struct pt_builder *b, struct pt_input in);
 
-/* build_material.c, build_material_v3.c: id, or -1. */
+/* build_material.c: id, or -1. */
 int32_t pt_build_material(struct pt_builder *b, const char *kind, struct pt_params *p);
 int32_t pt_build_default_material(struct pt_builder *b);
 /* v3: parameters of a shape that are of its material (`id`, -1: the default) go before the material's own. Marks them as
  * used; the id of the material with them, `id` when there are none, -1 after a failure. */
 int32_t pt_build_shape_material(struct pt_builder *b, int32_t id, struct pt_params *shape);
-/* A material while its parameters are read. */
-struct pt_making {
-    struct pt_builder *b;
-    struct pt_params *p;
-    const char *kind;
-    struct pt_material *m;
-    struct pt_material_info *info;
-};
-/* v3 kinds, and what stands in for kinds that are not simulated; 0 when making->kind is none of them. */
-int pt_build_material_v3(struct pt_making *making);
-/* A reflectance that may be textured; the fallback, grey, when absent. */
-struct pt_input pt_build_reflectance(struct pt_making *making, const char *name, float fallback);
-void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallback, int v3_rule, struct pt_material *m);
-/* Number of the displacement texture, 0 = none. */
-int32_t pt_build_bump(struct pt_builder *b, struct pt_params *p, const char *name);
-/* For a mix whose materials and amount are read: what of them lets rays through becomes its opacity. */
-void pt_build_mix_opacity(struct pt_making *making);
-/* A material of a mix by its name, made before; -1 after a failure. */
-int32_t pt_build_material_named(struct pt_builder *b, struct pt_loc loc, const char *name);
 /* The material of NamedMaterial, `before` where a v3 scene names none. v4 may make it further down. -1 after a failure. */
 int32_t pt_build_named_material(struct pt_builder *b, struct pt_loc loc, const char *name, int32_t before);
 /* MakeNamedMaterial. */

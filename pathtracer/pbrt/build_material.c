@@ -1,4 +1,4 @@
-/* Materials of pbrt-v4: the scattering models by their tables, mix and interface. */
+/* Materials: pbrt-v4's by the tables of the scattering models, pbrt-v3's in their terms, and what stands in for the rest. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,33 +8,44 @@
 #include "pbrt/build.h"
 #include "shade/bsdf_models.h"
 
-/* pbrt-v3's fit from perceived roughness to GGX alpha (TrowbridgeReitzDistribution::RoughnessToAlpha). */
+/* A material while its parameters are read. */
+struct making {
+    struct pt_builder *b;
+    struct pt_params *p;
+    const char *kind;
+    struct pt_material *m;
+    struct pt_material_info *info;
+};
+
+/* pbrt-v3's fit from perceived roughness to GGX alpha (TrowbridgeReitzDistribution::RoughnessToAlpha); it keeps 0 as a smooth
+ * surface. */
 static double v3_alpha(double roughness)
 {
     double x = log(fmax(roughness, 1e-3));
-    return 1.62142 + x * (0.819955 + x * (0.1734 + x * (0.0171201 + x * 0.000640711)));
+    return roughness <= 0 ? 0 : 1.62142 + x * (0.819955 + x * (0.1734 + x * (0.0171201 + x * 0.000640711)));
 }
 
-static void read_roughness(struct pt_builder *b, struct pt_params *p, const char *prefix, double fallback,
-                           struct pt_input *u, struct pt_input *v)
+static void read_roughness(struct making *c, const char *prefix, double fallback, struct pt_input *u, struct pt_input *v)
 {
     char name[48];
     const char *const suffix[3] = {"roughness", "uroughness", "vroughness"};
     struct pt_input values[3];
     for (int i = 0; i < 3; i++) {
         snprintf(name, sizeof name, "%s%s", prefix, suffix[i]);
-        const struct pt_param *given = pt_params_find(p, name);
-        values[i] = i > 0 && !given ? values[0] : pt_build_float_input(b, p, name, fallback);
+        const struct pt_param *given = pt_params_find(c->p, name);
+        values[i] = i > 0 && !given ? values[0] : pt_build_float_input(c->b, c->p, name, fallback);
         if (given && !values[i].texture && values[i].value.x < 0)
-            pt_diag_fail(&b->diag, given->loc, "\"%s\" is %g (expected 0 or more)", name, (double)values[i].value.x);
+            pt_diag_fail(&c->b->diag, given->loc, "\"%s\" is %g (expected 0 or more)", name, (double)values[i].value.x);
     }
     *u = values[1];
     *v = values[2];
 }
 
-void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallback, int v3_rule, struct pt_material *m)
+static void read_surface_roughness(struct making *c, const char *prefix, double fallback, int v3_rule)
 {
-    read_roughness(b, p, "", fallback, &m->roughness_u, &m->roughness_v);
+    struct pt_params *p = c->p;
+    struct pt_material *m = c->m;
+    read_roughness(c, prefix, fallback, &m->roughness_u, &m->roughness_v);
     m->remap_roughness = pt_params_bool(p, "remaproughness", 1);
     if (!v3_rule || !m->remap_roughness)
         return;
@@ -46,20 +57,15 @@ void pt_build_roughness(struct pt_builder *b, struct pt_params *p, double fallba
                        "textured roughness is remapped by pbrt-v4's rule");
         return;
     }
-    /* v3 keeps 0 as a smooth surface. */
-    double u = (double)m->roughness_u.value.x, v = (double)m->roughness_v.value.x;
-    u = u > 0 ? v3_alpha(u) : 0;
-    v = v > 0 ? v3_alpha(v) : 0;
-    m->roughness_u = pt_input_grey(u);
-    m->roughness_v = pt_input_grey(v);
+    m->roughness_u = pt_input_grey(v3_alpha((double)m->roughness_u.value.x));
+    m->roughness_v = pt_input_grey(v3_alpha((double)m->roughness_v.value.x));
     m->remap_roughness = 0;
 }
 
-int32_t pt_build_bump(struct pt_builder *b, struct pt_params *p, const char *name)
+/* Number of the displacement texture, 0 = none. */
+static int32_t read_bump(struct making *c, const char *name)
 {
-    if (!pt_params_find(p, name))
-        return 0;
-    return pt_build_float_input(b, p, name, 0).texture; /* a constant displaces nothing */
+    return pt_build_float_input(c->b, c->p, name, 0).texture; /* a constant displaces nothing */
 }
 
 static struct pt_material_info *info_of(const struct pt_builder *b, int32_t id)
@@ -67,7 +73,8 @@ static struct pt_material_info *info_of(const struct pt_builder *b, int32_t id)
     return (struct pt_material_info *)b->material_infos.items + id;
 }
 
-int32_t pt_build_material_named(struct pt_builder *b, struct pt_loc loc, const char *name)
+/* A material of a mix, made before; -1 after a failure. */
+static int32_t find_mixed(struct pt_builder *b, struct pt_loc loc, const char *name)
 {
     int32_t id = pt_names_get(&b->named_materials, name);
     if (id >= 0 && !info_of(b, id)->wanted)
@@ -78,24 +85,25 @@ int32_t pt_build_material_named(struct pt_builder *b, struct pt_loc loc, const c
 
 /* --- kinds ------------------------------------------------------------------------------------------------------------ */
 
-struct pt_input pt_build_reflectance(struct pt_making *c, const char *name, float fallback)
+/* May be textured; the fallback, grey, when absent. */
+static struct pt_input read_reflectance(struct making *c, const char *name, float fallback)
 {
     return pt_build_colour_input(c->b, c->p, name, PT_USE_REFLECTANCE, v3_splat(fallback));
 }
 
-static void read_metal(struct pt_making *c, const char *prefix)
+static void read_metal(struct making *c, const char *prefix)
 {
     char eta[32], k[32];
     snprintf(eta, sizeof eta, "%seta", prefix);
     snprintf(k, sizeof k, "%sk", prefix);
     c->m->conductor_by_colour = pt_params_find(c->p, "reflectance") != NULL;
     if (c->m->conductor_by_colour)
-        c->m->reflectance = pt_build_reflectance(c, "reflectance", 0.5f);
+        c->m->reflectance = read_reflectance(c, "reflectance", 0.5f);
     else
         pt_build_conductor(c->b, c->p, eta, k, &c->m->eta_rgb.value, &c->m->k_rgb.value);
 }
 
-static void scale_colours(struct pt_making *c, const struct pt_bsdf_read *reads, double scale)
+static void scale_colours(struct making *c, const struct pt_bsdf_read *reads, double scale)
 {
     for (const struct pt_bsdf_read *r = reads; r->kind != PT_READ_END; r++) {
         struct pt_input *in = (struct pt_input *)((char *)c->m + r->field);
@@ -105,19 +113,16 @@ static void scale_colours(struct pt_making *c, const struct pt_bsdf_read *reads,
 }
 
 /* By the table of the model, so that a new model needs no code here. */
-static void read_model(struct pt_making *c, const struct pt_bsdf_model *model)
+static void read_model(struct making *c, const struct pt_bsdf_model *model)
 {
     for (const struct pt_bsdf_read *r = model->reads; r->kind != PT_READ_END; r++) {
         struct pt_input *in = (struct pt_input *)((char *)c->m + r->field);
         switch (r->kind) {
-        case PT_READ_COLOUR: *in = pt_build_reflectance(c, r->name, (float)r->fallback); break;
+        case PT_READ_COLOUR: *in = read_reflectance(c, r->name, (float)r->fallback); break;
         case PT_READ_NUMBER: *in = pt_build_float_input(c->b, c->p, r->name, r->fallback); break;
-        case PT_READ_ROUGHNESS:
-            read_roughness(c->b, c->p, r->name, r->fallback, &c->m->roughness_u, &c->m->roughness_v);
-            c->m->remap_roughness = pt_params_bool(c->p, "remaproughness", 1);
-            break;
+        case PT_READ_ROUGHNESS: read_surface_roughness(c, r->name, r->fallback, 0); break;
         case PT_READ_BASE_ROUGHNESS:
-            read_roughness(c->b, c->p, r->name, r->fallback, &c->m->base_roughness_u, &c->m->base_roughness_v);
+            read_roughness(c, r->name, r->fallback, &c->m->base_roughness_u, &c->m->base_roughness_v);
             break;
         case PT_READ_INDEX: c->m->eta = (float)pt_build_index(c->b, c->p, r->name, r->fallback); break;
         case PT_READ_METAL: read_metal(c, r->name); break;
@@ -156,7 +161,8 @@ static void count_mixed(const struct pt_material *all, const struct pt_material 
     count_mixed(all, &all[m->mix_b], left);
 }
 
-void pt_build_mix_opacity(struct pt_making *c)
+/* When its materials and amount are read: what of them lets rays through becomes its opacity. */
+static void set_mix_opacity(struct making *c)
 {
     struct pt_material *m = c->m;
     if (c->b->diag.rc)
@@ -190,7 +196,7 @@ void pt_build_mix_opacity(struct pt_making *c)
     c->info->opacity = both;
 }
 
-static void read_mix(struct pt_making *c)
+static void read_mix(struct making *c)
 {
     struct pt_param *list = pt_params_find(c->p, "materials");
     c->m->kind = PT_MATERIAL_MIX;
@@ -199,14 +205,14 @@ static void read_mix(struct pt_making *c)
         return;
     }
     list->used = 1;
-    c->m->mix_a = pt_build_material_named(c->b, list->loc, pt_params_string_at(c->p, list, 0));
-    c->m->mix_b = pt_build_material_named(c->b, list->loc, pt_params_string_at(c->p, list, 1));
+    c->m->mix_a = find_mixed(c->b, list->loc, pt_params_string_at(c->p, list, 0));
+    c->m->mix_b = find_mixed(c->b, list->loc, pt_params_string_at(c->p, list, 1));
     c->m->mix_amount = pt_build_float_input(c->b, c->p, "amount", 0.5);
-    pt_build_mix_opacity(c);
+    set_mix_opacity(c);
 }
 
 /* 0: perhaps a kind of v3, or one that is not simulated. */
-static int build_v4(struct pt_making *c)
+static int build_v4(struct making *c)
 {
     static const char *const interface[] = {"interface", "none", "", NULL};
     for (int32_t i = 0; i < PT_BSDF_COUNT; i++)
@@ -225,6 +231,232 @@ static int build_v4(struct pt_making *c)
     return 1;
 }
 
+/* --- kinds of v3 in terms of v4's ------------------------------------------------------------------------------------- */
+
+static int is_black(struct pt_input in) { return !in.texture && v3_is_black(in.value); }
+
+static void clear_coat(struct making *c)
+{
+    c->m->kind = PT_BSDF_COATED_DIFFUSE;
+    c->m->thickness = pt_input_grey(0.01);
+}
+
+/* Metal by its colour instead of an index. */
+static void coloured_metal(struct making *c, struct pt_input colour)
+{
+    c->m->kind = PT_BSDF_CONDUCTOR;
+    c->m->conductor_by_colour = 1;
+    c->m->reflectance = colour;
+}
+
+static double index_of(struct making *c, double fallback)
+{
+    return pt_build_index(c->b, c->p, pt_params_find(c->p, "index") ? "index" : "eta", fallback);
+}
+
+static void make_matte(struct making *c)
+{
+    c->m->reflectance = read_reflectance(c, "Kd", 0.5f);
+    struct pt_input sigma = pt_build_float_input(c->b, c->p, "sigma", 0);
+    if (sigma.texture || sigma.value.x != 0)
+        pt_params_warn(c->p, "sigma", "sigma of a matte material is ignored: plain diffuse");
+}
+
+/* Ks of these v3 models is the strength of the coat; the coat here is glass of index 1.5 (as pbrt-v4's own upgrade does). */
+static void make_plastic(struct making *c)
+{
+    int substrate = strcmp(c->kind, "substrate") == 0;
+    c->m->reflectance = read_reflectance(c, "Kd", substrate ? 0.5f : 0.25f);
+    struct pt_input ks = read_reflectance(c, "Ks", substrate ? 0.5f : 0.25f);
+    read_surface_roughness(c, "", 0.1, 1);
+    if (is_black(ks))
+        return;
+    clear_coat(c);
+}
+
+/* A share that v3 gives as a colour is one number here. */
+static struct pt_input read_share(struct making *c, const char *name, float fallback)
+{
+    struct pt_input in = read_reflectance(c, name, fallback);
+    if (in.texture)
+        return pt_input_luminance(c->b, in);
+    if (in.value.x != in.value.y || in.value.y != in.value.z)
+        pt_params_warn(c->p, name, "a coloured %s is taken as a grey one", name);
+    return pt_input_grey((double)v3_luminance(in.value));
+}
+
+/* What glass lets through is all but what it reflects. */
+static void say_clear(struct making *c, struct pt_input kt)
+{
+    if (kt.texture || v3_luminance(kt.value) < 0.999f)
+        pt_params_warn(c->p, "Kt", "Kt of an uber material without Kd is taken as 1");
+}
+
+/* A sum of four lobes there. Here it is the one that stands alone, or else a coated diffuse surface. */
+static void make_uber(struct making *c)
+{
+    struct pt_input kd = read_reflectance(c, "Kd", 0.25f), ks = read_reflectance(c, "Ks", 0.25f),
+                    kr = read_reflectance(c, "Kr", 0), kt = read_reflectance(c, "Kt", 0);
+    double eta = index_of(c, 1.5);
+    read_surface_roughness(c, "", 0.1, 1);
+    c->m->eta = (float)eta;
+    struct pt_param *opacity = pt_params_find(c->p, "opacity");
+    if (opacity) {
+        c->info->opacity = read_share(c, "opacity", 1);
+        c->info->has_opacity = c->info->opacity.texture || c->info->opacity.value.x < 1;
+    }
+    if (!is_black(kt) && is_black(kd)) {
+        say_clear(c, kt);
+        c->m->kind = PT_BSDF_DIELECTRIC;
+        c->m->roughness_u = c->m->roughness_v = pt_input_grey(0);
+    } else if (!is_black(kr) && is_black(kd) && is_black(ks)) {
+        coloured_metal(c, kr);
+        c->m->roughness_u = c->m->roughness_v = pt_input_grey(0);
+    } else {
+        if (!is_black(kr) || !is_black(kt))
+            pt_params_warn(c->p, is_black(kr) ? "Kt" : "Kr", "Kr and Kt of an uber material with Kd are ignored");
+        c->m->reflectance = kd;
+        if (!is_black(ks) || !is_black(kr))
+            clear_coat(c);
+    }
+}
+
+static void make_metal(struct making *c)
+{
+    c->m->kind = PT_BSDF_CONDUCTOR;
+    read_surface_roughness(c, "", 0.01, 1);
+    pt_build_conductor(c->b, c->p, "eta", "k", &c->m->eta_rgb.value, &c->m->k_rgb.value);
+}
+
+static void make_mirror(struct making *c)
+{
+    coloured_metal(c, read_reflectance(c, "Kr", 0.9f));
+    pt_params_ignore(c->p, "remaproughness roughness");
+}
+
+static void make_shiny_metal(struct making *c)
+{
+    coloured_metal(c, read_reflectance(c, "Kr", 1));
+    pt_params_ignore(c->p, "Ks");
+    read_surface_roughness(c, "", 0.1, 1);
+}
+
+static void make_glass(struct making *c)
+{
+    struct pt_input kr = read_reflectance(c, "Kr", 1), kt = read_reflectance(c, "Kt", 1);
+    c->m->kind = PT_BSDF_DIELECTRIC;
+    read_surface_roughness(c, "", 0, 1);
+    c->m->eta = (float)index_of(c, 1.5);
+    if (kr.texture || kt.texture || v3_luminance(kr.value) < 0.999f || v3_luminance(kt.value) < 0.999f)
+        pt_params_warn(c->p, pt_params_find(c->p, "Kr") ? "Kr" : "Kt", "Kr and Kt of glass are taken as 1");
+}
+
+static void make_translucent(struct making *c)
+{
+    struct pt_input kd = read_reflectance(c, "Kd", 0.25f), ks = read_reflectance(c, "Ks", 0.25f);
+    c->m->kind = PT_BSDF_DIFFUSE_TRANSMISSION;
+    c->m->reflectance = pt_input_product(c->b, kd, read_reflectance(c, "reflect", 0.5f));
+    c->m->transmittance = pt_input_product(c->b, kd, read_reflectance(c, "transmit", 0.5f));
+    read_surface_roughness(c, "", 0.1, 1);
+    if (!is_black(ks))
+        pt_params_warn(c->p, "Ks", "Ks of a translucent material is ignored");
+}
+
+/* pbrt-v3 mixes matte where there is no material of that name. */
+static int32_t mixed(struct making *c, const char *parameter)
+{
+    const struct pt_param *param = pt_params_find(c->p, parameter);
+    const char *name = pt_params_string(c->p, parameter, "");
+    if (!c->b->is_v3 || pt_names_get(&c->b->named_materials, name) >= 0)
+        return find_mixed(c->b, param->loc, name);
+    pt_diag_warn(&c->b->diag, param->loc, "unknown material \"%s\": matte in its stead", name);
+    return pt_build_default_material(c->b);
+}
+
+/* v3 gives the share of the first material, v4 that of the second. */
+static void make_mix(struct making *c)
+{
+    struct pt_param *first = pt_params_find(c->p, "namedmaterial1"), *second = pt_params_find(c->p, "namedmaterial2");
+    c->m->kind = PT_MATERIAL_MIX;
+    if (!first || !second || first->type != PT_PARAM_STRING || second->type != PT_PARAM_STRING) {
+        pt_params_fail(c->p, NULL, "mix needs \"string namedmaterial1\" and \"string namedmaterial2\"");
+        return;
+    }
+    c->m->mix_b = mixed(c, "namedmaterial1");
+    c->m->mix_a = mixed(c, "namedmaterial2");
+    struct pt_param *amount = pt_params_find(c->p, "amount");
+    c->m->mix_amount = amount && amount->type == PT_PARAM_FLOAT ? pt_build_float_input(c->b, c->p, "amount", 0.5)
+                                                                : read_share(c, "amount", 0.5f);
+    set_mix_opacity(c);
+}
+
+/* What is not simulated: a diffuse surface of about its colour, mostly with a coat. */
+struct stand_in {
+    const char *name, *note; /* note: what the warning says besides */
+    const char *colours[2];  /* parameters, of which the last one that is given counts */
+    float grey;              /* else */
+    double roughness, index; /* index: by default, and roughness, too; 0: nothing is read of either */
+    int is_coated, is_of_v3; /* of v3: has a bumpmap */
+    const char *ignored;
+};
+
+static void stand_in(struct making *c, const struct stand_in *s)
+{
+    pt_params_warn(c->p, NULL, "material \"%s\"%s is replaced by a %sdiffuse one", c->kind, s->note,
+                   s->is_coated ? "coated " : "");
+    c->m->reflectance = pt_input_grey((double)s->grey);
+    for (int i = 0; i < 2 && s->colours[i]; i++)
+        if (i == 0 || pt_params_find(c->p, s->colours[i]))
+            c->m->reflectance = read_reflectance(c, s->colours[i], s->grey);
+    c->m->roughness_u = c->m->roughness_v = pt_input_grey(s->roughness);
+    if (s->index > 0) {
+        read_surface_roughness(c, "", s->roughness, 0);
+        c->m->eta = (float)pt_build_index(c->b, c->p, "eta", s->index);
+    }
+    pt_params_ignore(c->p, s->ignored);
+    if (s->is_coated)
+        clear_coat(c);
+}
+
+static const char not_of_kd[] = "Kr Kt mfp eta scale uroughness vroughness roughness remaproughness g sigma_a sigma_s name",
+                  not_of_disney[] = "metallic speculartint anisotropic sheen sheentint clearcoat clearcoatgloss spectrans "
+                                    "scatterdistance thin flatness difftrans";
+static const struct stand_in stand_ins[] = {
+    {"subsurface", "", {"reflectance"}, 0.6f, 0, 1.33, 1, 0, "mfp sigma_a sigma_s scale g name filename"},
+    {"hair", "", {"color", "reflectance"}, 0.2f, 0, 0, 0, 0, "sigma_a eumelanin pheomelanin eta beta_m beta_n alpha"},
+    {"measured", "", {NULL}, 0.5f, 0.1, 0, 1, 0, "filename"},
+    {"kdsubsurface", "", {"Kd"}, 0.5f, 0, 0, 0, 1, not_of_kd},
+    {"disney", "", {"color"}, 0.5f, 0.5, 1.5, 1, 1, not_of_disney},
+    {"fourier", " (a measured table)", {NULL}, 0.5f, 0.05, 0, 1, 1, "bsdffile"},
+};
+
+/* 0: unknown. */
+static int build_v3(struct making *c)
+{
+    static const struct {
+        const char *name;
+        void (*make)(struct making *c);
+    } kinds[] = {{"matte", make_matte},       {"plastic", make_plastic},
+                 {"substrate", make_plastic}, {"uber", make_uber},
+                 {"metal", make_metal},       {"mirror", make_mirror},
+                 {"glass", make_glass},       {"translucent", make_translucent},
+                 {"mix", make_mix},           {"shinymetal", make_shiny_metal}};
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
+        if (strcmp(kinds[i].name, c->kind) == 0) {
+            kinds[i].make(c);
+            c->m->bump = read_bump(c, "bumpmap");
+            return 1;
+        }
+    for (size_t i = 0; i < sizeof stand_ins / sizeof stand_ins[0]; i++)
+        if (strcmp(stand_ins[i].name, c->kind) == 0) {
+            stand_in(c, &stand_ins[i]);
+            if (stand_ins[i].is_of_v3)
+                c->m->bump = read_bump(c, "bumpmap");
+            return 1;
+        }
+    return 0;
+}
+
 static int32_t add(struct pt_builder *b, const struct pt_material *m, const struct pt_material_info *info)
 {
     if (pt_list_add(b, &b->material_infos, info) < 0)
@@ -236,17 +468,17 @@ static int32_t build(struct pt_builder *b, const char *kind, struct pt_params *p
 {
     struct pt_material m = {.kind = PT_BSDF_DIFFUSE, .eta = 1.5f};
     struct pt_material_info info = {.loc = p->loc, .opacity = pt_input_grey(1)};
-    struct pt_making c = {b, p, kind, &m, &info};
+    struct making c = {b, p, kind, &m, &info};
     pt_params_ignore(p, "type");
-    if (!build_v4(&c) && !pt_build_material_v3(&c)) {
+    if (!build_v4(&c) && !build_v3(&c)) {
         if (pt_diag_unknown(&b->diag, pt_params_loc(p, "type"), "material", kind,
                             "diffuse, coateddiffuse, conductor, dielectric, mix …", "matte in its stead") != 0)
             return -1;
         c.kind = "matte";
-        pt_build_material_v3(&c);
+        build_v3(&c);
     }
     if (!m.bump)
-        m.bump = pt_build_bump(b, p, "displacement");
+        m.bump = read_bump(&c, "displacement");
     struct pt_param *map = pt_params_find(p, "normalmap");
     if (map && map->type == PT_PARAM_TEXTURE)
         m.normal_map = pt_build_colour_input(b, p, "normalmap", PT_USE_UNBOUNDED, v3_splat(0)).texture;
