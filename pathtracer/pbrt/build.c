@@ -94,7 +94,7 @@ void pt_builder_effect(struct pt_builder *b, pt_effects bits, struct pt_loc loc)
     b->scene->effects |= bits;
 }
 
-void pt_builder_at_shutter(const struct pt_builder *b, const struct pt_xform ctm[2], struct pt_xform out[2])
+int pt_builder_at_shutter(const struct pt_builder *b, const struct pt_xform ctm[2], struct pt_xform out[2])
 {
     double t0 = b->transform_times[0], length = b->transform_times[1] - t0;
     for (int i = 0; i < 2; i++) {
@@ -107,14 +107,14 @@ void pt_builder_at_shutter(const struct pt_builder *b, const struct pt_xform ctm
         else
             out[i] = pt_xform_interpolate(&ctm[0], &ctm[1], s);
     }
+    return !pt_xform_equal(&out[0], &out[1]);
 }
 
-struct pt_xform pt_builder_to_render(const struct pt_builder *b, const struct pt_xform *world)
+struct pt_xform pt_builder_to_render(const struct pt_builder *b, struct pt_xform world)
 {
-    struct pt_xform r = *world;
     for (int i = 0; i < 3; i++)
-        r.m[i][3] -= b->origin[i];
-    return r;
+        world.m[i][3] -= b->origin[i];
+    return world;
 }
 
 /* --- finishing -------------------------------------------------------------------------------------------------------- */

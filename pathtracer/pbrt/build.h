@@ -127,10 +127,10 @@ int pt_builder_name(struct pt_builder *b, struct pt_names *names, const char *na
 void pt_builder_forget_names(struct pt_builder *b, size_t count);
 /* Turns on an effect; the first caller's place is the reason. */
 void pt_builder_effect(struct pt_builder *b, pt_effects bits, struct pt_loc loc);
-/* Transforms at shutter open and close. */
-void pt_builder_at_shutter(const struct pt_builder *b, const struct pt_xform ctm[2], struct pt_xform out[2]);
+/* Transforms at shutter open and close; whether they differ. */
+int pt_builder_at_shutter(const struct pt_builder *b, const struct pt_xform ctm[2], struct pt_xform out[2]);
 /* World → render. */
-struct pt_xform pt_builder_to_render(const struct pt_builder *b, const struct pt_xform *world);
+struct pt_xform pt_builder_to_render(const struct pt_builder *b, struct pt_xform world);
 
 /* build_image.c: film, filter, sampler, integrator, camera; at WorldBegin. */
 int pt_build_header(struct pt_builder *b);

@@ -228,12 +228,11 @@ static void set_screen(struct pt_params *p, struct pt_camera *c)
 static void override_camera(struct pt_builder *b, struct pt_xform world_to_camera[2])
 {
     const double *v = b->options->view.look_at_world;
-    const struct pt_xform mirror = pt_xform_scale(-1, 1, 1);
     struct pt_xform t;
     if (!b->options->view.has_look_at || !pt_xform_look_at(v, v + 3, v + 6, &t))
         return;
     if (pt_xform_det(&world_to_camera[0]) < 0)
-        t = pt_xform_mul(&mirror, &t);
+        t = pt_xform_mul(pt_xform_scale(-1, 1, 1), t);
     world_to_camera[0] = world_to_camera[1] = t;
 }
 
@@ -251,8 +250,7 @@ static void place_camera(struct pt_builder *b, struct pt_params *p, struct pt_ca
         if (i == 0)
             for (int k = 0; k < 3; k++)
                 b->origin[k] = to_world.m[k][3];
-        to_world = pt_builder_to_render(b, &to_world);
-        c->to_render[i] = pt_xform_to_mat34(&to_world);
+        c->to_render[i] = pt_xform_to_mat34(pt_builder_to_render(b, to_world));
     }
 }
 

@@ -31,7 +31,7 @@ struct context {
 static void place(const struct context *c, const double p[3], pt_vec3 *out)
 {
     double q[3];
-    struct pt_xform t = pt_builder_to_render(c->b, &c->ctm);
+    struct pt_xform t = pt_builder_to_render(c->b, c->ctm);
     pt_xform_point(&t, p, q);
     *out = v3((float)q[0], (float)q[1], (float)q[2]);
 }
@@ -127,8 +127,8 @@ static int light_space(struct context *c)
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             off = fmax(off, fabs(back.m[i][j] - inverse.m[j][i]));
-    c->light->from_render = pt_xform_to_mat34(&inverse);
-    c->light->to_render = pt_xform_to_mat34(&back);
+    c->light->from_render = pt_xform_to_mat34(inverse);
+    c->light->to_render = pt_xform_to_mat34(back);
     c->light->is_stretched = off > rotation_slack;
     return 0;
 }
@@ -256,8 +256,7 @@ int pt_build_light(struct pt_builder *b, struct pt_params *p)
                  {"goniometric", make_goniometric}};
     struct pt_light light = {.kind = -1, .shape = -1, .image = -1};
     struct pt_xform at[2];
-    pt_builder_at_shutter(b, b->state->ctm, at);
-    if (!pt_xform_equal(&at[0], &at[1]))
+    if (pt_builder_at_shutter(b, b->state->ctm, at))
         pt_params_warn(p, NULL, "lights do not move: the transform at shutter open is used");
     struct context c = {b, p, at[0], &light};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)

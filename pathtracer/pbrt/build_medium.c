@@ -29,8 +29,8 @@ static int stays(const struct pt_builder *b, const struct pt_instance *instance)
     if (instance->animated) /* perhaps a moving shape of its own, which has no offset */
         return 0;
     const double *origin = ((const struct pt_object_info *)b->object_infos.items)[instance->object].origin;
-    struct pt_xform shift = pt_xform_translate(origin[0], origin[1], origin[2]), at = pt_builder_to_render(b, &shift);
-    struct pt_mat34 there = pt_xform_to_mat34(&at);
+    struct pt_xform shift = pt_xform_translate(origin[0], origin[1], origin[2]);
+    struct pt_mat34 there = pt_xform_to_mat34(pt_builder_to_render(b, shift));
     int same = 1;
     for (int i = 0; i < 12; i++) /* but for the rounding of turns there and back */
         same &= fabsf(instance->to_render[0].m[i] - there.m[i]) <= 1e-6f * fmaxf(1.0f, fabsf(there.m[i]));
@@ -191,8 +191,7 @@ static int place_grid(struct pt_builder *b, struct pt_params *p, struct pt_mediu
     struct pt_xform at[2], inverse;
     pt_params_point(p, "p0", p0);
     pt_params_point(p, "p1", p1);
-    pt_builder_at_shutter(b, b->state->ctm, at);
-    if (!pt_xform_equal(&at[0], &at[1]))
+    if (pt_builder_at_shutter(b, b->state->ctm, at))
         pt_params_warn(p, NULL, "grid media do not move: the transform at shutter open is used");
     if (!(p0[0] != p1[0] && p0[1] != p1[1] && p0[2] != p1[2]))
         return pt_params_fail(p, pt_params_find(p, "p1") ? "p1" : "p0",
@@ -205,12 +204,10 @@ static int place_grid(struct pt_builder *b, struct pt_params *p, struct pt_mediu
         }
     struct pt_xform box = pt_xform_translate(p0[0], p0[1], p0[2]);
     struct pt_xform size = pt_xform_scale(p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]);
-    box = pt_xform_mul(&box, &size);
-    box = pt_xform_mul(&at[0], &box);
-    box = pt_builder_to_render(b, &box);
+    box = pt_builder_to_render(b, pt_xform_mul(at[0], pt_xform_mul(box, size)));
     if (!pt_xform_invert(&box, &inverse))
         return pt_params_fail(p, NULL, "singular transform of a medium");
-    m->from_render = pt_xform_to_mat34(&inverse);
+    m->from_render = pt_xform_to_mat34(inverse);
     bound_density(p, &box, m);
     return 0;
 }

@@ -59,9 +59,8 @@ static void find_origin(const struct pt_xform *t, const struct box *box, double 
 
 static struct placement place(struct pt_builder *b, const struct pt_params *p, const struct box *box)
 {
-    struct placement pl = {.animated = 0};
-    pt_builder_at_shutter(b, b->state->ctm, pl.at);
-    pl.animated = !pt_xform_equal(&pl.at[0], &pl.at[1]);
+    struct placement pl = {0};
+    pl.animated = pt_builder_at_shutter(b, b->state->ctm, pl.at);
     if (b->open_object >= 0) {
         struct pt_object_info *info = (struct pt_object_info *)b->object_infos.items + b->open_object;
         double *origin = info->origin;
@@ -79,7 +78,7 @@ static struct placement place(struct pt_builder *b, const struct pt_params *p, c
         for (int i = 0; i < 3; i++)
             pl.xform.m[i][3] -= pl.origin[i];
     } else {
-        pl.xform = pt_builder_to_render(b, &pl.at[0]);
+        pl.xform = pt_builder_to_render(b, pl.at[0]);
     }
     return pl;
 }
@@ -95,7 +94,7 @@ static int leave_out_flattened(struct pt_builder *b, struct pt_loc loc, const ch
  * beyond 1e18 are none to it. */
 static int is_flat(const struct pt_builder *b, const struct pt_xform *at)
 {
-    const struct pt_xform t = pt_builder_to_render(b, at);
+    const struct pt_xform t = pt_builder_to_render(b, *at);
     struct pt_xform inverse;
     double most = 0, away = 1e4;
     if (!pt_xform_invert(&t, &inverse) || fabs(pt_xform_det(&t)) < (double)FLT_MIN)
@@ -123,12 +122,12 @@ static int add_instance(struct pt_builder *b, int32_t object, const struct pt_xf
     for (int i = 0; i < 9; i++)
         turns |= at[0].m[i / 3][i % 3] != at[1].m[i / 3][i % 3];
     for (int i = 0; i < 2; i++) {
-        struct pt_xform t = pt_builder_to_render(b, &at[i]);
+        struct pt_xform t = pt_builder_to_render(b, at[i]);
         for (int k = 0; k < 9 && flat[i]; k++)
             t.m[k / 3][k % 3] += 1e-6 * at[1 - i].m[k / 3][k % 3];
         if (!turns)
-            t = pt_xform_mul(&t, &shift);
-        instance.to_render[i] = pt_xform_to_mat34(&t);
+            t = pt_xform_mul(t, shift);
+        instance.to_render[i] = pt_xform_to_mat34(t);
     }
     if (turns) /* not about the object's origin, but about the one that the file has */
         instance.origin = v3((float)origin[0], (float)origin[1], (float)origin[2]);
@@ -431,8 +430,8 @@ static int add_quadric(struct pt_builder *b, struct pt_params *p, struct pt_quad
         pt_params_check_used(p);
         return leave_out_flattened(b, p->loc, pt_params_kind(p));
     }
-    q->to_render = pt_xform_to_mat34(&pl.xform);
-    q->from_render = pt_xform_to_mat34(&inverse);
+    q->to_render = pt_xform_to_mat34(pl.xform);
+    q->from_render = pt_xform_to_mat34(inverse);
     if (b->diag.rc)
         return b->diag.rc;
     shape.kind = PT_SHAPE_QUADRIC;

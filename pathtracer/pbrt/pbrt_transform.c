@@ -5,12 +5,12 @@
 #include "pbrt/pbrt_parser.h"
 
 /* A transform may flatten what comes (Scale 0 hides things in animations): who needs its inverse sees to that. */
-static int concat(struct parser *p, const struct pt_xform *t)
+static int concat(struct parser *p, struct pt_xform t)
 {
     for (int i = 0; i < 2; i++) {
         if ((p->state.active >> i & 1) == 0)
             continue;
-        struct pt_xform next = p->directive->replaces ? *t : pt_xform_mul(&p->state.ctm[i], t);
+        struct pt_xform next = p->directive->replaces ? t : pt_xform_mul(p->state.ctm[i], t);
         for (int k = 0; k < 12; k++)
             if (!isfinite(next.m[k / 4][k % 4]))
                 return pt_parser_fail(p, "the transform is out of range (expected finite numbers)");
@@ -19,31 +19,21 @@ static int concat(struct parser *p, const struct pt_xform *t)
     return 0;
 }
 
-static int do_identity(struct parser *p)
-{
-    const struct pt_xform t = pt_xform_identity();
-    return concat(p, &t);
-}
+static int do_identity(struct parser *p) { return concat(p, pt_xform_identity()); }
 
 static int do_translate(struct parser *p)
 {
-    const struct pt_xform t = pt_xform_translate(p->numbers[0], p->numbers[1], p->numbers[2]);
-    return concat(p, &t);
+    return concat(p, pt_xform_translate(p->numbers[0], p->numbers[1], p->numbers[2]));
 }
 
-static int do_scale(struct parser *p)
-{
-    const struct pt_xform t = pt_xform_scale(p->numbers[0], p->numbers[1], p->numbers[2]);
-    return concat(p, &t);
-}
+static int do_scale(struct parser *p) { return concat(p, pt_xform_scale(p->numbers[0], p->numbers[1], p->numbers[2])); }
 
 static int do_rotate(struct parser *p)
 {
     const double *v = p->numbers;
     if (v[1] == 0 && v[2] == 0 && v[3] == 0)
         return pt_parser_fail(p, "Rotate about the axis 0 0 0 (expected a direction)");
-    const struct pt_xform t = pt_xform_rotate(v[0], v[1], v[2], v[3]);
-    return concat(p, &t);
+    return concat(p, pt_xform_rotate(v[0], v[1], v[2], v[3]));
 }
 
 static int do_look_at(struct parser *p)
@@ -51,7 +41,7 @@ static int do_look_at(struct parser *p)
     struct pt_xform t;
     if (!pt_xform_look_at(p->numbers, p->numbers + 3, p->numbers + 6, &t))
         return pt_parser_fail(p, "LookAt is degenerate (expected eye and target apart, up not along the view)");
-    return concat(p, &t);
+    return concat(p, t);
 }
 
 static int do_transform(struct parser *p)
@@ -59,7 +49,7 @@ static int do_transform(struct parser *p)
     struct pt_xform t;
     if (!pt_xform_from16(p->numbers, &t))
         return pt_parser_fail(p, "%s is not affine (expected 0 0 0 1 as every fourth number)", p->directive->name);
-    return concat(p, &t);
+    return concat(p, t);
 }
 
 int pt_parser_save_system(struct parser *p, const char *name, const struct pt_xform ctm[2])

@@ -7,13 +7,12 @@
 
 struct pt_xform pt_xform_identity(void) { return (struct pt_xform){{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}}; }
 
-struct pt_xform pt_xform_mul(const struct pt_xform *a, const struct pt_xform *b)
+struct pt_xform pt_xform_mul(struct pt_xform a, struct pt_xform b)
 {
     struct pt_xform r;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 4; j++)
-            r.m[i][j] =
-                a->m[i][0] * b->m[0][j] + a->m[i][1] * b->m[1][j] + a->m[i][2] * b->m[2][j] + (j == 3 ? a->m[i][3] : 0);
+            r.m[i][j] = a.m[i][0] * b.m[0][j] + a.m[i][1] * b.m[1][j] + a.m[i][2] * b.m[2][j] + (j == 3 ? a.m[i][3] : 0);
     return r;
 }
 
@@ -155,7 +154,7 @@ static void polar(const struct pt_xform *t, struct pt_xform *rotation, struct pt
     }
     *rotation = r;
     if (pt_xform_invert(&r, &inverse))
-        *stretch = pt_xform_mul(&inverse, &source);
+        *stretch = pt_xform_mul(inverse, source);
     else
         *stretch = source;
 }
@@ -232,17 +231,17 @@ struct pt_xform pt_xform_interpolate(const struct pt_xform *a, const struct pt_x
     quaternion_of(&ra, qa);
     quaternion_of(&rb, qb);
     slerp(qa, qb, s, q);
-    struct pt_xform rotation = rotation_of(q), r = pt_xform_mul(&rotation, &stretch);
+    struct pt_xform r = pt_xform_mul(rotation_of(q), stretch);
     for (int i = 0; i < 3; i++)
         r.m[i][3] = (1 - s) * a->m[i][3] + s * b->m[i][3];
     return r;
 }
 
-struct pt_mat34 pt_xform_to_mat34(const struct pt_xform *t)
+struct pt_mat34 pt_xform_to_mat34(struct pt_xform t)
 {
     struct pt_mat34 r;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 4; j++)
-            r.m[4 * i + j] = (float)t->m[i][j];
+            r.m[4 * i + j] = (float)t.m[i][j];
     return r;
 }

@@ -14,7 +14,7 @@ struct pt_xform {
 
 struct pt_xform pt_xform_identity(void);
 /* (a b) p = a (b p) */
-struct pt_xform pt_xform_mul(const struct pt_xform *a, const struct pt_xform *b);
+struct pt_xform pt_xform_mul(struct pt_xform a, struct pt_xform b);
 struct pt_xform pt_xform_translate(double x, double y, double z);
 struct pt_xform pt_xform_scale(double x, double y, double z);
 /* Degrees about an axis, which need not be unit but not zero. */
@@ -32,6 +32,6 @@ int pt_xform_equal(const struct pt_xform *a, const struct pt_xform *b);
 /* Translation, rotation (slerp) and scale interpolated apart; Shoemake and Duff 1992, "Matrix animation and polar
  * decomposition". s = 0 gives a, s = 1 gives b. */
 struct pt_xform pt_xform_interpolate(const struct pt_xform *a, const struct pt_xform *b, double s);
-struct pt_mat34 pt_xform_to_mat34(const struct pt_xform *t);
+struct pt_mat34 pt_xform_to_mat34(struct pt_xform t);
 
 #endif
