@@ -51,12 +51,11 @@ static void read_direction(struct context *c)
     pt_params_point(c->p, "to", to);
     const double d[3] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
     pt_xform_vector(&c->ctm, d, w);
-    double len = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-    if (!(len > 0) || !isfinite(len))
+    if (!pt_normalize(w))
         pt_params_fail(c->p, pt_params_find(c->p, "to") ? "to" : "from",
                        "the light points nowhere (expected \"from\" and \"to\" apart)");
     else
-        c->light->direction = v3((float)(w[0] / len), (float)(w[1] / len), (float)(w[2] / len));
+        c->light->direction = v3((float)w[0], (float)w[1], (float)w[2]);
 }
 
 static void make_point(struct context *c)

@@ -60,26 +60,24 @@ static void find_origin(const struct pt_xform *t, const struct box *box, double 
 static struct placement place(struct pt_builder *b, const struct pt_params *p, const struct box *box)
 {
     struct placement pl = {0};
+    const double *origin = b->origin;
     pl.animated = pt_builder_at_shutter(b, b->state->ctm, pl.at);
+    pl.xform = pl.at[0];
     if (b->open_object >= 0) {
         struct pt_object_info *info = (struct pt_object_info *)b->object_infos.items + b->open_object;
-        double *origin = info->origin;
         if (pl.animated)
             pt_params_warn(p, NULL, "a moving shape within an object stays at its place at shutter open");
         pl.animated = 0;
         if (((struct pt_object *)b->objects.items)[b->open_object].shape_count == 0 && info->used.line == 0)
-            find_origin(&pl.at[0], box, origin);
-        pl.xform = pl.at[0];
-        for (int i = 0; i < 3; i++)
-            pl.xform.m[i][3] -= origin[i];
+            find_origin(&pl.xform, box, info->origin);
+        origin = info->origin;
     } else if (pl.animated) {
         pl.xform = pt_xform_identity();
         find_origin(&pl.xform, box, pl.origin);
-        for (int i = 0; i < 3; i++)
-            pl.xform.m[i][3] -= pl.origin[i];
-    } else {
-        pl.xform = pt_builder_to_render(b, pl.at[0]);
+        origin = pl.origin;
     }
+    for (int i = 0; i < 3; i++)
+        pl.xform.m[i][3] -= origin[i];
     return pl;
 }
 

@@ -95,12 +95,6 @@ static int is_even(const double *const c[4], size_t size)
     return off <= 1e-5 * extent; /* rectangles of floats count */
 }
 
-static void cross(const double d[3], const double e[3], double n[3])
-{
-    for (size_t k = 0; k < 3; k++)
-        n[k] = d[(k + 1) % 3] * e[(k + 2) % 3] - d[(k + 2) % 3] * e[(k + 1) % 3];
-}
-
 /* Across a patch at (u, v), 0 where corners coincide. Bilinear as the patch, so that it is not to be made unit before it is
  * interpolated. */
 static void patch_normal(const double *const c[4], double u, double v, double n[3])
@@ -110,7 +104,7 @@ static void patch_normal(const double *const c[4], double u, double v, double n[
         d[k] = (1 - v) * (c[1][k] - c[0][k]) + v * (c[3][k] - c[2][k]);
         e[k] = (1 - u) * (c[2][k] - c[0][k]) + u * (c[3][k] - c[1][k]);
     }
-    cross(d, e, n);
+    pt_cross(d, e, n);
 }
 
 int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
@@ -367,7 +361,7 @@ int pt_build_revolved(struct pt_builder *b, struct pt_params *p)
             /* around: at the tip as just before it */
             const double d[3] = {kind[0] == 'h' ? -q[1] : -s, kind[0] == 'h' ? q[0] : c, 0};
             double n[3];
-            cross(d, e, n);
+            pt_cross(d, e, n);
             add_vertex(&g, q, n, u, v);
         }
     add_grid(&g, 0, AROUND + 1, ALONG + 1);

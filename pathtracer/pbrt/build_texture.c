@@ -240,18 +240,23 @@ static struct pt_input input(struct context *c, const char *name, double fallbac
     return pt_build_colour_input(c->b, c->p, name, PT_USE_UNBOUNDED, v3_splat((float)fallback));
 }
 
+/* Index of the word that a parameter has, 0 when it is absent. -1 after a failure. */
+static int read_word(struct pt_params *p, const char *name, const char *const *words, const char *expected)
+{
+    const char *word = pt_params_string(p, name, words[0]);
+    const int index = base_word_index(words, word, strlen(word));
+    if (index < 0)
+        pt_params_fail(p, name, "unknown %s \"%.40s\" (expected %s)", name, word, expected);
+    return index;
+}
+
 static void read_mapping(struct context *c, struct pt_texture *t)
 {
+    static const char *const mappings[] = {"uv", "spherical", "cylindrical", "planar", NULL};
     struct pt_params *p = c->p;
-    const char *mapping = pt_params_string(p, "mapping", "uv");
-    if (strcmp(mapping, "uv") != 0) {
-        static const char *const known[] = {"spherical", "cylindrical", "planar", NULL};
-        if (base_word_index(known, mapping, strlen(mapping)) < 0)
-            pt_params_fail(p, "mapping", "unknown mapping \"%.40s\" (expected uv, spherical, cylindrical or planar)",
-                           mapping);
-        else
-            pt_params_warn(p, "mapping", "mapping \"%s\" is replaced by the shape's own uv", mapping);
-    }
+    const int mapping = read_word(p, "mapping", mappings, "uv, spherical, cylindrical or planar");
+    if (mapping > 0)
+        pt_params_warn(p, "mapping", "mapping \"%s\" is replaced by the shape's own uv", mappings[mapping]);
     t->su = (float)pt_params_float(p, "uscale", 1);
     t->sv = (float)pt_params_float(p, "vscale", 1);
     t->du = (float)pt_params_float(p, "udelta", 0);
@@ -324,33 +329,21 @@ static void make_bilerp(struct context *c, struct pt_texture *t)
     read_mapping(c, t);
 }
 
-/* pbrt-v4's filters: what is no single texel is bilinear here. */
-static int reads_nearest(struct context *c)
-{
-    static const char *const filters[] = {"point", "bilinear", "trilinear", "EWA", "ewa", NULL};
-    const char *name = pt_params_string(c->p, "filter", "bilinear");
-    int filter = base_word_index(filters, name, strlen(name));
-    if (filter < 0)
-        pt_params_fail(c->p, "filter", "unknown filter \"%.40s\" (expected point, bilinear, trilinear or ewa)", name);
-    return filter == 0;
-}
-
 static void make_imagemap(struct context *c, struct pt_texture *t)
 {
     static const char *const wraps[] = {"repeat", "black", "clamp", "octahedralsphere", NULL}; /* by enum pt_wrap */
+    /* pbrt-v4's: what is no single texel is bilinear here */
+    static const char *const filters[] = {"bilinear", "point", "trilinear", "EWA", "ewa", NULL};
     struct pt_params *p = c->p;
     const char *file = pt_params_string(p, "filename", ""), *encoding = pt_params_string(p, "encoding", NULL);
-    const char *wrap = pt_params_string(p, "wrap", "repeat");
     struct pt_param *gamma = pt_params_find(p, "gamma");
     t->kind = PT_TEXTURE_IMAGE;
     if (gamma && gamma->type == PT_PARAM_BOOL) /* v3 */
         encoding = pt_params_bool(p, "gamma", 1) ? "sRGB" : "linear";
     else
         pt_params_ignore(p, "gamma");
-    t->wrap = base_word_index(wraps, wrap, strlen(wrap));
-    if (t->wrap < 0)
-        pt_params_fail(p, "wrap", "unknown wrap \"%.40s\" (expected repeat, black or clamp)", wrap);
-    t->is_nearest = reads_nearest(c);
+    t->wrap = read_word(p, "wrap", wraps, "repeat, black or clamp");
+    t->is_nearest = read_word(p, "filter", filters, "point, bilinear, trilinear or ewa") == 1;
     t->scale = (float)pt_params_float(p, "scale", 1);
     t->invert = pt_params_bool(p, "invert", 0);
     t->is_signed = c->is_float && !t->invert;

@@ -204,13 +204,6 @@ static int do_camera(struct parser *p)
     return pt_parser_save_system(p, "camera", inverse);
 }
 
-/* The choice is ours. */
-static int do_accelerator(struct parser *p)
-{
-    (void)p;
-    return 0;
-}
-
 static int do_world_begin(struct parser *p)
 {
     if (p->in_world)
@@ -430,10 +423,10 @@ static const struct directive directives[] = {
     {"Sampler", do_header, .header = PT_HEADER_SAMPLER},
     {"Integrator", do_header, .header = PT_HEADER_INTEGRATOR},
     {"SurfaceIntegrator", do_header, .header = PT_HEADER_INTEGRATOR},
-    {"VolumeIntegrator", do_accelerator, .reads = READ_PLAIN},
-    {"Renderer", do_accelerator, .reads = READ_PLAIN},
+    {"VolumeIntegrator", .reads = READ_PLAIN},
+    {"Renderer", .reads = READ_PLAIN},
     {"PixelFilter", do_header, .header = PT_HEADER_FILTER},
-    {"Accelerator", do_accelerator, .reads = READ_PLAIN},
+    {"Accelerator", .reads = READ_PLAIN},
     {.name = "WorldBegin", .run = do_world_begin},
     {"WorldEnd", do_world_end, .in_world = 1},
     {0},
@@ -465,7 +458,7 @@ static int run_directive(struct parser *p, const struct pt_token *t)
              : d->numbers > 0           ? read_numbers(p)
              : d->reads != READ_NOTHING ? read_entity(p, (int)d->reads - READ_FOR_SHAPE)
                                         : 0;
-    return rc ? rc : d->run(p);
+    return rc || !d->run ? rc : d->run(p);
 }
 
 static int finish(struct parser *p, struct pt_loc loc)

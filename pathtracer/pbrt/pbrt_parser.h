@@ -43,8 +43,8 @@ enum directive_reads {
 
 struct directive {
     const char *name;
-    int (*run)(struct parser *p);
-    int in_world; /* refused before WorldBegin */
+    int (*run)(struct parser *p); /* NULL: the choice is ours */
+    int in_world;                 /* refused before WorldBegin */
     /* what goes into parser.name, .numbers or .params first, or none of them: */
     const char *text; /* a quoted string, called so in errors */
     int numbers;      /* so many */

@@ -1,6 +1,7 @@
 #include "pbrt/spectra.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/options.h"
@@ -147,19 +148,18 @@ static double oxide_index(const char *oxide, double um)
 
 int pt_spd_named(const char *name, struct pt_spd *out)
 {
-    char metal[8] = "";
-    const char *dash = strrchr(name, '-');
+    char metal[8], which[4];
+    int end = 0;
     double glass = pt_glass_index(name);
     if (glass > 0) {
         pt_spd_constant(glass, out);
         return 1;
     }
-    if (strncmp(name, "metal-", 6) != 0 || !dash || dash < name + 6 || (size_t)(dash - name - 6) >= sizeof metal)
+    if (sscanf(name, "metal-%7[^-]-%3[a-z]%n", metal, which, &end) != 2 || name[end] != '\0')
         return 0;
-    int is_k = strcmp(dash, "-k") == 0;
-    if (!is_k && strcmp(dash, "-eta") != 0)
+    const int is_k = strcmp(which, "k") == 0;
+    if (!is_k && strcmp(which, "eta") != 0)
         return 0;
-    memcpy(metal, name + 6, (size_t)(dash - name - 6));
     if (noble_metal(metal, is_k, out))
         return 1;
     if (strcmp(metal, "Al") == 0) {

@@ -209,7 +209,8 @@ static void limit_normal(const struct mesh *m, const uint32_t *ring, int count, 
         t[k] = count > 2 ? t[k] / (count - 2) - m->p[3 * v + k]
                          : m->p[3 * (size_t)ring[0] + k] + m->p[3 * (size_t)ring[1] + k] - 2 * m->p[3 * v + k];
     }
-    const double n[3] = {t[1] * s[2] - t[2] * s[1], t[2] * s[0] - t[0] * s[2], t[0] * s[1] - t[1] * s[0]};
+    double n[3];
+    pt_cross(t, s, n);
     const double len = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     for (size_t k = 0; k < 3; k++)
         out[k] = len > 0 ? n[k] / len : 0;

@@ -38,13 +38,13 @@ struct pt_xform pt_xform_rotate(double angle_deg, double x, double y, double z)
                               {x * z * (1 - c) - y * s, y * z * (1 - c) + x * s, z * z + (1 - z * z) * c, 0}}};
 }
 
-static void cross(const double a[3], const double b[3], double out[3])
+void pt_cross(const double a[3], const double b[3], double out[3])
 {
     double r[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
     memcpy(out, r, sizeof r);
 }
 
-static int normalize(double v[3])
+int pt_normalize(double v[3])
 {
     double len = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     if (!(len > 0) || !isfinite(len))
@@ -57,12 +57,12 @@ static int normalize(double v[3])
 int pt_xform_look_at(const double eye[3], const double look[3], const double up[3], struct pt_xform *out)
 {
     double z[3] = {look[0] - eye[0], look[1] - eye[1], look[2] - eye[2]}, u[3] = {up[0], up[1], up[2]}, x[3], y[3];
-    if (!normalize(z) || !normalize(u))
+    if (!pt_normalize(z) || !pt_normalize(u))
         return 0;
-    cross(u, z, x);
-    if (x[0] * x[0] + x[1] * x[1] + x[2] * x[2] < 1e-18 || !normalize(x))
+    pt_cross(u, z, x);
+    if (x[0] * x[0] + x[1] * x[1] + x[2] * x[2] < 1e-18 || !pt_normalize(x))
         return 0;
-    cross(z, x, y);
+    pt_cross(z, x, y);
     struct pt_xform camera_to_world = {{{x[0], y[0], z[0], eye[0]}, {x[1], y[1], z[1], eye[1]}, {x[2], y[2], z[2], eye[2]}}};
     return pt_xform_invert(&camera_to_world, out);
 }

@@ -19,6 +19,10 @@ struct pt_xform pt_xform_translate(double x, double y, double z);
 struct pt_xform pt_xform_scale(double x, double y, double z);
 /* Degrees about an axis, which need not be unit but not zero. */
 struct pt_xform pt_xform_rotate(double angle_deg, double x, double y, double z);
+/* out = a × b, which may be a or b. */
+void pt_cross(const double a[3], const double b[3], double out[3]);
+/* Makes v unit; 0, and v as it was, when its length is 0 or not finite. */
+int pt_normalize(double v[3]);
 /* World → camera (+x right, +y up, +z forward, left-handed as in pbrt). 0 when the three points are degenerate. */
 int pt_xform_look_at(const double eye[3], const double look[3], const double up[3], struct pt_xform *out);
 /* From pbrt's sixteen numbers (columns one after the other). 0 when the last row is not (0, 0, 0, w ≠ 0). */
