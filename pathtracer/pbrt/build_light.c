@@ -61,12 +61,10 @@ static void read_direction(struct context *c)
 static void make_point(struct context *c)
 {
     double power = pt_params_float(c->p, "power", -1);
-    c->light->kind = PT_LIGHT_POINT;
     c->light->emission = scaled_colour(c->b, c->p, "I");
     if (power > 0)
         c->light->emission = v3_scale(c->light->emission, (float)(power / (4 * BASE_PI)));
     read_position(c);
-    pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
 }
 
 static void make_spot(struct context *c)
@@ -75,7 +73,6 @@ static void make_spot(struct context *c)
     double cone = pt_params_float_in(c->p, "coneangle", 30, 1e-3, 180),
            delta = pt_params_float_in(c->p, "conedeltaangle", 5, 0, 180);
     double cos_total = cos(cone * BASE_PI / 180), cos_start = cos(fmax(cone - delta, 0) * BASE_PI / 180);
-    c->light->kind = PT_LIGHT_SPOT;
     c->light->emission = scaled_colour(c->b, c->p, "I");
     if (power > 0) /* flux of the smooth fall-off: 2π ((1 - cos start) + (cos start - cos total) / 2) */
         c->light->emission =
@@ -85,18 +82,15 @@ static void make_spot(struct context *c)
     c->light->cos_total = cos_total;
     c->light->cos_start = cos_start;
     c->light->is_quartic = c->b->is_v3;
-    pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
 }
 
 static void make_distant(struct context *c)
 {
     double illuminance = pt_params_float(c->p, "illuminance", -1);
-    c->light->kind = PT_LIGHT_DISTANT;
     c->light->emission = scaled_colour(c->b, c->p, "L");
     if (illuminance > 0)
         c->light->emission = v3_scale(c->light->emission, (float)illuminance);
     read_direction(c);
-    pt_builder_effect(c->b, PT_FX_DELTA_LIGHT, c->p->loc);
 }
 
 /* How far a transform may be from a rotation before its inverse is no longer taken to be its transpose. */
@@ -193,9 +187,7 @@ static void make_infinite(struct context *c)
     const char *key = pt_params_find(p, "mapname") ? "mapname" : "filename", *file = pt_params_string(p, key, "");
     double illuminance = pt_params_float(p, "illuminance", -1);
     c->light->emission = scaled_colour(c->b, p, "L");
-    c->light->kind = PT_LIGHT_ENV_CONSTANT;
     make_portal(c);
-    pt_builder_effect(c->b, PT_FX_ENVIRONMENT, p->loc);
     if (file[0] == '\0') {
         if (illuminance > 0) /* of an upward patch under the whole sky of radiance 1; "L" and "scale" come on top */
             c->light->emission = v3_scale(c->light->emission, (float)(illuminance / BASE_PI));
@@ -244,23 +236,28 @@ static int add_light(struct pt_builder *b, const struct pt_light *light, struct 
 int pt_build_light(struct pt_builder *b, struct pt_params *p)
 {
     static const struct {
-        const char *kind;
+        const char *name;
+        int32_t kind;
+        pt_effects needs;
         void (*make)(struct context *c);
-    } kinds[] = {{"point", make_point},
-                 {"spot", make_spot},
-                 {"distant", make_distant},
-                 {"infinite", make_infinite},
-                 {"exinfinite", make_infinite},
-                 {"projection", make_projection},
-                 {"goniometric", make_goniometric}};
+    } kinds[] = {{"point", PT_LIGHT_POINT, PT_FX_DELTA_LIGHT, make_point},
+                 {"spot", PT_LIGHT_SPOT, PT_FX_DELTA_LIGHT, make_spot},
+                 {"distant", PT_LIGHT_DISTANT, PT_FX_DELTA_LIGHT, make_distant},
+                 {"infinite", PT_LIGHT_ENV_CONSTANT, PT_FX_ENVIRONMENT, make_infinite},
+                 {"exinfinite", PT_LIGHT_ENV_CONSTANT, PT_FX_ENVIRONMENT, make_infinite},
+                 {"projection", PT_LIGHT_SPOT, PT_FX_DELTA_LIGHT, make_projection},
+                 {"goniometric", PT_LIGHT_POINT, PT_FX_DELTA_LIGHT, make_goniometric}};
     struct pt_light light = {.kind = -1, .shape = -1, .image = -1};
     struct pt_xform at[2];
     if (pt_builder_at_shutter(b, b->state->ctm, at))
         pt_params_warn(p, NULL, "lights do not move: the transform at shutter open is used");
     struct context c = {b, p, at[0], &light};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
-        if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
+        if (strcmp(kinds[i].name, pt_params_kind(p)) == 0) {
+            light.kind = kinds[i].kind;
+            pt_builder_effect(b, kinds[i].needs, p->loc);
             kinds[i].make(&c);
+        }
     if (light.kind < 0)
         return pt_diag_unknown(&b->diag, p->loc, "light", pt_params_kind(p), "point, spot, distant, infinite …",
                                "it is left out");

@@ -213,35 +213,31 @@ static int place_grid(struct pt_builder *b, struct pt_params *p, struct pt_mediu
 }
 
 /* v4's Lescale of a grid, one for each density. There is one emission for all here: that of the same whole. */
-static void read_glow(struct pt_builder *b, struct pt_params *p, size_t expected, struct pt_medium *m)
+static int read_glow(struct pt_params *p, size_t expected, struct pt_medium *m)
 {
-    const struct pt_param *temperature = pt_params_find(p, "temperature"), *given = pt_params_find(p, "Lescale");
     size_t n;
-    if (temperature)
-        pt_diag_warn(&b->diag, temperature->loc, "the temperature of a grid medium is ignored: it does not glow");
+    if (pt_params_find(p, "temperature"))
+        pt_params_warn(p, "temperature", "the temperature of a grid medium is ignored: it does not glow");
     pt_params_ignore(p, "temperature temperaturecutoff temperatureoffset temperaturescale");
     if (!has_many(p, "Lescale"))
-        return;
+        return 0;
     const double *scales = pt_params_floats(p, "Lescale", 1, &n);
     double sum = 0, weights = 0;
-    if (n != expected) {
-        pt_diag_fail(&b->diag, given->loc, "Lescale has %zu values (expected 1 or nx·ny·nz = %zu)", n, expected);
-        return;
-    }
+    if (n != expected)
+        return pt_params_fail(p, "Lescale", "Lescale has %zu values (expected 1 or nx·ny·nz = %zu)", n, expected);
     int varies = 0;
     for (size_t i = 0; i < n; i++) {
         double density = (double)m->density[i];
-        if (!(scales[i] >= 0 && scales[i] <= 1e12)) {
-            pt_diag_fail(&b->diag, given->loc, "Lescale %zu is %g (expected 0 to 1e+12)", i, scales[i]);
-            return;
-        }
+        if (!(scales[i] >= 0 && scales[i] <= 1e12))
+            return pt_params_fail(p, "Lescale", "Lescale %zu is %g (expected 0 to 1e+12)", i, scales[i]);
         sum += density * scales[i];
         weights += density;
         varies |= scales[i] != scales[0];
     }
     if (varies && !v3_is_black(m->emission))
-        pt_diag_warn(&b->diag, given->loc, "Lescale of a grid medium is replaced by its mean");
+        pt_params_warn(p, "Lescale", "Lescale of a grid medium is replaced by its mean");
     m->emission = v3_scale(m->emission, (float)(weights > 0 ? sum / weights : scales[0]));
+    return 0;
 }
 
 /* The number of densities is checked before memory is taken: a file may say anything of nx, ny and nz. */
@@ -269,7 +265,7 @@ static int read_grid(struct pt_builder *b, struct pt_params *p, struct pt_medium
         kept[i] = (float)density[i];
     }
     m->density = kept;
-    read_glow(b, p, expected, m);
+    read_glow(p, expected, m);
     return place_grid(b, p, m);
 }
 

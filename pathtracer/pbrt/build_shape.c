@@ -309,36 +309,31 @@ int pt_build_check_index(const struct pt_params *p, double v, size_t vertex_coun
                           vertex_count > 0 ? vertex_count - 1 : 0);
 }
 
-/* Whole numbers of a list as vertex indices in [0, vertex_count); malloc'ed, NULL on failure. */
-static uint32_t *read_indices(struct pt_builder *b, struct pt_params *p, size_t vertex_count, size_t *count)
+/* A list as vertex indices in [0, vertex_count); malloc'ed. */
+static int read_indices(struct pt_params *p, size_t vertex_count, uint32_t **out, size_t *count)
 {
     const double *given = pt_params_ints(p, "indices", count);
-    size_t n = given ? *count : 3;
-    if (b->diag.rc)
-        return NULL;
-    if (!given && vertex_count != 3) {
-        pt_params_fail(p, NULL, "a trianglemesh of %zu vertices needs \"integer indices\"", vertex_count);
-        return NULL;
-    }
-    if (n % 3 != 0) {
-        pt_params_fail(p, "indices", "%zu indices (expected a multiple of 3)", n);
-        return NULL;
-    }
-    uint32_t *indices = malloc((n > 0 ? n : 1) * sizeof *indices);
-    if (!indices) {
-        pt_diag_nomem(&b->diag, "a mesh");
-        return NULL;
-    }
-    for (size_t i = 0; i < n; i++) {
+    if (p->diag->rc)
+        return p->diag->rc;
+    if (!given && vertex_count != 3)
+        return pt_params_fail(p, NULL, "a trianglemesh of %zu vertices needs \"integer indices\"", vertex_count);
+    if (!given)
+        *count = 3;
+    if (*count % 3 != 0)
+        return pt_params_fail(p, "indices", "%zu indices (expected a multiple of 3)", *count);
+    uint32_t *indices = malloc(*count * sizeof *indices);
+    if (!indices)
+        return pt_diag_nomem(p->diag, "a mesh");
+    for (size_t i = 0; i < *count; i++) {
         double v = given ? given[i] : (double)i;
         if (pt_build_check_index(p, v, vertex_count) != 0) {
             free(indices);
-            return NULL;
+            return p->diag->rc;
         }
         indices[i] = (uint32_t)v;
     }
-    *count = n;
-    return indices;
+    *out = indices;
+    return 0;
 }
 
 static int is_empty(const struct pt_params *p, const char *name)
@@ -366,8 +361,8 @@ static int make_triangle_mesh(struct pt_builder *b, struct pt_params *p)
         return pt_params_fail(p, "N", "%zu normals for %zu vertices", n_count, soup.vertex_count);
     if (soup.uvd && uv_count != soup.vertex_count)
         return pt_params_fail(p, uv_name, "%zu texture coordinates for %zu vertices", uv_count, soup.vertex_count);
-    uint32_t *indices = read_indices(b, p, soup.vertex_count, &index_count);
-    if (!indices)
+    uint32_t *indices = NULL;
+    if (read_indices(p, soup.vertex_count, &indices, &index_count) != 0)
         return b->diag.rc;
     soup.indices = indices;
     soup.triangle_count = index_count / 3;

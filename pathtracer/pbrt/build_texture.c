@@ -264,16 +264,11 @@ static void read_mapping(struct context *c, struct pt_texture *t)
     pt_params_ignore(p, "v1 v2");
 }
 
-static void make_constant(struct context *c, struct pt_texture *t)
-{
-    t->kind = PT_TEXTURE_CONSTANT;
-    t->in[0] = input(c, "value", 1);
-}
+static void make_constant(struct context *c, struct pt_texture *t) { t->in[0] = input(c, "value", 1); }
 
 static void make_scale(struct context *c, struct pt_texture *t)
 {
     struct pt_input x, y;
-    t->kind = PT_TEXTURE_SCALE;
     if (pt_params_find(c->p, "tex") || pt_params_find(c->p, "scale")) { /* v4 */
         x = input(c, "tex", 1);
         y = pt_build_float_input(c->b, c->p, "scale", 1);
@@ -291,7 +286,6 @@ static void make_scale(struct context *c, struct pt_texture *t)
 
 static void make_mix(struct context *c, struct pt_texture *t)
 {
-    t->kind = PT_TEXTURE_MIX;
     t->in[0] = input(c, "tex1", 0);
     t->in[1] = input(c, "tex2", 1);
     t->in[2] = pt_build_float_input(c->b, c->p, "amount", 0.5);
@@ -311,7 +305,6 @@ static void make_direction_mix(struct context *c, struct pt_texture *t)
 
 static void make_checkerboard(struct context *c, struct pt_texture *t)
 {
-    t->kind = PT_TEXTURE_CHECKERBOARD;
     t->in[0] = input(c, "tex1", 1);
     t->in[1] = input(c, "tex2", 0);
     read_mapping(c, t);
@@ -323,7 +316,6 @@ static void make_checkerboard(struct context *c, struct pt_texture *t)
 static void make_bilerp(struct context *c, struct pt_texture *t)
 {
     static const char *const corners[4] = {"v00", "v01", "v10", "v11"};
-    t->kind = PT_TEXTURE_BILERP;
     for (int i = 0; i < 4; i++)
         t->in[i] = input(c, corners[i], i % 2);
     read_mapping(c, t);
@@ -337,7 +329,6 @@ static void make_imagemap(struct context *c, struct pt_texture *t)
     struct pt_params *p = c->p;
     const char *file = pt_params_string(p, "filename", ""), *encoding = pt_params_string(p, "encoding", NULL);
     struct pt_param *gamma = pt_params_find(p, "gamma");
-    t->kind = PT_TEXTURE_IMAGE;
     if (gamma && gamma->type == PT_PARAM_BOOL) /* v3 */
         encoding = pt_params_bool(p, "gamma", 1) ? "sRGB" : "linear";
     else
@@ -369,7 +360,6 @@ static void make_stand_in(struct context *c, struct pt_texture *t)
     const char *kind = pt_params_kind(c->p);
     struct pt_input inside = input(c, "inside", 1), outside = input(c, "outside", 0);
     pt_params_warn(c->p, NULL, "texture \"%s\" is replaced by a constant", kind);
-    t->kind = PT_TEXTURE_CONSTANT;
     t->in[0] = strcmp(kind, "dots") == 0 && !inside.texture && !outside.texture
                    ? (struct pt_input){0, v3_scale(v3_add(inside.value, outside.value), 0.5f)}
                    : pt_input_grey(0.5);
@@ -392,35 +382,36 @@ static void count_lookups(const struct pt_texture *all, const struct pt_texture 
 int pt_build_texture(struct pt_builder *b, const char *name, const char *class_name, struct pt_params *p)
 {
     static const struct {
-        const char *kind;
+        const char *name;
+        int32_t kind;
         void (*make)(struct context *c, struct pt_texture *t);
-    } kinds[] = {{"imagemap", make_imagemap},
-                 {"scale", make_scale},
-                 {"mix", make_mix},
-                 {"constant", make_constant},
-                 {"checkerboard", make_checkerboard},
-                 {"bilerp", make_bilerp},
-                 {"directionmix", make_direction_mix},
-                 {"dots", make_stand_in},
-                 {"fbm", make_stand_in},
-                 {"wrinkled", make_stand_in},
-                 {"windy", make_stand_in},
-                 {"marble", make_stand_in},
-                 {"ptex", make_stand_in},
-                 {"uv", make_stand_in}};
+    } kinds[] = {{"imagemap", PT_TEXTURE_IMAGE, make_imagemap},
+                 {"scale", PT_TEXTURE_SCALE, make_scale},
+                 {"mix", PT_TEXTURE_MIX, make_mix},
+                 {"constant", PT_TEXTURE_CONSTANT, make_constant},
+                 {"checkerboard", PT_TEXTURE_CHECKERBOARD, make_checkerboard},
+                 {"bilerp", PT_TEXTURE_BILERP, make_bilerp},
+                 {"directionmix", PT_TEXTURE_MIX, make_direction_mix}};
+    static const char *const stand_ins[] = {"dots", "fbm", "wrinkled", "windy", "marble", "ptex", "uv", NULL};
+    const char *kind = pt_params_kind(p);
     int is_float = strcmp(class_name, "float") == 0;
     if (!is_float && strcmp(class_name, "spectrum") != 0 && strcmp(class_name, "color") != 0 &&
         strcmp(class_name, "rgb") != 0)
         return pt_params_fail(p, NULL, "texture \"%s\" of type \"%s\" (expected float or spectrum)", name, class_name);
     struct context c = {b, p, is_float};
-    /* What is not rendered has a stand-in, with a warning, so that scenes of other renderers load. */
-    struct pt_texture t = {.kind = -1, .scale = 1, .su = 1, .sv = 1, .channel = 0};
-    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
-        if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
-            kinds[i].make(&c, &t);
-    if (t.kind < 0)
-        return pt_diag_unknown(&b->diag, p->loc, "texture class", pt_params_kind(p),
-                               "imagemap, scale, mix, constant, checkerboard …", "it is left out");
+    struct pt_texture t = {.kind = PT_TEXTURE_CONSTANT, .scale = 1, .su = 1, .sv = 1};
+    size_t i = 0;
+    while (i < sizeof kinds / sizeof kinds[0] && strcmp(kinds[i].name, kind) != 0)
+        i++;
+    if (i < sizeof kinds / sizeof kinds[0]) {
+        t.kind = kinds[i].kind;
+        kinds[i].make(&c, &t);
+    } else if (base_word_index(stand_ins, kind, strlen(kind)) >= 0) {
+        make_stand_in(&c, &t);
+    } else {
+        return pt_diag_unknown(&b->diag, p->loc, "texture class", kind, "imagemap, scale, mix, constant, checkerboard …",
+                               "it is left out");
+    }
     pt_params_check_used(p);
     if (b->diag.rc)
         return b->diag.rc;

@@ -137,7 +137,6 @@ static void polar(const struct pt_xform *t, struct pt_xform *rotation, struct pt
     struct pt_xform r = *t, inverse;
     r.m[0][3] = r.m[1][3] = r.m[2][3] = 0;
     const struct pt_xform source = r;
-    struct pt_xform linear = r;
     for (int step = 0; step < 100; step++) {
         double change = 0;
         if (!pt_xform_invert(&r, &inverse))
@@ -146,9 +145,8 @@ static void polar(const struct pt_xform *t, struct pt_xform *rotation, struct pt
             for (int j = 0; j < 3; j++) {
                 double next = 0.5 * (r.m[i][j] + inverse.m[j][i]);
                 change = fmax(change, fabs(next - r.m[i][j]));
-                linear.m[i][j] = next;
+                r.m[i][j] = next;
             }
-        r = linear;
         if (change < 1e-12)
             break;
     }
