@@ -1,9 +1,9 @@
 /* Colours and indices of refraction from parameters: rgb, xyz, spectra by list, name or file, black bodies. */
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/text.h"
 #include "pbrt/build.h"
 #include "pbrt/number.h"
 #include "pbrt/spectra.h"
@@ -16,7 +16,7 @@ static int by_wavelength(const void *a, const void *b)
 }
 
 /* A spectrum of pairs: where its wavelengths do not rise, pbrt-v3 sorts them and v4 refuses it. `file` is "" or names the
- * file that they are from, with ": " behind it. */
+ * file that they are from. */
 static int read_pairs(struct pt_builder *b, const struct pt_param *param, const char *file, const double *pairs,
                       size_t count, int extend, struct pt_spd *out)
 {
@@ -24,8 +24,8 @@ static int read_pairs(struct pt_builder *b, const struct pt_param *param, const 
     while (i < count && (pairs[2 * i] > pairs[2 * i - 2] || (b->is_v3 && pairs[2 * i] == pairs[2 * i - 2])))
         i++;
     if (i < count && !b->is_v3)
-        return pt_diag_fail(&b->diag, param->loc, "%swavelength %g after %g (expected rising ones)", file, pairs[2 * i],
-                            pairs[2 * i - 2]);
+        return pt_diag_fail(&b->diag, param->loc, "%s%swavelength %g after %g (expected rising ones)", file,
+                            *file ? ": " : "", pairs[2 * i], pairs[2 * i - 2]);
     double *sorted = i < count ? malloc(2 * count * sizeof *sorted) : NULL;
     if (i < count && !sorted)
         return pt_diag_nomem(&b->diag, "spectrum");
@@ -53,7 +53,7 @@ static int read_spd_file(struct pt_builder *b, const struct pt_param *param, con
     if (b->source->read(b->source->data, path, &bytes, &size, &err) != 0)
         return pt_diag_fail(&b->diag, param->loc, "spectrum \"%s\" is neither a known name nor a readable file", name);
     const char *end = bytes + size;
-    for (const char *at = size >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0 ? bytes + 3 : bytes; at < end && !b->diag.rc;) {
+    for (const char *at = bytes + base_utf8_mark(bytes, size); at < end && !b->diag.rc;) {
         if (*at == '#') {
             while (at < end && *at != '\n' && *at != '\r')
                 at++;
@@ -73,10 +73,8 @@ static int read_spd_file(struct pt_builder *b, const struct pt_param *param, con
     }
     if (!b->diag.rc && (n < 2 || n % 2 != 0))
         pt_diag_fail(&b->diag, param->loc, "%s: %zu numbers (expected pairs of wavelength and value)", path, n);
-    char file[sizeof path + 2];
-    snprintf(file, sizeof file, "%s: ", path);
     if (!b->diag.rc)
-        read_pairs(b, param, file, numbers, n / 2, extend, out);
+        read_pairs(b, param, path, numbers, n / 2, extend, out);
     free(numbers);
     free(bytes);
     return b->diag.rc;

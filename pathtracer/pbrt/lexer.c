@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/text.h"
+
 int pt_lexer_include(struct pt_lexer *lexer, const char *path, struct pt_loc from, int scoped)
 {
     if (lexer->depth >= PT_LEXER_DEPTH)
@@ -10,7 +12,7 @@ int pt_lexer_include(struct pt_lexer *lexer, const char *path, struct pt_loc fro
     for (int i = 0; i < lexer->depth; i++)
         if (strcmp(lexer->stack[i].loc.file, path) == 0)
             return pt_diag_fail(lexer->diag, from, "\"%s\" includes itself", path);
-    struct pt_lexer_file file = {.from = from, .scoped = scoped};
+    struct pt_lexer_file file = {.scoped = scoped};
     struct base_err err = {0};
     size_t size = 0;
     int rc = lexer->source->read(lexer->source->data, path, &file.bytes, &size, &err);
@@ -27,10 +29,8 @@ int pt_lexer_include(struct pt_lexer *lexer, const char *path, struct pt_loc fro
         free(file.bytes);
         return pt_diag_fail(lexer->diag, file.loc, "the text is UTF-16 (expected UTF-8)");
     }
-    file.at = file.line_start = file.bytes;
+    file.at = file.line_start = file.bytes + base_utf8_mark(file.bytes, size);
     file.end = file.bytes + size;
-    if (size >= 3 && memcmp(file.bytes, "\xef\xbb\xbf", 3) == 0)
-        file.at = file.line_start = file.bytes + 3;
     lexer->stack[lexer->depth++] = file;
     return 0;
 }

@@ -32,8 +32,7 @@ struct pt_token {
 struct pt_lexer_file {
     char *bytes; /* owns */
     char *at, *end, *line_start;
-    struct pt_loc loc;  /* file and the current line */
-    struct pt_loc from; /* where it was included */
+    struct pt_loc loc; /* file and the current line */
     int scoped;
 };
 

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/options.h"
 #include "pbrt/number.h"
 
 static const struct {
@@ -165,18 +166,16 @@ static int add_string(struct pt_params *params, struct pt_param *p, const char *
     return add_number(params, p, (double)pt_params_keep(params, text, length));
 }
 
-static int is_word(const struct pt_token *t, const char *word)
-{
-    return t->length == strlen(word) && memcmp(t->text, word, t->length) == 0;
-}
+static const char *const bool_words[] = {"false", "true", NULL};
 
 static int add_value(struct pt_params *params, struct pt_param *p, const struct pt_token *t)
 {
     const char *name = pt_param_name(params, p);
     int text = t->kind == PT_TOKEN_STRING;
     if (p->type == PT_PARAM_BOOL) {
-        if (is_word(t, "true") || is_word(t, "false"))
-            return add_number(params, p, t->text[0] == 't');
+        const int word = base_word_index(bool_words, t->text, t->length);
+        if (word >= 0)
+            return add_number(params, p, word);
         return pt_diag_fail(params->diag, t->loc, "value of \"bool %s\" is \"%.*s\" (expected true or false)", name,
                             clip(t->length), t->text);
     }
@@ -419,8 +418,9 @@ int pt_params_bool(struct pt_params *params, const char *name, int fallback)
     if (!p->is_text)
         return params->numbers[p->first] != 0;
     const char *s = pt_params_string_at(params, p, 0);
-    if (strcmp(s, "true") == 0 || strcmp(s, "false") == 0)
-        return s[0] == 't';
+    const int word = base_word_index(bool_words, s, strlen(s));
+    if (word >= 0)
+        return word;
     pt_diag_fail(params->diag, p->loc, "parameter \"%s\" is \"%.40s\" (expected true or false)", name, s);
     return fallback;
 }

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/options.h"
 #include "pbrt/pbrt_parser.h"
 
 /* A transform may flatten what comes (Scale 0 hides things in animations): who needs its inverse sees to that. */
@@ -78,14 +79,12 @@ static int do_coord_sys_transform(struct parser *p)
 static int do_active_transform(struct parser *p)
 {
     struct pt_token t = pt_lexer_next(&p->lexer);
-    if (t.length == 9 && memcmp(t.text, "StartTime", 9) == 0)
-        p->state.active = 1;
-    else if (t.length == 7 && memcmp(t.text, "EndTime", 7) == 0)
-        p->state.active = 2;
-    else if (t.length == 3 && memcmp(t.text, "All", 3) == 0)
-        p->state.active = 3;
-    else
+    /* by the bits of pt_state.active, from 1 on */
+    static const char *const words[] = {"StartTime", "EndTime", "All", NULL};
+    const int word = base_word_index(words, t.text, t.length);
+    if (word < 0)
         return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "ActiveTransform needs StartTime, EndTime or All");
+    p->state.active = (unsigned)word + 1;
     return 0;
 }
 

@@ -11,13 +11,9 @@
 
 enum ply_type { T_NONE, T_I8, T_U8, T_I16, T_U16, T_I32, T_U32, T_F32, T_F64 };
 static const uint8_t type_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
-static const struct {
-    const char *name;
-    enum ply_type type;
-} type_names[] = {{"char", T_I8},   {"int8", T_I8},     {"uchar", T_U8},   {"uint8", T_U8},
-                  {"short", T_I16}, {"int16", T_I16},   {"ushort", T_U16}, {"uint16", T_U16},
-                  {"int", T_I32},   {"int32", T_I32},   {"uint", T_U32},   {"uint32", T_U32},
-                  {"float", T_F32}, {"float32", T_F32}, {"double", T_F64}, {"float64", T_F64}};
+static const char *const type_names[] = {"none", "char", "uchar", "short", "ushort", "int", "uint", "float", "double"};
+static const char *const sized_names[] = {"none",  "int8",   "uint8",   "int16",  "uint16",
+                                          "int32", "uint32", "float32", "float64"};
 
 /* What a property means to us. */
 enum role { R_SKIP, R_X, R_Y, R_Z, R_NX, R_NY, R_NZ, R_U, R_V, R_INDICES, R_CORNER_UVS };
@@ -91,10 +87,10 @@ static int split(char *line, char *words[], int max)
 
 static enum ply_type type_of(const char *name)
 {
-    for (size_t i = 0; i < sizeof type_names / sizeof type_names[0]; i++)
-        if (strcmp(type_names[i].name, name) == 0)
-            return type_names[i].type;
-    return T_NONE;
+    enum ply_type type = T_F64;
+    while (type > T_NONE && strcmp(type_names[type], name) != 0 && strcmp(sized_names[type], name) != 0)
+        type--;
+    return type;
 }
 
 static enum role role_of(const struct element *e, const char *name, int is_list)
