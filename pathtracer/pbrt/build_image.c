@@ -15,10 +15,8 @@ static int is_one_of(const char *kind, const char *const *names) { return base_w
 static struct pt_params *begin(struct pt_builder *b, enum pt_header which, const char *fallback)
 {
     struct pt_params *p = &b->header[which];
-    if (!p->text) {
-        pt_params_clear(p, &b->diag, (struct pt_loc){NULL, 0, 0});
-        p->kind = pt_params_keep(p, fallback, strlen(fallback));
-    }
+    if (!p->text)
+        pt_params_clear(p, &b->diag, (struct pt_loc){NULL, 0, 0}, fallback);
     return p;
 }
 

@@ -496,8 +496,7 @@ static void keep_params(struct pt_builder *b, int32_t id, const char *kind, cons
         return;
     }
     info_of(b, id)->params = copy;
-    pt_params_clear(copy, &b->diag, p->loc);
-    copy->kind = pt_params_keep(copy, kind, strlen(kind));
+    pt_params_clear(copy, &b->diag, p->loc, kind);
     pt_params_append(copy, p);
 }
 
@@ -573,12 +572,11 @@ int32_t pt_build_shape_material(struct pt_builder *b, int32_t id, struct pt_para
         return id;
     const struct pt_params *own = id >= 0 ? info_of(b, id)->params : NULL;
     const char *kind = own ? pt_params_kind(own) : "matte";
-    pt_params_clear(&both, &b->diag, shape->loc);
-    both.kind = pt_params_keep(&both, kind, strlen(kind));
+    pt_params_clear(&both, &b->diag, shape->loc, kind);
     pt_params_append(&both, shape);
     if (own)
         pt_params_append(&both, own);
-    int32_t made = b->diag.rc ? -1 : build(b, pt_params_kind(&both), &both);
+    int32_t made = b->diag.rc ? -1 : build(b, kind, &both);
     for (size_t i = 0; i < shape->count && made >= 0; i++) {
         const char *name = pt_param_name(shape, &shape->items[i]);
         if (!pt_name_is_in(of_materials, name) || !pt_params_find(&both, name)->used)

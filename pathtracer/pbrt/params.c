@@ -45,23 +45,8 @@ static const char known_names[] =
     "initialsamples savefp16 crease nointerior maxwavelength jitter dichromatic writeframe infinitelights lights shadow "
     "dispersion ";
 
-void pt_params_clear(struct pt_params *params, struct pt_diag *diag, struct pt_loc loc)
-{
-    params->diag = diag;
-    params->loc = loc;
-    params->count = params->number_count = params->text_count = 0;
-    params->kind = pt_params_keep(params, "", 0);
-}
-
-void pt_params_release(struct pt_params *params)
-{
-    free(params->items);
-    free(params->numbers);
-    free(params->text);
-    *params = (struct pt_params){0};
-}
-
-size_t pt_params_keep(struct pt_params *params, const char *text, size_t length)
+/* Remembers a string and returns its offset in text. */
+static size_t keep(struct pt_params *params, const char *text, size_t length)
 {
     while (params->text_room - params->text_count <= length)
         if (!pt_grow((void **)&params->text, &params->text_room, params->text_room, 1)) {
@@ -74,6 +59,22 @@ size_t pt_params_keep(struct pt_params *params, const char *text, size_t length)
     params->text[at + length] = '\0';
     params->text_count += length + 1;
     return at;
+}
+
+void pt_params_clear(struct pt_params *params, struct pt_diag *diag, struct pt_loc loc, const char *kind)
+{
+    params->diag = diag;
+    params->loc = loc;
+    params->count = params->number_count = params->text_count = 0;
+    params->kind = keep(params, kind, strlen(kind));
+}
+
+void pt_params_release(struct pt_params *params)
+{
+    free(params->items);
+    free(params->numbers);
+    free(params->text);
+    *params = (struct pt_params){0};
 }
 
 const char *pt_params_kind(const struct pt_params *params) { return params->text ? params->text + params->kind : ""; }
@@ -145,7 +146,7 @@ static int read_declaration(struct pt_params *params, const struct pt_token *t, 
                             clip(d.type_end - d.type), t->text + d.type);
     out->type = d.kind;
     out->loc = t->loc;
-    out->name = pt_params_keep(params, t->text + d.name, d.name_end - d.name);
+    out->name = keep(params, t->text + d.name, d.name_end - d.name);
     return params->diag->rc;
 }
 
@@ -163,7 +164,7 @@ static int add_number(struct pt_params *params, struct pt_param *p, double value
 static int add_string(struct pt_params *params, struct pt_param *p, const char *text, size_t length)
 {
     p->is_text = 1;
-    return add_number(params, p, (double)pt_params_keep(params, text, length));
+    return add_number(params, p, (double)keep(params, text, length));
 }
 
 static const char *const bool_words[] = {"false", "true", NULL};
@@ -273,7 +274,7 @@ int pt_params_append(struct pt_params *params, const struct pt_params *from)
         if (pt_params_find(params, name))
             continue;
         struct pt_param p = *src;
-        p.name = pt_params_keep(params, name, strlen(name));
+        p.name = keep(params, name, strlen(name));
         p.inherited = 1;
         p.used = 0;
         p.count = 0;

@@ -52,11 +52,9 @@ struct pt_params {
     size_t text_count, text_room;
 };
 
-/* Empties, keeps the memory, and starts a list for the directive at `loc`. */
-void pt_params_clear(struct pt_params *params, struct pt_diag *diag, struct pt_loc loc);
+/* Empties, keeps the memory, and starts a list for the directive at `loc`, which names `kind`. */
+void pt_params_clear(struct pt_params *params, struct pt_diag *diag, struct pt_loc loc, const char *kind);
 void pt_params_release(struct pt_params *params);
-/* Remembers a string and returns its offset in text. */
-size_t pt_params_keep(struct pt_params *params, const char *text, size_t length);
 const char *pt_params_kind(const struct pt_params *params);
 /* Whether a string has two words, as those that declare a parameter. */
 int pt_params_declares(const struct pt_token *token);

@@ -60,11 +60,10 @@ static int read_entity(struct parser *p, int target)
 {
     char kind[NAME_MAX_BYTES];
     struct pt_params *params = &p->params;
-    pt_params_clear(params, &p->b->diag, p->loc);
     int rc = read_string(p, "name of what follows", kind, sizeof kind);
     if (rc)
         return rc;
-    params->kind = pt_params_keep(params, kind, strlen(kind));
+    pt_params_clear(params, &p->b->diag, p->loc, kind);
     rc = pt_params_read(params, &p->lexer);
     if (!rc && target >= 0 && p->state.attributes[target])
         rc = pt_params_append(params, p->state.attributes[target]);
@@ -302,7 +301,7 @@ static int do_attribute(struct parser *p)
         free(copy);
         return pt_diag_nomem(&p->b->diag, "attributes");
     }
-    pt_params_clear(copy, &p->b->diag, p->loc);
+    pt_params_clear(copy, &p->b->diag, p->loc, targets[target]);
     p->state.attributes[target] = copy;
     return pt_params_append(copy, &p->params);
 }
@@ -371,7 +370,7 @@ static int do_option(struct parser *p)
     const struct pt_token first = pt_lexer_peek(&p->lexer);
     if (first.kind != PT_TOKEN_STRING || !pt_params_declares(&first)) /* v4 has the name alone */
         return read_option(p);
-    pt_params_clear(&p->params, &p->b->diag, p->loc);
+    pt_params_clear(&p->params, &p->b->diag, p->loc, "");
     int rc = pt_params_read(&p->params, &p->lexer);
     for (size_t i = 0; i < p->params.count && !rc; i++) {
         const char *name = pt_param_name(&p->params, &p->params.items[i]);

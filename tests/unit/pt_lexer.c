@@ -115,7 +115,7 @@ static void list_across_files(void **state)
     expect(&x, PT_TOKEN_WORD, "Include", 1, 1);
     assert_int_equal(pt_lexer_include(&x.lexer, "b", (struct pt_loc){"a", 1, 1}, 0), 0);
     expect(&x, PT_TOKEN_WORD, "Medium", 1, 1);
-    pt_params_clear(&params, &x.diag, (struct pt_loc){0});
+    pt_params_clear(&params, &x.diag, (struct pt_loc){0}, "");
     assert_int_equal(pt_params_read(&params, &x.lexer), 0);
     assert_int_equal(params.count, 2);
     assert_true(pt_params_float(&params, "x", 0) == 4);
@@ -152,7 +152,7 @@ static void parameter_spellings(void **state)
     double xyz[3];
     size_t n;
     open_files(&x, &files);
-    pt_params_clear(&p, &x.diag, (struct pt_loc){0});
+    pt_params_clear(&p, &x.diag, (struct pt_loc){0}, "");
     assert_int_equal(pt_params_read(&p, &x.lexer), 0);
     assert_int_equal(p.count, 10);
     assert_true(pt_params_float(&p, "a", 0) == 2 && pt_params_float(&p, "b", 0) == 3);
