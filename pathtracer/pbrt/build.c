@@ -63,8 +63,7 @@ void pt_builder_path(struct pt_builder *b, const char *name, char *path, size_t 
 int pt_builder_name(struct pt_builder *b, struct pt_names *names, const char *name, int32_t value)
 {
     if (b->name_scopes > 0) {
-        struct pt_name_undo undo = {names, pt_arena_strndup(&b->scene->arena, name, strlen(name)),
-                                    pt_names_get(names, name)};
+        struct pt_name_undo undo = {names, pt_arena_strdup(&b->scene->arena, name), pt_names_get(names, name)};
         if (!undo.name)
             return pt_diag_nomem(&b->diag, "names");
         if (pt_list_add(b, &b->name_undo, &undo) < 0)

@@ -519,7 +519,7 @@ int32_t pt_build_named_material(struct pt_builder *b, struct pt_loc loc, const c
     }
     const struct pt_material unmade = {.kind = PT_BSDF_DIFFUSE, .eta = 1.5f};
     struct pt_material_info info = {.loc = loc, .opacity = pt_input_grey(1)};
-    info.wanted = pt_arena_strndup(&b->scene->arena, name, strlen(name));
+    info.wanted = pt_arena_strdup(&b->scene->arena, name);
     id = info.wanted ? add(b, &unmade, &info) : -1;
     if (id < 0 || pt_names_set(&b->named_materials, name, id) != 0)
         pt_diag_nomem(&b->diag, "materials");

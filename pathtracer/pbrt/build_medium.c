@@ -16,7 +16,7 @@ int32_t pt_build_medium_ref(struct pt_builder *b, const char *name, struct pt_lo
         return id;
     }
     struct pt_medium medium = {.kind = PT_MEDIUM_HOMOGENEOUS};
-    struct pt_medium_info info = {.first_use = loc, .name = pt_arena_strndup(&b->scene->arena, name, strlen(name))};
+    struct pt_medium_info info = {.first_use = loc, .name = pt_arena_strdup(&b->scene->arena, name)};
     if (!info.name || pt_list_add(b, &b->medium_infos, &info) < 0 || (id = pt_list_add(b, &b->media, &medium)) < 0 ||
         pt_names_set(&b->media_names, name, id) != 0)
         pt_diag_nomem(&b->diag, "media");

@@ -537,7 +537,7 @@ static int32_t find_object(struct pt_builder *b, const char *name, struct pt_loc
         pt_diag_warn(&b->diag, loc, "unknown object \"%s\": its instance is left out", name);
         return -1;
     }
-    const struct pt_object_info info = {.wanted = pt_arena_strndup(&b->scene->arena, name, strlen(name)), .used = loc};
+    const struct pt_object_info info = {.wanted = pt_arena_strdup(&b->scene->arena, name), .used = loc};
     if (!info.wanted)
         pt_diag_nomem(&b->diag, "objects");
     return b->diag.rc ? -1 : add_object(b, name, &info);

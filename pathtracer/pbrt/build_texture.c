@@ -80,16 +80,11 @@ static int convert(struct pt_builder *b, const char *path, const struct pic_imag
     return out->pixels ? 0 : pt_diag_nomem(&b->diag, "a texture");
 }
 
-/* The images already read of a file whose colours mean something else than the same numbers in Rec. 709. */
-static void name_image(char *key, size_t room, const char *path, double code, enum pt_image_use use)
-{
-    snprintf(key, room, "%s%g %s", use == PT_IMAGE_COLOUR ? "c" : "d", code, path);
-}
-
 int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding,
                            enum pt_image_use use)
 {
-    char path[2048], key[2200], own_key[2200];
+    char path[2048], own_key[2200];
+    const char *const key = own_key + 1;
     double code = parse_encoding(encoding), start_s = base_clock_wall_s();
     struct pic_image image = {0};
     struct pt_image_map map;
@@ -104,9 +99,9 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
         return -1;
     }
     pt_builder_path(b, name, path, sizeof path);
-    snprintf(key, sizeof key, "%g %s", code, path);
-    /* Many textures of a scene name one file: it is read once for each encoding. */
-    name_image(own_key, sizeof own_key, path, code, use);
+    /* Many textures of a scene name one file: it is read once for each encoding, and one whose colours mean something else than
+     * the same numbers in Rec. 709 once for each use. */
+    snprintf(own_key, sizeof own_key, "%s%g %s", use == PT_IMAGE_COLOUR ? "c" : "d", code, path);
     if ((id = pt_names_get(&b->image_names, key)) >= 0 || (id = pt_names_get(&b->image_names, own_key)) >= 0)
         return id;
     int rc;

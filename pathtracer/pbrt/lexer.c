@@ -20,7 +20,7 @@ int pt_lexer_include(struct pt_lexer *lexer, const char *path, struct pt_loc fro
         return pt_diag_fail_code(lexer->diag, rc, from, "%s", err.text);
     if (rc)
         return pt_diag_fail_code(lexer->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, from, "cannot read %s", err.text);
-    file.loc = (struct pt_loc){pt_arena_strndup(lexer->arena, path, strlen(path)), 1, 1};
+    file.loc = (struct pt_loc){pt_arena_strdup(lexer->arena, path), 1, 1};
     if (!file.loc.file) {
         free(file.bytes);
         return pt_diag_nomem(lexer->diag, "file names");

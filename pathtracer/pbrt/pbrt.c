@@ -288,22 +288,22 @@ static int do_attribute(struct parser *p)
     /* in the order of enum pt_attribute */
     static const char *const targets[] = {"shape", "light", "material", "medium", "texture", NULL};
     const char *kind = pt_params_kind(&p->params);
-    int rc, target = base_word_index(targets, kind, strlen(kind));
+    const int target = base_word_index(targets, kind, strlen(kind));
     if (target < 0)
         return pt_parser_fail(p, "Attribute \"%s\" (expected shape, light, material, medium or texture)", kind);
     for (size_t i = 0; i < p->params.count; i++)
         p->params.items[i].colour_space = 1 + p->state.colour_space;
-    /* New values win over those set before. */
-    if (p->state.attributes[target] && (rc = pt_params_append(&p->params, p->state.attributes[target])) != 0)
-        return rc;
     struct pt_params *copy = calloc(1, sizeof *copy);
     if (!copy || pt_list_add(p->b, &p->attributes, &copy) < 0) {
         free(copy);
         return pt_diag_nomem(&p->b->diag, "attributes");
     }
     pt_params_clear(copy, &p->b->diag, p->loc, targets[target]);
+    pt_params_append(copy, &p->params);
+    if (p->state.attributes[target]) /* new values win over those set before */
+        pt_params_append(copy, p->state.attributes[target]);
     p->state.attributes[target] = copy;
-    return pt_params_append(copy, &p->params);
+    return p->b->diag.rc;
 }
 
 static int do_color_space(struct parser *p)

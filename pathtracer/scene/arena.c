@@ -39,12 +39,11 @@ void *pt_arena_alloc(struct pt_arena *arena, size_t count, size_t size)
     return p;
 }
 
-char *pt_arena_strndup(struct pt_arena *arena, const char *text, size_t n)
+char *pt_arena_strdup(struct pt_arena *arena, const char *text)
 {
-    char *copy = pt_arena_alloc(arena, n + 1, 1);
-    if (copy)
-        memcpy(copy, text, n);
-    return copy;
+    const size_t bytes = strlen(text) + 1;
+    char *copy = pt_arena_alloc(arena, bytes, 1);
+    return copy ? memcpy(copy, text, bytes) : NULL;
 }
 
 void pt_arena_release(struct pt_arena *arena)

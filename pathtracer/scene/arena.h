@@ -15,8 +15,8 @@ struct pt_arena {
 
 /* NULL when out of memory, when count * size overflows, or when either is 0. The arena owns the block until release. */
 void *pt_arena_alloc(struct pt_arena *arena, size_t count, size_t size);
-/* Copies n bytes of text and terminates them. NULL when out of memory. */
-char *pt_arena_strndup(struct pt_arena *arena, const char *text, size_t n);
+/* A copy; NULL when out of memory. */
+char *pt_arena_strdup(struct pt_arena *arena, const char *text);
 void pt_arena_release(struct pt_arena *arena);
 
 /* Makes room for one more item in a malloc'ed array; 0 when out of memory, *items then as before. */
