@@ -17,8 +17,8 @@ struct making {
     struct pt_material_info *info;
 };
 
-/* pbrt-v3's fit from perceived roughness to GGX alpha (TrowbridgeReitzDistribution::RoughnessToAlpha); it keeps 0 as a smooth
- * surface. */
+/* pbrt-v3's fit from perceived roughness to GGX alpha (TrowbridgeReitzDistribution::RoughnessToAlpha). It keeps 0
+ * as a smooth surface. */
 static double v3_alpha(double roughness)
 {
     double x = log(fmax(roughness, 1e-3));

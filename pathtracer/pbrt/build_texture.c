@@ -99,8 +99,8 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
         return -1;
     }
     pt_builder_path(b, name, path, sizeof path);
-    /* Many textures of a scene name one file: it is read once for each encoding, and one whose colours mean something else than
-     * the same numbers in Rec. 709 once for each use. */
+    /* Many textures of a scene name one file: it is read once for each encoding, and one whose colours mean something else
+     * than the same numbers in Rec. 709 once for each use. */
     snprintf(own_key, sizeof own_key, "%s%g %s", use == PT_IMAGE_COLOUR ? "c" : "d", code, path);
     if ((id = pt_names_get(&b->image_names, key)) >= 0 || (id = pt_names_get(&b->image_names, own_key)) >= 0)
         return id;
