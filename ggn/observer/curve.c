@@ -30,11 +30,13 @@ static void eye_release(struct eye *e)
 static int eye_init(struct eye *e, const struct seq_block *block, struct base_err *err)
 {
     const size_t pixels = (size_t)block->width * block->height;
+    struct ggn_meter_room room = {0};
     *e = (struct eye){.block = block, .mean = malloc(6 * pixels * sizeof *e->mean)};
     if (!e->mean)
         return base_fail_nomem(err, "observer");
     e->difference = e->mean + 3 * pixels;
-    return ggn_meter_init(&e->meter, pixels, err);
+    ggn_meter_make_room(&room, (int)block->width, (int)block->height);
+    return ggn_meter_init(&e->meter, &room, err);
 }
 
 /* Visible noise of the two pictures in the meter; split, keep_texture: see ggn_measure. */
