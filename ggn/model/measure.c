@@ -65,8 +65,8 @@ static void summarise(const struct ggn_meter *m, int width, int height, struct g
     out->uneven = out->visible > 0 ? fmax(0, log2(sqrt(cbrt(highest)) / out->visible)) : 0;
 }
 
-void ggn_measure(const struct ggn_meter *m, int width, int height, double split, int keep_texture, struct ggn_measure *out,
-                 uint8_t *map)
+double ggn_measure_visible(const struct ggn_meter *m, int width, int height, double split, int keep_texture,
+                           double *lightness)
 {
     const size_t pixels = (size_t)width * (size_t)height;
     double sum = 0;
@@ -79,8 +79,16 @@ void ggn_measure(const struct ggn_meter *m, int width, int height, double split,
         sum += (double)m->lightness[0][i] + (double)m->lightness[1][i];
         m->lightness[0][i] = (float)split * (m->lightness[0][i] - m->lightness[1][i]);
     }
-    out->visible = ggn_visible_noise(m->lightness[0], width, height, m->texture, m->scratch, m->blurred);
-    out->lightness = sum / (200 * (double)pixels);
+    *lightness = sum / (200 * (double)pixels);
+    return ggn_visible_noise(m->lightness[0], width, height, m->texture, m->scratch, m->blurred);
+}
+
+void ggn_measure(const struct ggn_meter *m, int width, int height, double split, int keep_texture, struct ggn_measure *out,
+                 uint8_t *map)
+{
+    const size_t pixels = (size_t)width * (size_t)height;
+
+    out->visible = ggn_measure_visible(m, width, height, split, keep_texture, &out->lightness);
     summarise(m, width, height, out);
     for (size_t i = 0; map && i < pixels; i++)
         map[i] = (uint8_t)fmin(GGN_VISIBLE_CODES * fabs((double)m->blurred[i]) + 0.5, 255);

@@ -48,6 +48,9 @@ void ggn_meter_release(struct ggn_meter *meter);
 void ggn_measure(const struct ggn_meter *meter, int width, int height, double split, int keep_texture,
                  struct ggn_measure *out, uint8_t *map);
 #define GGN_VISIBLE_CODES 96.0
+/* Only r and the mean lightness, which take most of the time but not all. */
+double ggn_measure_visible(const struct ggn_meter *meter, int width, int height, double split, int keep_texture,
+                           double *lightness);
 
 /* window: of S images, oldest first, taken at spp; error: of the newest, in log2. Unknown ones say nothing: 0. */
 void ggn_measure_scalars(const struct ggn_measure *window, const double *spp, int length, double error,

@@ -42,9 +42,8 @@ static int eye_init(struct eye *e, const struct seq_block *block, struct base_er
 /* Visible noise of the two pictures in the meter; split, keep_texture: see ggn_measure. */
 static double see(struct eye *e, double split, int keep_texture)
 {
-    struct ggn_measure seen;
-    ggn_measure(&e->meter, (int)e->block->width, (int)e->block->height, split, keep_texture, &seen, NULL);
-    return seen.visible;
+    double lightness;
+    return ggn_measure_visible(&e->meter, (int)e->block->width, (int)e->block->height, split, keep_texture, &lightness);
 }
 
 /* Puts mean + scale * difference into the meter. */
