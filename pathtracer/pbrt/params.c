@@ -296,7 +296,9 @@ int pt_params_append(struct pt_params *params, const struct pt_params *from)
 int pt_name_is_in(const char *names, const char *name)
 {
     size_t n = strlen(name);
-    for (const char *at = strstr(names, name); n > 0 && at; at = strstr(at + 1, name))
+    if (n == 0 || strchr(name, ' '))
+        return 0;
+    for (const char *at = strstr(names, name); at; at = strstr(at + 1, name))
         if ((at == names || at[-1] == ' ') && (at[n] == ' ' || at[n] == '\0'))
             return 1;
     return 0;

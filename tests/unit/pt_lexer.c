@@ -168,6 +168,7 @@ static void parameter_spellings(void **state)
     pt_params_check_used(&p); /* f and s were not asked for: unknown names fail */
     assert_int_equal(x.diag.rc, BASE_EINVAL);
     assert_string_equal(x.err.text, "a:1:79: unknown parameter \"f\" of \"\"");
+    assert_true(pt_name_is_in("B C", "B") && pt_name_is_in("B C", "C") && !pt_name_is_in("B C", "B C"));
     pt_params_release(&p);
     close_files(&x);
 }
