@@ -455,7 +455,7 @@ static void arenas_give_room(void **state)
     for (int i = 0; i < 200; i++)
         for (size_t k = 0; k < sizes[i]; k++)
             assert_int_equal(at[i][k], (unsigned char)(1 + i));
-    char *copy = pt_arena_strndup(&arena, "abcdef", 4);
+    char *copy = pt_arena_strdup(&arena, "abcd");
     assert_string_equal(copy, "abcd");
     unsigned char *whole = pt_arena_alloc(&arena, (1u << 18) / 8, 8);
     memset(whole, 7, 1u << 18);
