@@ -101,12 +101,12 @@ def wanted_above(replay, view, spp):
     return statistics.mean(b["threshold"] > spp for b in replay["blocks"] if b["view"] != view)
 
 
-def judged(replay, published, also=()):
-    """{name: figures of its windows} and their number; the replay's methods are lull-3 and those of also."""
+def judged(replay, published, names=("lull-3",)):
+    """{name: figures of its windows} and their number; names: of the replay's methods, in their order."""
     views = replay["views"]
-    models = list(zip(["lull-3", *also], replay["methods"], strict=True))
+    models = list(zip(names, replay["methods"], strict=True))
     spread = tool.load(tool.ROOT, "ggn", "observer", "observer.json")["spread"]
-    windows = {name: Windows() for name in ["lull-3", *also, *list(NAMES)[1:]]}
+    windows = {name: Windows() for name in dict.fromkeys(["lull-3", *names, *NAMES])}
     for i, block in enumerate(replay["blocks"]):
         view = views[block["view"]]["name"]
         levels = block["spp"]
@@ -157,19 +157,20 @@ def main(o):
     if not os.access(human, os.R_OK):
         raise tool.Refused("%s: no thresholds of people there (see --human)" % human)
     views = people_views(o.human, os.path.join(o.human, "views"), os.path.join(o.work, "people"))
-    also = o.network + o.baseline  # ggn replay has the networks first, too
+    names = [name for name, _ in o.baseline] + ["lull-3"] + [name for name, _ in o.network]  # in the order of ggn replay
     asked = ["-d", o.work, "-O", os.path.join(tool.ROOT, "ggn/observer/observer.json"), "-m", os.path.join(tool.ROOT, "ggn/models/lull-3.ggn"),
              *[word for _, file in o.network for word in ("-m", file)], *[word for _, file in o.baseline for word in ("--baseline", file)],
              "-t", tool.THREADS]
     replay = json.loads(ggn("replay", *asked, "--no-quality"))
     found, windows = judged(replay, {name: thresholds(os.path.join(o.human, name + "-thresholds.csv")) for name in PUBLISHED},
-                            [name for name, _ in also])
+                            names)
+    titles = {name: m["title"] for name, m in zip(names, replay["methods"])}
     files = [word for name in PUBLISHED for word in ("--thresholds", os.path.join(o.human, name + "-thresholds.csv"))]
     rows = json.loads(ggn("evaluate", *asked, "--no-quality", "--json", *files))["splits"]["people"]
     results = {"measured": tool.measured(), "views": len(views), "windows": windows, "windows_of": found, "blocks_of": {
         **{NAMES[name] + ", all 40 views": compared(o, name) for name in PUBLISHED},
         **{NAMES[name] + ", these views": evaluated(rows, name + "-thresholds.csv") for name in PUBLISHED},
-        NAMES["lull-3"]: evaluated(rows, "lull-3.ggn"), **{name: evaluated(rows, m["title"]) for (name, _), m in zip(also, replay["methods"][1:])},
+        **{NAMES.get(name, name): evaluated(rows, titles[name]) for name in dict.fromkeys(["lull-3", *names])},
         NAMES["law"]: evaluated(rows, "observer"),
         NAMES["-spp"]: evaluated(rows, "-spp")}}
     print(page(results))

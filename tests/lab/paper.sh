@@ -26,6 +26,10 @@ other = {"view": 1, "id": 0, "threshold": 100, "spp": [], "noisy": [], "error": 
 replay = {"views": [{"name": "p3d_a-view0"}, {"name": "p3d_b-view0"}], "blocks": [block, other, dict(other, threshold=200)],
           "methods": [{"scores": [[0.9, 0.1, 0.1], [], []]}]}
 found, count = paper.judged(replay, {"SVD-Entropy": {"p3d_a-view0_part6": [100, 120]}})
+both = dict(replay, methods=[{"scores": [[None, 0.9, 0.9], [], []]}, *replay["methods"]])  # ggn replay has baselines before networks
+beside, _ = paper.judged(both, {}, ["LSTM", "lull-3"])
+assert beside["lull-3"] == found["lull-3"] and list(beside)[:2] == ["lull-3", "LSTM"], beside
+assert beside["LSTM"]["pooled"]["auc"] == 1 and beside["LSTM"]["pooled"]["accuracy"][0] == 0.5, beside["LSTM"]  # no answer yet: noisy
 assert count == 2 and found["lull-3"]["pooled"]["auc"] == 1 and found["law"]["pooled"]["accuracy"][paper.CUTS.index(0.6)] == 1, found
 assert paper.wanted_above(replay, 0, 50) == 1 and paper.wanted_above(replay, 0, 150) == 0.5
 assert found["SVD-Entropy"]["pooled"] == {"auc": None, "accuracy": None, "best": 1.0}, found
