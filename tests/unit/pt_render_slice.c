@@ -8,7 +8,7 @@
 #include <zlib.h>
 #include <cmocka.h>
 
-#include "render/farm.h"
+#include "render/rows.h"
 #include "support/pt_fake.h"
 #include "support/pt_captured.h"
 
