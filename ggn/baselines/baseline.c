@@ -46,8 +46,6 @@ void ggn_baseline_release(struct ggn_baseline *b)
     *b = (struct ggn_baseline){0};
 }
 
-/* --- file -------------------------------------------------------------------------------------------------------------- */
-
 /* The tensors, in order; `values` is where they are or go. */
 struct part {
     const char *name;
@@ -205,8 +203,6 @@ int ggn_baseline_load(struct ggn_baseline *b, const char *path, enum ggn_baselin
     ggn_container_release(&c);
     return rc;
 }
-
-/* --- judging ----------------------------------------------------------------------------------------------------------- */
 
 struct ggn_baseline_reader {
     const struct ggn_baseline *b;

@@ -60,8 +60,6 @@ int ggn_svd_entropy(const double *l, int w, int h, int first, int last, double *
     return 0;
 }
 
-/* --- filters --- */
-
 enum border { BORDER_MIRROR /* c b | a b c */, BORDER_ZERO };
 
 /* n >= 3, i at most two beyond. */

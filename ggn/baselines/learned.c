@@ -19,8 +19,6 @@ struct work {
     double *x;                 /* owns; [rows][size] */
 };
 
-/* --- features --- */
-
 static void work_release(struct work *w)
 {
     free(w->first);
@@ -67,8 +65,6 @@ static double logit_of(const struct work *w, struct ggn_baseline_reader *r, cons
         features[k] = x + (size_t)(levels ? levels[k] : k) * w->size;
     return ggn_baseline_logit(r, features, w->set->images.width, w->set->images.height);
 }
-
-/* --- training --- */
 
 /* The cases of a split that have a label: where their window's features begin, [window][size] one after the other. */
 struct cases {
@@ -176,8 +172,6 @@ static int train(const struct work *w, enum ggn_split split, int epochs, struct 
         b->policy.first_spp = ggn_policy_next(&b->policy, b->policy.first_spp);
     return rc ? rc : calibrate(w, split, err);
 }
-
-/* --- judging --- */
 
 struct one_block {
     const struct work *work;

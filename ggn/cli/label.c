@@ -64,8 +64,6 @@ static int find_row(const char *csv, const char *name, const struct ggn_threshol
     return *row ? 0 : base_fail(err, BASE_EINVAL, "%s: no thresholds for '%s'", csv, name);
 }
 
-/* --- labels --- */
-
 /* From thresholds of the study to samples at which no noise is seen at all. */
 static void convert_from_study(struct ggn_labels *l)
 {
@@ -101,8 +99,6 @@ static int human_labels(const struct options *o, const struct ggn_thresholds *t,
         out->spread = o->spread;
     return 0;
 }
-
-/* --- checking labels from halves --- */
 
 static int has_blocks(const struct ggn_dataset_view *v)
 {
@@ -254,8 +250,6 @@ static int label(const struct options *o, struct base_threads *threads, struct b
     ggn_thresholds_release(&human);
     return rc;
 }
-
-/* --- calibration --- */
 
 static void print_row(const struct ggn_calibration_row *r)
 {

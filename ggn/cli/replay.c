@@ -103,8 +103,6 @@ static void adjust(const struct options *o, struct ggn_policy *policy)
     }
 }
 
-/* --- what is not as in a render --- */
-
 /* A scene that a model has met in training says nothing about scenes that it has not met. */
 static void warn_of_learned(const struct replay *r)
 {
@@ -142,8 +140,6 @@ static void warn_of_setting(const struct replay *r, int index, const struct ggn_
         }
 }
 
-/* --- loading --- */
-
 static int load(struct replay *r, struct base_err *err)
 {
     struct ggn_eval_options eo = r->o->set;
@@ -180,8 +176,6 @@ static int load(struct replay *r, struct base_err *err)
     }
     return rc;
 }
-
-/* --- output --- */
 
 static void put_views(const struct replay *r, cJSON *to, int *failed)
 {

@@ -177,8 +177,6 @@ void ggn_import_scene(const char *view, char *scene, size_t room)
     snprintf(scene, room, "%.*s", cut ? (int)(cut - view) : (int)strlen(view), view);
 }
 
-/* --- pictures --------------------------------------------------------------------------------------------------------- */
-
 static int check_finite(const char *path, const struct pic_image *p, struct base_err *err)
 {
     const size_t n = p->f32 ? 3 * (size_t)p->width * (size_t)p->height : 0;

@@ -81,8 +81,6 @@ uint32_t ggn_series_set_crc(const struct ggn_series_set *set)
     return (uint32_t)crc;
 }
 
-/* --- series --- */
-
 int ggn_series_grow(const struct ggn_series_set *set, struct ggn_level_series *c, int levels, struct base_err *err)
 {
     const size_t n = (size_t)levels, values = ggn_series_set_values(set);

@@ -33,8 +33,6 @@ int ggn_shown_plain_name(const char *name)
     return strspn(name, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-") == n;
 }
 
-/* --- sources ---------------------------------------------------------------------------------------------------------- */
-
 static int is_list(const char *at)
 {
     unsigned long lo, hi;
@@ -88,8 +86,6 @@ int ggn_shown_source_check(const struct ggn_shown_source *s, const struct ggn_sh
             return base_fail(err, BASE_EINVAL, "%s: has no block %lu", s->folder, has_block(view, lo) ? hi : lo);
     return 0;
 }
-
-/* --- pictures --------------------------------------------------------------------------------------------------------- */
 
 int ggn_shown_takes_level(const struct ggn_shown_request *q, const struct ggn_shown_block *b, double spp)
 {
@@ -145,8 +141,6 @@ int ggn_shown_write_reference(const struct ggn_shown_request *q, int view, const
     free(noisy);
     return rc;
 }
-
-/* --- views ------------------------------------------------------------------------------------------------------------ */
 
 /* The last part of the folder's path, with the kind behind it. */
 static int name_view(struct ggn_shown *s, int index, const char *folder, struct base_err *err)

@@ -5,8 +5,6 @@
 
 const char *const ggn_split_sources[GGN_SPLIT_SOURCES] = {"the data set's own", "the models' own", "every fifth scene"};
 
-/* --- lists ------------------------------------------------------------------------------------------------------------ */
-
 static int is_item(const char *list, const char *scene)
 {
     const size_t length = strlen(scene);
@@ -57,8 +55,6 @@ static int check_lists(const struct ggn_dataset *data, const struct ggn_split_op
     return 0;
 }
 
-/* --- models ----------------------------------------------------------------------------------------------------------- */
-
 enum ggn_split ggn_split_learned(const cJSON *learned, const char *scene)
 {
     for (int split = 0; split < GGN_SPLIT_NONE; split++) {
@@ -81,8 +77,6 @@ static enum ggn_split by_models(const struct ggn_split_options *o, const char *s
     }
     return split;
 }
-
-/* --- the choice ------------------------------------------------------------------------------------------------------- */
 
 static enum ggn_split_source source_of(const struct ggn_dataset *data, const struct ggn_split_options *o)
 {

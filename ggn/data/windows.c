@@ -116,8 +116,6 @@ int ggn_windows_draw(const struct ggn_windows *w, uint64_t step, int i, uint32_t
     return w->first[series] + chosen;
 }
 
-/* --- pixels --- */
-
 struct ggn_augment ggn_augment_none(void) { return (struct ggn_augment){.gain = {1, 1, 1}}; }
 
 struct ggn_augment ggn_augment_draw(uint64_t step, int i, uint32_t seed, const struct ggn_augment_options *o)

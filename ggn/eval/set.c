@@ -94,8 +94,6 @@ int ggn_eval_count(const struct ggn_eval_set *s, enum ggn_split split)
     return n;
 }
 
-/* --- statistics and quality --- */
-
 struct fill {
     struct ggn_eval_set *set;
     int quality, no_ssim;

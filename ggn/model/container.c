@@ -28,8 +28,6 @@ static uint64_t checksum(const unsigned char *p, size_t size)
     return h;
 }
 
-/* --- writing ----------------------------------------------------------------------------------------------------------- */
-
 void ggn_container_release(struct ggn_container *c)
 {
     free(c->entry);
@@ -143,8 +141,6 @@ int ggn_container_write(struct ggn_container *c, const char *path, struct base_e
     free(file);
     return rc;
 }
-
-/* --- reading ----------------------------------------------------------------------------------------------------------- */
 
 static int check_header(const unsigned char *p, size_t size, const char *name, struct base_err *err)
 {

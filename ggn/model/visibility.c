@@ -49,8 +49,6 @@ void ggn_visible_lightness(const float *rgb, size_t n, float *lightness)
     }
 }
 
-/* --- patches --- */
-
 static int parts(int side) { return (side - 1) / PATCH + 1; }
 
 /* Where part k of a side begins; part k + 1 begins where it ends. */

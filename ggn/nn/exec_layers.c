@@ -6,8 +6,6 @@
 #include "nn/layers.h"
 #include "nn/real.h"
 
-/* --- batch norm ------------------------------------------------------------------------------------------------------- */
-
 /* The two sums of image n and channel c. */
 static double *bn_sums_of(const struct ggn_task *t, int n, int c)
 {
@@ -144,8 +142,6 @@ static void bn_backward(struct ggn_task *t)
 }
 
 const struct ggn_layer_passes GGN_LAYER(bn) = {bn_forward, bn_backward};
-
-/* --- plane by plane --------------------------------------------------------------------------------------------------- */
 
 /* The planes of task i. */
 struct pair {
@@ -288,7 +284,7 @@ static real dropout_factor(const struct ggn_task *t, long i)
 
 PLANE_LAYER(dropout, *p.y = *p.x * dropout_factor(t, i), *p.dx = (t->l->add_in ? *p.dx : 0) + *p.dy * dropout_factor(t, i))
 
-/* --- linear: Y = W·X + b, X the vector `in` and behind it that of `in2` ----------------------------------------------- */
+/* Linear: Y = W·X + b, X the vector `in` and behind it that of `in2`. */
 
 static void linear_unit(void *data, long o, int worker)
 {

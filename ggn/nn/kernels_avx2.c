@@ -24,7 +24,7 @@
 #include "nn/vector.h"
 
 #ifndef GGN_DOUBLE
-/* --- what moves values between the 8 lanes of nn/winograd_body.h --- */
+/* What moves values between the 8 lanes of nn/winograd_body.h. */
 
 /* Transposes the 4×4 values in the lower halves of m[0..3] and those in the upper ones. */
 INLINE void transpose_halves(vf m[4])

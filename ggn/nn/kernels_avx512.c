@@ -24,7 +24,7 @@
 #include "nn/vector.h"
 
 #ifndef GGN_DOUBLE
-/* --- what moves values between the 16 lanes of nn/winograd_body.h --- */
+/* What moves values between the 16 lanes of nn/winograd_body.h. */
 
 /* p[j] lane t = row[4t + j]. */
 INLINE void deinterleave4(vf p[4], const float *row)

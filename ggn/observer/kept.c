@@ -42,8 +42,6 @@ static struct judging begin(const struct ggn_kept *kept, double *scratch)
     return j;
 }
 
-/* --- the crossed square ------------------------------------------------------------------------------------------------ */
-
 /* Mean square of the error of what is kept of all samples: the estimate's formula of differences in luminance times the
  * slope of L*, blurred as the eye does. */
 static void cross(const struct judging *j)
@@ -66,8 +64,6 @@ static void cross(const struct judging *j)
             j->crossed[i] += terms[t].weight * j->blurred[i] * j->blurred[i];
     }
 }
-
-/* --- sixth powers ------------------------------------------------------------------------------------------------------ */
 
 /* Over some pixels, of visible errors in units of what texture hides: how many, sums of the crossed square, of its square,
  * of the second and sixth power of the halves' difference. */
@@ -152,8 +148,6 @@ static double crossed_error(const struct judging *j)
     }
     return sqrt(sum / (double)patches);
 }
-
-/* --- both errors ------------------------------------------------------------------------------------------------------- */
 
 /* The halves' difference is noise; what else the crossed error has is bias. Both add in squares. */
 static void set_viewed(struct ggn_kept_errors *e, double gain, double still)

@@ -30,8 +30,6 @@ static const struct lull_param params[P_COUNT] = {
                                  "samples per pixel of the first image of a window; without it the model's own"),
 };
 
-/* --- what it sees ------------------------------------------------------------------------------------------------------ */
-
 struct worker {
     struct ggn_inference *inference;
     uint8_t *noise_map;     /* [pixels of the largest block], for models with the noise map */
@@ -193,8 +191,6 @@ static double window_logit(void *data)
     }
     return ggn_inference_logit(worker->inference, noisy, denoised, noise_map, scalars, w, h);
 }
-
-/* --- instance ---------------------------------------------------------------------------------------------------------- */
 
 static int32_t load(struct lull_instance *in, int kind, const char *path, struct lull_error *err)
 {

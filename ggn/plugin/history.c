@@ -72,8 +72,6 @@ uint32_t gp_head_push(struct gp_head *head, int window, uint32_t before)
     return slot;
 }
 
-/* --- lull.state/1 ------------------------------------------------------------------------------------------------------ */
-
 static const char MAGIC[8] = {'G', 'G', 'N', 'S', 'T', 'A', 'T', '3'};
 
 struct state_header {

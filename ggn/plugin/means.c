@@ -88,8 +88,6 @@ const float *gp_means_begin(struct gp_means *l, uint32_t id, uint64_t spp, float
 
 void gp_means_commit(struct gp_means *l, uint32_t id) { l->head[id] = l->pending[id]; }
 
-/* --- state ------------------------------------------------------------------------------------------------------------- */
-
 int32_t gp_means_save(const struct gp_means *l, const struct lull_writer *writer, struct lull_error *err)
 {
     struct state_header header = header_of(l);

@@ -59,8 +59,6 @@ struct lull_instance {
     struct ggn_meter *worker; /* owns */
 };
 
-/* --- one block --------------------------------------------------------------------------------------------------------- */
-
 /* A side of what surrounds a small block: WINDOW pixels about it, as far as the frame reaches. */
 static void widen(int32_t *from, int32_t *to, int32_t first, int32_t last)
 {
@@ -288,8 +286,6 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
     return status;
 }
 
-/* --- instance ---------------------------------------------------------------------------------------------------------- */
-
 static void workers_release(struct ggn_meter *worker, uint32_t count)
 {
     for (uint32_t i = 0; worker && i < count; i++)
@@ -398,7 +394,7 @@ static void destroy(struct lull_instance *in)
 static const struct lull_kit_rule rule = {
     .planes_required = COLOR, .planes_used = PLANES, .first_spp = "first-spp", .judge = judge, .check = check_block};
 
-/* --- state: of a frame with HALF there is none ------------------------------------------------------------------------- */
+/* State: of a frame with HALF there is none. */
 
 static int32_t state_save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {

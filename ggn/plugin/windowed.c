@@ -4,8 +4,6 @@
 #include "plugin/model_path.h"
 #include "plugin/translate.h"
 
-/* --- instance ---------------------------------------------------------------------------------------------------------- */
-
 static const struct lull_kit_rule rule;
 
 /* The model that the first parameter names, or the default one. */
@@ -186,8 +184,6 @@ void gp_windowed_destroy(struct lull_instance *in)
     lull_kit_destroy(in);
 }
 
-/* --- evaluate ---------------------------------------------------------------------------------------------------------- */
-
 long gp_windowed_read(const struct gp_block_view *seen, uint8_t *out)
 {
     const struct lull_block *b = seen->block;
@@ -288,8 +284,6 @@ static const struct lull_kit_rule rule = {
     .judge = judge,
     .check = check_block,
 };
-
-/* --- state ------------------------------------------------------------------------------------------------------------- */
 
 static int32_t state_save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {

@@ -24,8 +24,6 @@ static float difference(const struct ggn_session *s)
     return s->hyper.preset == GGN_PRESET_LULL ? (float)s->plan->difference : 0;
 }
 
-/* --- pixels of a batch ------------------------------------------------------------------------------------------------ */
-
 struct fill {
     struct ggn_session *s;
     const struct ggn_windows *windows;
@@ -98,8 +96,6 @@ static struct ggn_batch fill_batch(struct fill *f, int count)
                               .label = f->label};
 }
 
-/* --- evaluation mode -------------------------------------------------------------------------------------------------- */
-
 /* Raw logits of windows list[index[i]], i < n, with the weights as they are. */
 static void logits(struct ggn_session *s, const struct ggn_windows *windows, const int *index, int n, double *logit)
 {
@@ -158,8 +154,6 @@ static int denoise(struct ggn_session *s, enum ggn_split split, struct base_err 
     ggn_exec_destroy(exec);
     return rc;
 }
-
-/* --- one step --------------------------------------------------------------------------------------------------------- */
 
 /* Steps of an epoch over all windows (preset paper). */
 static uint64_t epoch_length(const struct ggn_session *s)
@@ -220,8 +214,6 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
     *right /= n;
     return 0;
 }
-
-/* --- validation ------------------------------------------------------------------------------------------------------- */
 
 void ggn_classified_release(struct ggn_classified *o)
 {
@@ -322,8 +314,6 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_
         note_best(s, row);
     return rc;
 }
-
-/* --- the phase -------------------------------------------------------------------------------------------------------- */
 
 static int begin(struct ggn_session *s, struct base_err *err)
 {

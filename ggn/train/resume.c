@@ -58,8 +58,6 @@ static int visit_arrays(struct ggn_session *s, struct ggn_container *c, int read
     return rc;
 }
 
-/* --- JSON ------------------------------------------------------------------------------------------------------------- */
-
 static double *row_field(struct ggn_log_row *r, int i)
 {
     double *const fields[N_ROW] = {
@@ -143,8 +141,6 @@ static int restore(struct ggn_session *s, const cJSON *root, const char *path, s
     }
     return 0;
 }
-
-/* --- file ------------------------------------------------------------------------------------------------------------- */
 
 int ggn_resume_save(struct ggn_session *s, const char *path, struct base_err *err)
 {

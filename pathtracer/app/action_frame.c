@@ -64,8 +64,6 @@ static int act(struct pt_open *o, int *status, struct base_err *err)
     }
 }
 
-/* --- processes ------------------------------------------------------------------------------------------------------- */
-
 static int32_t add_to_crc(const struct lull_writer *to, const void *data, uint64_t size)
 {
     uint32_t *crc = to->context;

@@ -11,8 +11,6 @@
 #include "render/checkpoint.h"
 #include "render/film.h"
 
-/* --- values of several parts ------------------------------------------------------------------------------------------ */
-
 static int expected(struct base_err *err, const char *what) { return base_fail(err, BASE_EINVAL, "expected %s", what); }
 
 /* An integer in [low, high] of so many characters. */
@@ -223,7 +221,7 @@ static int set_quote_pilot(void *into, const char *value, struct base_err *err)
     return 0;
 }
 
-/* --- what the image depends on: options of several parts, or whose line has another name --------------------------  */
+/* What the image depends on: options of several parts, or whose line has another name. */
 
 static void identify_uniform(const void *from, struct base_identity *to)
 {
@@ -278,8 +276,6 @@ static void identify_filter(const void *from, struct base_identity *to)
     base_identity_add(to, "filter", "%d:%gx%g:%g", i->filter, (double)i->filter_x, (double)i->filter_y,
                       (double)i->filter_sigma);
 }
-
-/* --- options -------------------------------------------------------------------------------------------------------- */
 
 static const char *const frame_seed_words[] = {"fresh", "fixed", NULL};
 static const char *const effect_words[] = {"auto", "all", NULL};
@@ -423,8 +419,6 @@ const struct base_option pt_cli_options[] = {
     {"name", 0, "SCENE[/VIEW]", TO(sequence.name), .help = "Scene and view in the manifest (default: by the file's name)"},
     {"order-seed", 0, "N", TO(render.order_seed), 0, UINT32_MAX, .hidden = 1, .help = ""},
     {0}};
-
-/* --- the whole ------------------------------------------------------------------------------------------------------ */
 
 int pt_cli_parse(struct pt_cli *cli, int argc, char **argv, struct base_err *err)
 {

@@ -9,8 +9,6 @@
 
 enum { NAME_ROOM = 4096 };
 
-/* --- names ---------------------------------------------------------------------------------------------------------- */
-
 /* Where the number's place begins in a text and how long it is; 0: there is none; -1: something else has a '%'. */
 static int find_place(const char *text, size_t *begin, int *digits)
 {
@@ -90,8 +88,6 @@ static int name_image(struct pt_shot_frame *f, const char *scene, struct base_er
     f->paths[PT_OUTPUT] = f->names;
     return 0;
 }
-
-/* --- frames --------------------------------------------------------------------------------------------------------- */
 
 uint32_t pt_frame_seed(uint32_t seed, int number)
 {

@@ -9,8 +9,6 @@
 #include "render/output.h"
 #include "sample/sampler.h"
 
-/* --- scene ---------------------------------------------------------------------------------------------------------- */
-
 /* What the command line puts over the scene's integrator. */
 static void override(const struct pt_integrator *by, struct pt_integrator *i)
 {
@@ -114,8 +112,6 @@ int pt_open_scene(struct pt_open *o, const struct pt_shot_frame *f, struct base_
     return rc;
 }
 
-/* --- criterion ------------------------------------------------------------------------------------------------------ */
-
 static const char *parameter(const struct pt_cli_params *params, const char *key)
 {
     const char *value = NULL;
@@ -175,8 +171,6 @@ static int open_criterion(struct pt_open *o, struct base_err *err)
     return rc;
 }
 
-/* --- outputs -------------------------------------------------------------------------------------------------------- */
-
 /* A parameter may name a file: a model. */
 static int protect_parameters(const struct pt_open *o, const struct base_outputs *outputs, struct base_err *err)
 {
@@ -207,8 +201,6 @@ static int check_outputs(const struct pt_open *o, struct base_err *err)
     return rc ? rc : protect_parameters(o, &outputs, err);
 }
 
-/* --- identity ------------------------------------------------------------------------------------------------------- */
-
 /* Everything that decides the bytes of the image, and nothing else: the options, with the scene's own settings where they
  * say nothing, and what was read. A criterion's model is in its saved state. */
 static int identify(struct pt_open *o, struct base_err *err)
@@ -235,8 +227,6 @@ static int identify(struct pt_open *o, struct base_err *err)
     base_identity_add(id, "plugin-and-mask-crc", "%08x", judging_crc);
     return base_identity_check(id, err);
 }
-
-/* --- render --------------------------------------------------------------------------------------------------------- */
 
 int pt_open_frame(struct pt_open *o, struct job *job, struct base_err *err)
 {

@@ -10,8 +10,6 @@
 
 enum { MOST_EXPENSIVE = 5, REPLAYED = 256 };
 
-/* --- what stands out --------------------------------------------------------------------------------------------------- */
-
 struct expensive_block {
     uint32_t index;
     double share;       /* of the time of all blocks */
@@ -60,8 +58,6 @@ static uint32_t find_most_expensive(const struct pt_quote *q, const struct pt_re
         take_census(r, &r->blocks->list[out[k].index], &out[k]);
     return n;
 }
-
-/* --- text -------------------------------------------------------------------------------------------------------------- */
 
 const char *pt_quote_duration(double s, char text[32])
 {
@@ -163,8 +159,6 @@ void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *
     fprintf(out, "memory: film %.1f MB, scene %.1f MB\n", (double)r->film.bytes * 1e-6, (double)info->scene_bytes * 1e-6);
 }
 
-/* --- JSON -------------------------------------------------------------------------------------------------------------- */
-
 static void add_range(cJSON *to, const char *key, double value, double low, double high, int *failed)
 {
     cJSON *o = base_json_object(to, key, failed);
@@ -264,8 +258,6 @@ int pt_quote_json(FILE *out, const struct pt_quote *q, const struct pt_render *r
     cJSON_free(text);
     return 0;
 }
-
-/* --- picture ----------------------------------------------------------------------------------------------------------- */
 
 int pt_quote_map(const char *path, const struct pt_quote *q, const struct pt_render *r, struct base_err *err)
 {

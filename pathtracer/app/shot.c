@@ -19,8 +19,6 @@
 
 enum { FRAMES_MAX = 1000000, PATH_BYTES_MAX = 1 << 26, NAME_ROOM = 4096, LINE_ROOM = 512 };
 
-/* --- which frames --------------------------------------------------------------------------------------------------- */
-
 static int add_frame(struct pt_shot *s, long frame, size_t *room, struct base_err *err)
 {
     if (!pt_grow((void **)&s->frames, room, s->count, sizeof *s->frames))
@@ -47,8 +45,6 @@ int pt_shot_parse_frames(const char *text, struct pt_shot *s, struct base_err *e
     } while (*at != '\0');
     return 0;
 }
-
-/* --- the camera's path ---------------------------------------------------------------------------------------------- */
 
 static const char PATH_HEAD[] = "frame;eye;at;up;fov";
 
@@ -152,8 +148,6 @@ static int read_path(const struct pt_shot_plan *plan, struct pt_shot *s, struct 
     return rc;
 }
 
-/* --- the whole shot ----------------------------------------------------------------------------------------------- */
-
 /* Frames would replace each other's files. */
 static int check_names(const struct pt_cli *cli, const struct pt_shot *s, struct base_err *err)
 {
@@ -178,8 +172,6 @@ void pt_shot_release(struct pt_shot *s)
     free(s->views);
     *s = (struct pt_shot){0};
 }
-
-/* --- frame by frame -------------------------------------------------------------------------------------------------- */
 
 static int render_frame(struct pt_open *o, struct pt_shot_frame *f, const struct pt_shot_table *table, const char *place,
                         int *status, struct base_err *err)

@@ -22,8 +22,6 @@ struct plan {
     double samples, thread_s; /* of all frames; samples per pixel summed over blocks */
 };
 
-/* --- pilots --------------------------------------------------------------------------------------------------------- */
-
 static int keep_answer(struct plan *p, const struct pt_open *o, const struct pt_quote *quote, size_t at,
                        struct base_err *err)
 {
@@ -67,8 +65,6 @@ static int run_pilot(struct plan *p, struct pt_open *o, const struct pt_shot *s,
     pt_frame_release(&f);
     return rc;
 }
-
-/* --- table ---------------------------------------------------------------------------------------------------------- */
 
 /* The last pilot at or before a frame. */
 static size_t pilot_of(const struct plan *p, size_t frame)

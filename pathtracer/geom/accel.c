@@ -20,8 +20,6 @@ struct pt_accel {
     atomic_llong bytes;
 };
 
-/* --- quadrics as user geometry ---------------------------------------------------------------------------------------- */
-
 static void quadric_bounds(const struct RTCBoundsFunctionArguments *args)
 {
     pt_vec3 lower, upper;
@@ -126,8 +124,6 @@ static void quadric_occluded(const struct RTCOccludedFunctionNArguments *args)
             lanes[TFAR * n + i].f = -INFINITY;
 }
 
-/* --- out of memory ---------------------------------------------------------------------------------------------------- */
-
 /* What memory is wanted for, in errors. */
 #define WHAT "the acceleration structure"
 
@@ -153,8 +149,6 @@ static handler set_handler(handler now)
     memcpy(&set_terminate, &symbol, sizeof set_terminate); /* a pointer to data into one to a function */
     return set_terminate ? set_terminate(now) : NULL;
 }
-
-/* --- building --------------------------------------------------------------------------------------------------------- */
 
 static bool count_bytes(void *user, ssize_t bytes, bool post)
 {
@@ -360,8 +354,6 @@ void pt_accel_release(struct pt_scene *scene)
 }
 
 long long pt_accel_bytes(const struct pt_scene *scene) { return scene->accel ? atomic_load(&scene->accel->bytes) : 0; }
-
-/* --- queries ---------------------------------------------------------------------------------------------------------- */
 
 /* Embree's ids as ours. */
 static inline void name_shape(const struct pt_scene *scene, unsigned geometry, unsigned instance, struct pt_hit *hit)

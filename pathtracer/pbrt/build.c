@@ -116,8 +116,6 @@ struct pt_xform pt_builder_to_render(const struct pt_builder *b, struct pt_xform
     return world;
 }
 
-/* --- finishing -------------------------------------------------------------------------------------------------------- */
-
 /* Array of a list in the arena; leaves NULL for empty lists. */
 static void *move(struct pt_builder *b, struct pt_list *list, int32_t *count)
 {

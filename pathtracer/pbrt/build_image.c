@@ -20,8 +20,6 @@ static struct pt_params *begin(struct pt_builder *b, enum pt_header which, const
     return p;
 }
 
-/* --- shutter and film ------------------------------------------------------------------------------------------------- */
-
 static struct pt_loc shutter_loc(const struct pt_params *camera)
 {
     return pt_params_loc(camera, pt_params_find(camera, "shutterclose") ? "shutterclose" : "shutteropen");
@@ -125,8 +123,6 @@ static void build_film(struct pt_builder *b)
     pt_params_check_used(p);
 }
 
-/* --- filter ----------------------------------------------------------------------------------------------------------- */
-
 /* v3 and v4 differ in defaults, in what sigma is, and in the names of the radii. */
 static void build_filter(struct pt_builder *b)
 {
@@ -161,8 +157,6 @@ static void build_filter(struct pt_builder *b)
     it->filter_sigma = strcmp(kind, "mitchell") == 0 ? 0.25f * it->filter_x : (float)sigma;
     pt_params_check_used(p);
 }
-
-/* --- sampler and integrator ------------------------------------------------------------------------------------------- */
 
 static void build_sampler(struct pt_builder *b)
 {
@@ -204,8 +198,6 @@ static void build_integrator(struct pt_builder *b)
                         "cossample maxdistance nsamples strategy illuminant");
     pt_params_check_used(p);
 }
-
-/* --- camera ----------------------------------------------------------------------------------------------------------- */
 
 static void set_screen(struct pt_params *p, struct pt_camera *c)
 {

@@ -19,8 +19,6 @@ static pt_vec3 scaled_colour(struct pt_builder *b, struct pt_params *p, const ch
     return v3_mul(value, by);
 }
 
-/* --- kinds ------------------------------------------------------------------------------------------------------------ */
-
 struct context {
     struct pt_builder *b;
     struct pt_params *p;

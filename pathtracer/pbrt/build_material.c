@@ -83,8 +83,6 @@ static int32_t find_mixed(struct pt_builder *b, struct pt_loc loc, const char *n
     return -1;
 }
 
-/* --- kinds ------------------------------------------------------------------------------------------------------------ */
-
 /* May be textured; the fallback, grey, when absent. */
 static struct pt_input read_reflectance(struct making *c, const char *name, float fallback)
 {
@@ -231,7 +229,7 @@ static int build_v4(struct making *c)
     return 1;
 }
 
-/* --- kinds of v3 in terms of v4's ------------------------------------------------------------------------------------- */
+/* Kinds of v3 in terms of v4's. */
 
 static int is_black(struct pt_input in) { return !in.texture && v3_is_black(in.value); }
 

@@ -27,8 +27,6 @@ struct box {
     double low[3], high[3];
 };
 
-/* --- where a shape goes ------------------------------------------------------------------------------------------------ */
-
 static void box_add(struct box *box, const double p[3], int is_first)
 {
     for (int i = 0; i < 3; i++) {
@@ -192,8 +190,6 @@ static int add_shape(struct pt_builder *b, struct pt_params *p, const struct pla
     }
     return b->diag.rc;
 }
-
-/* --- meshes ------------------------------------------------------------------------------------------------------------ */
 
 static double value(const double *d, const float *f, size_t i) { return d ? d[i] : (double)f[i]; }
 
@@ -409,8 +405,6 @@ static int make_ply_mesh(struct pt_builder *b, struct pt_params *p)
     return b->diag.rc;
 }
 
-/* --- quadrics ---------------------------------------------------------------------------------------------------------- */
-
 static int add_quadric(struct pt_builder *b, struct pt_params *p, struct pt_quadric *q)
 {
     const double r = (double)q->radius;
@@ -466,8 +460,6 @@ static int make_cylinder(struct pt_builder *b, struct pt_params *p)
         .kind = PT_QUADRIC_CYLINDER, .radius = (float)r, .z_min = (float)fmin(z0, z1), .z_max = (float)fmax(z0, z1)};
     return add_quadric(b, p, &q);
 }
-
-/* --- dispatch, objects ------------------------------------------------------------------------------------------------ */
 
 static int make_nurbs(struct pt_builder *b, struct pt_params *p)
 {

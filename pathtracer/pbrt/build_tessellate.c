@@ -74,8 +74,6 @@ static int finish(struct grower *g, struct pt_builder *b, struct pt_params *p)
     return b->diag.rc;
 }
 
-/* --- bilinear patches ------------------------------------------------------------------------------------------------- */
-
 /* Between what four corners have, `size` numbers each. */
 static void lerp2(const double *const c[4], double u, double v, size_t size, double *out)
 {
@@ -161,7 +159,7 @@ int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
     return finish(&g, b, p);
 }
 
-/* --- curves: tubes of six sides --------------------------------------------------------------------------------------- */
+/* Curves: tubes of six sides. */
 
 enum { CURVE_SIDES = 6, CURVE_CUTS = 8 };
 
@@ -298,7 +296,7 @@ int pt_build_curve(struct pt_builder *b, struct pt_params *p)
     return finish(&g, b, p);
 }
 
-/* --- height fields and surfaces of revolution (v3) -------------------------------------------------------------------- */
+/* Height fields and surfaces of revolution (v3). */
 
 int pt_build_height_field(struct pt_builder *b, struct pt_params *p)
 {

@@ -18,8 +18,6 @@ struct pt_input pt_input_grey(double value) { return (struct pt_input){0, v3_spl
 /* Of the texture with this id; black after a failure (-1). */
 static struct pt_input input_of(int32_t id) { return (struct pt_input){.texture = id + 1}; }
 
-/* --- images ----------------------------------------------------------------------------------------------------------- */
-
 /* Encoding of an 8- or 16-bit file: 0 sRGB, 1 linear, else the exponent. -1 when not understood. */
 static double parse_encoding(const char *encoding)
 {
@@ -141,8 +139,6 @@ int32_t pt_build_image_texture(struct pt_builder *b, struct pt_loc loc, const ch
     return t.image < 0 ? 0 : pt_list_add(b, &b->textures, &t) + 1;
 }
 
-/* --- inputs ----------------------------------------------------------------------------------------------------------- */
-
 static struct pt_input named_texture(struct pt_builder *b, struct pt_params *p, struct pt_param *param, int is_float,
                                      pt_vec3 fallback)
 {
@@ -219,8 +215,6 @@ struct pt_input pt_input_luminance(struct pt_builder *b, struct pt_input in)
         t.in[i] = pt_input_luminance(b, t.in[i]);
     return input_of(pt_list_add(b, &b->textures, &t));
 }
-
-/* --- classes ---------------------------------------------------------------------------------------------------------- */
 
 struct context {
     struct pt_builder *b;

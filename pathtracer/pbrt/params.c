@@ -101,8 +101,6 @@ const char *pt_params_string_at(const struct pt_params *params, const struct pt_
 /* Tokens are quoted in messages up to this length. */
 static int clip(size_t length) { return length < 40 ? (int)length : 40; }
 
-/* --- reading ---------------------------------------------------------------------------------------------------------- */
-
 struct declaration { /* offsets in the token's text */
     size_t type, type_end, name, name_end;
     int kind; /* enum pt_param_type; -1: unknown */
@@ -290,8 +288,6 @@ int pt_params_append(struct pt_params *params, const struct pt_params *from)
     }
     return params->diag->rc;
 }
-
-/* --- use -------------------------------------------------------------------------------------------------------------- */
 
 int pt_name_is_in(const char *names, const char *name)
 {

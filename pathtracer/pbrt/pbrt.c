@@ -8,8 +8,6 @@
 #include "pbrt/pbrt_parser.h"
 #include "pbrt/spectra.h"
 
-/* --- pieces of directives --------------------------------------------------------------------------------------------- */
-
 /* A quoted string, with or without brackets, of less than `room` bytes; `what` names it in errors. */
 static int read_string(struct parser *p, const char *what, char *out, size_t room)
 {
@@ -69,8 +67,6 @@ static int read_entity(struct parser *p, int target)
         rc = pt_params_append(params, p->state.attributes[target]);
     return rc;
 }
-
-/* --- blocks ----------------------------------------------------------------------------------------------------------- */
 
 /* Whether names that are given in such a block end with it. */
 static int has_names(const struct parser *p, char kind) { return p->b->is_v3 && (kind == 'A' || kind == 'O'); }
@@ -164,8 +160,6 @@ static int do_reverse_orientation(struct parser *p)
     return 0;
 }
 
-/* --- header ----------------------------------------------------------------------------------------------------------- */
-
 static int do_header(struct parser *p)
 {
     static const char *const names[PT_HEADER_COUNT] = {"Film", "Camera", "Sampler", "Integrator", "PixelFilter"};
@@ -221,8 +215,6 @@ static int do_world_end(struct parser *p)
     p->ended = 1;
     return innermost(p) && !p->b->is_v3 ? fail_open(p) : 0;
 }
-
-/* --- world ------------------------------------------------------------------------------------------------------------ */
 
 static int do_shape(struct parser *p)
 {
@@ -391,8 +383,6 @@ static int do_include(struct parser *p)
     int rc = scoped ? push(p) : 0;
     return rc ? rc : pt_lexer_include(&p->lexer, path, p->loc, scoped);
 }
-
-/* --- the loop --------------------------------------------------------------------------------------------------------- */
 
 static const struct directive directives[] = {
     {"Shape", do_shape, .in_world = 1, .reads = READ_FOR_SHAPE},

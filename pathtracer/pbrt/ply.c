@@ -47,8 +47,6 @@ struct reader {
     float *column[R_V + 1]; /* where the first vertex's value of a role goes, NULL: nowhere */
 };
 
-/* --- header ----------------------------------------------------------------------------------------------------------- */
-
 /* By the end of the first line, because behind a binary header either character may be data. */
 static char newline_of(const char *at, const char *end)
 {
@@ -188,8 +186,6 @@ static int read_header(struct reader *r)
     return base_fail(r->err, BASE_EINVAL, "%s: truncated PLY header", r->name);
 }
 
-/* --- values ----------------------------------------------------------------------------------------------------------- */
-
 static int truncated(struct reader *r) { return base_fail(r->err, BASE_EINVAL, "%s: truncated PLY file", r->name); }
 
 /* What exporters write for a number that is none, those of Microsoft's C library 1.#IND, 1.#QNAN or 1.#INF; where one is
@@ -260,8 +256,6 @@ static int read_value(struct reader *r, enum ply_type type, double *out)
     r->at += type_bytes[type];
     return 0;
 }
-
-/* --- elements --------------------------------------------------------------------------------------------------------- */
 
 static int store_vertex_value(struct reader *r, uint64_t i, enum role role, float v)
 {

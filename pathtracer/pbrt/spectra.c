@@ -117,8 +117,6 @@ void pt_spd_blackbody(double kelvin, struct pt_spd *out)
         out->v[i] = planck(PT_SPD_FIRST_NM + i * PT_SPD_STEP_NM, kelvin) / peak;
 }
 
-/* --- names ------------------------------------------------------------------------------------------------------------ */
-
 static int noble_metal(const char *metal, int is_k, struct pt_spd *out)
 {
     double pairs[2 * NOBLE_COUNT];
@@ -213,8 +211,6 @@ int pt_illuminant_named(const char *name, pt_vec3 *rgb)
         }
     return 0;
 }
-
-/* --- colour ----------------------------------------------------------------------------------------------------------- */
 
 pt_vec3 pt_xyz_to_rgb(double x, double y, double z)
 {

@@ -13,8 +13,6 @@ const struct base_file_kind pt_checkpoint_kind = {"checkpoint", {'L', 'U', 'L', 
 /* The frame: blocks, totals, the criterion. */
 enum { MAX_STATE_BYTES = 1 << 30 };
 
-/* --- saving --------------------------------------------------------------------------------------------------------- */
-
 struct sink {
     FILE *file;
     uint32_t crc;
@@ -64,8 +62,6 @@ int pt_checkpoint_save(const char *path, const struct pt_render *r, const struct
     fwrite(&s.crc, 1, sizeof s.crc, out.file);
     return base_file_commit(&out, err);
 }
-
-/* --- loading -------------------------------------------------------------------------------------------------------- */
 
 struct source {
     const char *path;

@@ -28,8 +28,6 @@ static void log_message(void *context, int32_t level, const char *text)
         base_log_note(s->log, "%s", text);
 }
 
-/* --- finding criteria ----------------------------------------------------------------------------------------------- */
-
 int pt_criterion_find(const char *spec, struct base_inputs *inputs, struct base_log *log, const struct lull_criterion **out,
                       struct base_err *err)
 {
@@ -114,8 +112,6 @@ int pt_criterion_create(const struct lull_criterion *table, const struct lull_pa
     return pt_host_result(lull_host_create(&services, table, pairs, pair_count, out, &e), &e, err);
 }
 
-/* --- showing the film ----------------------------------------------------------------------------------------------- */
-
 /* Sums of the film and what they are divided by. */
 static const struct {
     uint32_t abi, film; /* LULL_PLANE_, PT_FILM_ */
@@ -191,8 +187,6 @@ const struct lull_host_view *pt_host_show(const struct pt_film *film, struct lul
                                       .dropped_half = film->dropped_half ? &v->dropped_half : NULL};
     return &v->view;
 }
-
-/* --- mask ----------------------------------------------------------------------------------------------------------- */
 
 static float sample(const struct pic_image *image, size_t i)
 {

@@ -21,8 +21,6 @@ static const struct lull_host_block *block_at(const struct lull_host_blocks *b, 
     return &b->list[(uint32_t)row * b->list_columns + (uint32_t)column];
 }
 
-/* --- EXR ------------------------------------------------------------------------------------------------------------ */
-
 enum { R, G, B, SPP, P_NOISY, ERROR, REASON, FIRST_AOV, CHANNELS_MAX = FIRST_AOV + 7 + 8 };
 
 struct exr_source {
@@ -188,8 +186,6 @@ int pt_output_is_ours(const char *path)
     return n == 0 || memmem(begin, n, mark, sizeof mark - 1) != NULL;
 }
 
-/* --- pictures ------------------------------------------------------------------------------------------------------- */
-
 /* sRGB codes of a picture over the crop: `shown` over the film's pixels, NULL: the noisy one. The caller's. */
 static uint8_t *encode(const struct pt_render *r, const float *shown, struct base_err *err)
 {
@@ -228,8 +224,6 @@ int pt_output_stop_map(const char *path, const struct pt_render *r, const struct
     struct lull_error e = {.struct_size = sizeof e};
     return pt_output_result(lull_host_stop_map(r->blocks, path, info->of.scene, &e), &e, err);
 }
-
-/* --- report --------------------------------------------------------------------------------------------------------- */
 
 /* effects: room for PT_FX_COUNT names. */
 static struct lull_host_report describe(const struct pt_render *r, const struct pt_output_info *info, const char **effects)
@@ -309,8 +303,6 @@ int pt_output_report(const char *path, const struct pt_render *r, const struct p
     struct lull_error e = {.struct_size = sizeof e};
     return pt_output_result(lull_host_report_write(r->frame, &report, path, &e), &e, err);
 }
-
-/* --- page ----------------------------------------------------------------------------------------------------------- */
 
 int pt_output_page(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {

@@ -60,7 +60,7 @@ void pt_progress_text(struct pt_progress_pace *p, const struct pt_render *r, dou
                        room);
 }
 
-/* --- the blocks as a picture of half-block characters for a terminal with 256 colours -------------------------------- */
+/* The blocks as a picture of half-block characters for a terminal with 256 colours. */
 
 enum { ACTIVE = 231, UNTOUCHED = 237, BEYOND = -1, LARGEST_BLOCK = 4 };
 

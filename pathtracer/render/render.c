@@ -163,8 +163,6 @@ void pt_render_go_on(struct pt_render *r, unsigned others, uint64_t first_spp)
         lull_host_reopen(blocks, r->config.max_seam);
 }
 
-/* --- one slice ------------------------------------------------------------------------------------------------------ */
-
 /* Samples up to which a block goes now. */
 static uint64_t goal(const struct pt_render *r, const struct lull_host_block *b)
 {
@@ -308,8 +306,6 @@ static int slice(struct pt_render *r, int *more, struct base_err *err)
     r->sampled_rows = (long)r->work.count;
     return 0;
 }
-
-/* --- checks --------------------------------------------------------------------------------------------------------- */
 
 /* A criterion that fails says so once. */
 static void warn_once(const struct pt_render *r, const struct pt_render_hooks *hooks, const char *line)

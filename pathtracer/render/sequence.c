@@ -24,8 +24,6 @@ static const uint32_t REFERENCE_SEED_BITS = 0x5bd1e995u;
 /* The one level whose pixels are kept as half floats, from which other sample counts can be simulated. */
 enum { FULL_LEVEL_SPP = 320 };
 
-/* --- settings ------------------------------------------------------------------------------------------------------- */
-
 int pt_sequence_levels(const char *text, uint32_t spp[PT_SEQUENCE_MAX_LEVELS], struct base_err *err)
 {
     char kind[16], end;
@@ -72,8 +70,6 @@ struct recorder {
     uint8_t *chosen;                                      /* owns; [grid.count] */
     double *mean, *half, *difference, *moment2, *scratch; /* one block, planar; mean owns all */
 };
-
-/* --- manifest ------------------------------------------------------------------------------------------------------- */
 
 /* Scene and view by name: "kitchen-view2.pbrt" is view2 of kitchen. */
 static void name_view(const struct pt_sequence_config *c, char *scene, char *view, size_t room)
@@ -163,8 +159,6 @@ static int resume(struct recorder *r, struct base_err *err)
     seq_manifest_release(&old);
     return rc;
 }
-
-/* --- one block ------------------------------------------------------------------------------------------------------ */
 
 static int open_block(const struct recorder *r, const struct lull_host_block *b, int reference, struct pt_render **out,
                       struct base_err *err)
@@ -302,8 +296,6 @@ static int record_block(struct recorder *r, const struct lull_host_block *b, int
     seq_builder_release(&file);
     return rc;
 }
-
-/* --- all blocks ----------------------------------------------------------------------------------------------------- */
 
 static int lay_grid(struct recorder *r, struct base_err *err)
 {

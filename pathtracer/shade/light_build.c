@@ -194,8 +194,6 @@ static int make_table(struct pt_scene *scene, double *weights, struct pt_arena *
     return 1;
 }
 
-/* --- hierarchy -------------------------------------------------------------------------------------------------------- */
-
 static void bound_quadric(const struct pt_shape *shape, const struct pt_quadric *q, struct pt_light_bounds *out)
 {
     pt_quadric_bounds(q, &out->lower, &out->upper);

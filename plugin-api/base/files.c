@@ -14,8 +14,6 @@
 enum { PATH_ROOM = 4096, LINKS_MAX = 40, TRIES_MAX = 100, NAME_KEPT = 180 };
 static const char TMP_PREFIX[] = ".tmp-lull"; /* .tmp-lullPID-N.NAME */
 
-/* --- reading --- */
-
 int base_file_open(const char *path, FILE **file, struct base_err *err)
 {
     struct stat st;
@@ -70,8 +68,6 @@ int base_file_read(const char *path, size_t max_size, char **data, size_t *size,
     *size = (size_t)st.st_size;
     return 0;
 }
-
-/* --- names of outputs --- */
 
 static int too_long(const char *path, struct base_err *err)
 {
@@ -233,8 +229,6 @@ static int name_tmp(const char *target, int n, char *tmp_path, size_t room, stru
                         length > NAME_KEPT ? base + length - NAME_KEPT : base);
     return used > 0 && (size_t)used < room ? 0 : too_long(target, err);
 }
-
-/* --- writing --- */
 
 int base_make_folder(const char *path, int *made, struct base_err *err)
 {

@@ -7,8 +7,6 @@
 
 enum { REALS = 16, SHOWN = 160 }; /* bytes of a line in a message: two of them and a path fit */
 
-/* --- writing ---------------------------------------------------------------------------------------------------------- */
-
 /* Can be printed in a line: no control character, no byte that UTF-8 never has. */
 static int is_text(char of)
 {
@@ -91,8 +89,6 @@ void base_identity_release(struct base_identity *id)
     free(id->text);
     *id = (struct base_identity){0};
 }
-
-/* --- comparing -------------------------------------------------------------------------------------------------------- */
 
 struct line {
     const char *text;   /* NULL: there is none */

@@ -16,8 +16,6 @@
 
 enum { EXIT_UNWRITTEN = 2, MAX_OPTIONS = 96, KEY_LONG = 256, KEY_USAGE = KEY_LONG + MAX_OPTIONS, KEY_HELP, KEY_VERSION };
 
-/* --- values --- */
-
 /* strtol and strtod pass over blanks before a number; an argument that has some is none. */
 static int begins_blank(const char *text) { return isspace((unsigned char)*text) != 0; }
 
@@ -150,8 +148,6 @@ static const struct base_option *find(const struct base_option *list, int key)
     return NULL;
 }
 
-/* --- identity --- */
-
 static void add_option(struct base_identity *id, const struct base_option *o, const void *from)
 {
     const void *at = (const char *)from + o->to.offset;
@@ -182,8 +178,6 @@ void base_options_identify(const struct base_option *list, const void *from, str
             add_option(id, o, from);
     }
 }
-
-/* --- help --- */
 
 /* What --help calls the value, or the words: a|b|c. */
 static const char *value_name(const struct base_option *o, char *text, size_t room)
@@ -234,8 +228,6 @@ _Noreturn static void answer(const struct base_options *options, const char *pro
     fprintf(stderr, "%s: cannot write standard output\n", program);
     exit(EXIT_UNWRITTEN);
 }
-
-/* --- parsing --- */
 
 struct getopt_form {
     struct option longs[MAX_OPTIONS + 4];

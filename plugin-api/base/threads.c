@@ -45,8 +45,6 @@ struct base_threads {
 /* How often one looks before one sleeps: some fifty microseconds, about what waking would take. */
 enum { LOOKS = 2000 };
 
-/* --- what there is ---------------------------------------------------------------------------------------------------- */
-
 static double fewer(double a, double b) { return b > 0 && (a <= 0 || b < a) ? b : a; }
 
 /* A small file's text, "" if there is none. By no stream: that would allocate, and fail without a word. */

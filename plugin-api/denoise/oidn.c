@@ -33,8 +33,6 @@ struct lull_oidn {
     int program_fd; /* the connection to it, or -1 */
 };
 
-/* --- the program ------------------------------------------------------------------------------------------------------- */
-
 /* The file that this code is in, as it was loaded or what that links to; a program that was found by PATH only knows its
  * own name. 0: no telling. */
 static int own_file(int resolved, char path[PATH_MAX])
@@ -146,8 +144,6 @@ static int ask_program(struct lull_oidn *o, int (*cancelled)(void *data), void *
     return rc;
 }
 
-/* --- memory ------------------------------------------------------------------------------------------------------------ */
-
 static void drop_memory(struct lull_oidn *o)
 {
     if (o->shared)
@@ -222,8 +218,6 @@ void lull_oidn_close(struct lull_oidn *o)
     free(o->library);
     free(o);
 }
-
-/* --- pictures ---------------------------------------------------------------------------------------------------------- */
 
 /* A copy with its margin, in which everything is finite and inside [lo, hi]; what is no number is 0. form: of the copy. */
 static void clean(const float *from, const struct lull_oidn_form *form, float lo, float hi, float *to)

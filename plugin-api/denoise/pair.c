@@ -95,8 +95,6 @@ void lull_denoised_part_close(struct lull_denoised_part *part)
     *part = (struct lull_denoised_part){0};
 }
 
-/* --- reading ----------------------------------------------------------------------------------------------------------- */
-
 void lull_denoised_begin(struct lull_denoised_pair *pair, int32_t width, int32_t height)
 {
     pair->width = width;
@@ -143,8 +141,6 @@ void lull_denoised_mirror(struct lull_denoised_pair *pair, struct lull_denoised_
         if (pictures[i])
             mirror(pictures[i], pair->width, pair->height, known);
 }
-
-/* --- what becomes of it ------------------------------------------------------------------------------------------------ */
 
 static int run(struct lull_denoised_pair *pair, float *const out[2], int prefiltered, int (*cancelled)(void *data),
                void *data, struct base_err *err)

@@ -42,8 +42,6 @@ static int32_t open_pair(struct picture *p, int32_t height, struct lull_error *e
     return rc ? lull_host_translate(&why, err) : LULL_OK;
 }
 
-/* --- reading ----------------------------------------------------------------------------------------------------------- */
-
 /* What a pass over the pixels does with one run of them; at: index of its first pixel. */
 typedef void visit(struct picture *p, const struct lull_kit_span *span, size_t at);
 
@@ -82,8 +80,6 @@ static void read_auxiliary(struct picture *p, const struct lull_kit_span *s, siz
             for (size_t c = 0; c < 3; c++)
                 to[k][3 * (at + i) + c] = (float)s->value[LULL_PLANE_ALBEDO + k][i][c];
 }
-
-/* --- denoising --------------------------------------------------------------------------------------------------------- */
 
 /* Luminance by which pictures are compared, 1 is the display's white: what is far beyond shows no noise. What is little
  * beyond counts as it is, since a noisy half that is cut off at white is darker than the truth in the mean. */

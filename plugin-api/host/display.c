@@ -50,7 +50,7 @@ struct lull_host_display {
     struct viewer_packet packet;
 };
 
-/* --- a connection to somebody who may be slow, hostile or gone -------------------------------------------------------- */
+/* A connection to somebody who may be slow, hostile or gone. */
 
 /* Cuts "HOST", "HOST:PORT" or "[IPv6]:PORT" into host and port, which stays where none is named; an IPv6 address without
  * brackets has none. 0: that is no address. */
@@ -129,8 +129,6 @@ static ssize_t send_some(int socket, const void *data, size_t size)
     }
 }
 
-/* --- the renderer's side ---------------------------------------------------------------------------------------------- */
-
 static int has_changed(const struct lull_host_block *b, const struct lull_host_block *seen)
 {
     return seen->next_spp == 0 || b->spp != seen->spp || b->reason != seen->reason || b->asked_spp != seen->asked_spp;
@@ -190,7 +188,7 @@ int32_t lull_host_display_update(struct lull_host_display *d, const struct lull_
     return code;
 }
 
-/* --- the thread's side; the lock is held wherever nothing else is said ------------------------------------------------ */
+/* The thread's side; the lock is held wherever nothing else is said. */
 
 /* What a viewer that comes has not seen is all. */
 static void forget(struct lull_host_display *d)
@@ -302,8 +300,6 @@ static void *serve(void *data)
     pthread_mutex_unlock(&d->lock);
     return NULL;
 }
-
-/* --- life ------------------------------------------------------------------------------------------------------------- */
 
 static void destroy(struct lull_host_display *d)
 {

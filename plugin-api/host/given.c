@@ -43,8 +43,6 @@ int32_t lull_host_check_services(const struct lull_host_services *s, struct lull
     return LULL_OK;
 }
 
-/* --- a config ------------------------------------------------------------------------------------------------------- */
-
 static int32_t check_numbers(const struct lull_host_config *g, struct lull_error *err)
 {
     const struct {
@@ -117,8 +115,6 @@ int32_t lull_host_check_config(const struct lull_host_config *g, const struct lu
     return LULL_OK;
 }
 
-/* --- a layout ------------------------------------------------------------------------------------------------------- */
-
 static int by_place(const void *a, const void *b)
 {
     const struct lull_host_block *x = *(const struct lull_host_block *const *)a,
@@ -185,8 +181,6 @@ int32_t lull_host_check_disjoint(const struct lull_host_block *list, uint32_t co
     free(sorted);
     return code;
 }
-
-/* --- planes --------------------------------------------------------------------------------------------------------- */
 
 int32_t lull_host_check_plane(const char *name, const struct lull_plane *p, uint32_t channels, struct lull_error *err)
 {
@@ -257,8 +251,6 @@ int32_t lull_host_check_view(const struct lull_host_blocks *b, const struct lull
         return lull_error_set(err, LULL_E_INVALID, "a view with a plane WEIGHT counts no dropped samples");
     return LULL_OK;
 }
-
-/* --- what the renderer writes ---------------------------------------------------------------------------------------- */
 
 static int32_t check_block(const struct lull_host_block *b, uint32_t index, struct lull_error *err)
 {

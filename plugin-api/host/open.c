@@ -7,8 +7,6 @@
 #include "base/clock.h"
 #include "base/colour.h"
 
-/* --- a criterion ---------------------------------------------------------------------------------------------------- */
-
 static int32_t copy_pairs(struct lull_host_criterion *c, const struct lull_pair *pairs, uint32_t count,
                           struct lull_error *err)
 {
@@ -178,8 +176,6 @@ const char *lull_host_parameter(const struct lull_criterion *t, const char *name
     return text;
 }
 
-/* --- its frame ------------------------------------------------------------------------------------------------------ */
-
 /* An instance like the first one, its quality parameter scaled for this step of the mask. */
 static int32_t create_instance(struct lull_host_criterion *c, uint32_t step, struct lull_error *err)
 {
@@ -298,8 +294,6 @@ int32_t lull_host_join(const struct lull_host_frame *f, struct lull_host_criteri
     c->begin_s = base_clock_wall_s();
     return LULL_OK;
 }
-
-/* --- a frame -------------------------------------------------------------------------------------------------------- */
 
 /* Samples at the first check. */
 static uint64_t first_check(const struct lull_host_frame *f)

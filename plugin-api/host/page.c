@@ -20,8 +20,6 @@ __asm__(".section .rodata\n"
         ".previous\n");
 extern const char lull_host_page_html[] __attribute__((visibility("hidden")));
 
-/* --- the data --------------------------------------------------------------------------------------------------------- */
-
 /* The size of the pictures that belong to a report; 0: it is none. */
 static int find_size(const cJSON *report, double size[2])
 {
@@ -84,8 +82,6 @@ static int32_t parse(const char *report, const char *quote, uint32_t layer_count
     *data = make_data(r, q);
     return *data ? LULL_OK : lull_host_no_memory(err, "the page");
 }
-
-/* --- writing ---------------------------------------------------------------------------------------------------------- */
 
 static void put_base64(FILE *file, const uint8_t *bytes, size_t size)
 {

@@ -11,8 +11,6 @@
 
 static int32_t no_memory(struct lull_error *err) { return lull_host_no_memory(err, "quote"); }
 
-/* --- rows -------------------------------------------------------------------------------------------------------------- */
-
 int32_t lull_host_quote_begin(const struct lull_host_frame *frame, int32_t threads, struct lull_host_quote **out,
                               struct lull_error *err)
 {
@@ -138,8 +136,6 @@ int32_t lull_host_quote_add_other(struct lull_host_quote *q, struct lull_host_cr
     return lull_host_join(q->frame, criterion, err);
 }
 
-/* --- asking ------------------------------------------------------------------------------------------------------------ */
-
 /* A row that would have stopped the block at an earlier check has stopped it; where between the two checks follows from what
  * it expected at the first. */
 static void note_answer(struct lull_host_response *response, const struct lull_host_block *b, const struct lull_decision *d,
@@ -230,8 +226,6 @@ void lull_host_quote_ask(struct lull_host_quote *q, const struct lull_host_view 
         ask_row(q, i, view, due, count, NULL);
 }
 
-/* --- light that is rare --- */
-
 /* One pixel in a hundred with more than this share of the squared difference of the halves (8 % in normal noise) … */
 static const double MOST_TOP_SHARE = 0.6;
 /* … or predicted samples that grow by half as many octaves as the samples do: noise that more samples find more of. */
@@ -291,8 +285,6 @@ static int32_t find_undersampled(const struct lull_host_quote *q, const struct l
     free(scratch);
     return code;
 }
-
-/* --- the answer -------------------------------------------------------------------------------------------------------- */
 
 /* Thread seconds of one sample of every pixel of each block; blocks that have none take the mean of the rest. */
 static void cost_blocks(const struct lull_host_blocks *blocks, struct lull_host_quote_block *out)

@@ -48,8 +48,6 @@ uint64_t lull_host_goal(const struct lull_host_blocks *b, const struct lull_host
     return block->next_spp > b->spp_max ? b->spp_max : block->next_spp;
 }
 
-/* --- re-opening ----------------------------------------------------------------------------------------------------- */
-
 static int touch(const struct lull_host_block *a, const struct lull_host_block *b)
 {
     int beside = a->x1 == b->x0 || b->x1 == a->x0, above = a->y1 == b->y0 || b->y1 == a->y0;
@@ -116,8 +114,6 @@ uint32_t lull_host_extend(struct lull_host_blocks *b)
     return reopened;
 }
 
-/* --- a check -------------------------------------------------------------------------------------------------------- */
-
 static void keep_answer(struct lull_host_frame *f, uint32_t block)
 {
     const struct lull_host_block *b = &f->blocks.list[block];
@@ -171,8 +167,7 @@ static void apply_one(const struct lull_host_blocks *blocks, struct lull_host_bl
     }
 }
 
-/* --- a time budget ---------------------------------------------------------------------------------------------------
- *
+/* A time budget.
  * Time that does not suffice for every block is spent where noise is seen most: only blocks of about the largest error are
  * asked, and so go on; the others wait at their checks. About the same is what half as many samples again make up for, and
  * no block goes further than that unasked. A render that is resumed differs from one without a budget, therefore.

@@ -50,8 +50,6 @@ static void host_log(const struct lull_host *host, int32_t level, const char *te
     lull_host_say(host->context, level, text);
 }
 
-/* --- what it must leave as it is ------------------------------------------------------------------------------------- */
-
 static void tell(struct lull_host_criterion *c, const char *call, const char *changed)
 {
     char text[128];
@@ -92,8 +90,6 @@ static int32_t host_parallel_for(const struct lull_host *host, uint64_t count, l
     base_threads_tasks(c->threads, count, run_task, &t);
     return LULL_OK;
 }
-
-/* --- life ------------------------------------------------------------------------------------------------------------- */
 
 int32_t lull_host_offer(struct lull_host_criterion *c, const struct lull_host_services *services, struct lull_error *err)
 {

@@ -24,8 +24,6 @@ struct totals_record {
 _Static_assert(offsetof(struct lull_host_totals, criterion_thread_s) == sizeof(struct totals_record),
                "the totals begin with what is saved of them");
 
-/* --- the criterion's history ---------------------------------------------------------------------------------------- */
-
 struct bytes {
     unsigned char *data;
     size_t used, room;
@@ -104,8 +102,6 @@ int32_t lull_host_load_history(struct lull_host_criterion *c, const void *data, 
     return LULL_OK;
 }
 
-/* --- saving --------------------------------------------------------------------------------------------------------- */
-
 /* Remembers the first failure. */
 struct sink {
     const struct lull_writer *writer;
@@ -155,8 +151,6 @@ int32_t lull_host_save(const struct lull_host_frame *f, const struct lull_writer
     free(history.data);
     return code;
 }
-
-/* --- loading -------------------------------------------------------------------------------------------------------- */
 
 struct source {
     const char *name;
@@ -276,8 +270,6 @@ int32_t lull_host_load_blocks(struct lull_host_frame *f, const void *data, uint6
 {
     return load(f, data, size, name, 0, err);
 }
-
-/* --- identity ------------------------------------------------------------------------------------------------------- */
 
 int32_t lull_host_same_identity(const char *saved, uint64_t saved_size, const char *present, const char *name,
                                 struct lull_error *err)

@@ -33,8 +33,6 @@ void viewer_release(struct viewer_packet *p)
     *p = (struct viewer_packet){0};
 }
 
-/* --- values ----------------------------------------------------------------------------------------------------------- */
-
 static void put_u8(struct viewer_packet *p, uint8_t v) { p->at[p->size++] = v; }
 
 static void put_i32(struct viewer_packet *p, int32_t v)
@@ -75,8 +73,6 @@ static void put_channels(struct viewer_packet *p)
         put_text(p, channels[c]);
 }
 
-/* --- images ----------------------------------------------------------------------------------------------------------- */
-
 void viewer_create(struct viewer_packet *p, int32_t width, int32_t height)
 {
     begin(p, CREATE, 1);
@@ -110,8 +106,6 @@ void viewer_update(struct viewer_packet *p, const struct viewer_tile *t)
     }
     end(p);
 }
-
-/* --- drawings --------------------------------------------------------------------------------------------------------- */
 
 static void command(struct viewer_packet *p, int *count, uint8_t type, int n, const float *values)
 {

@@ -15,8 +15,6 @@ static const size_t MOST_BYTES = (size_t)64 << 20; /* of a task, unless one item
 /* How often a thread that works looks for messages; waits of one that does not, while others work and while nobody does. */
 static const double LOOK_EVERY_S = 0.001, SHORT_WAIT_S = 0.0002, LONG_WAIT_S = 0.05;
 
-/* --- rank 0 ----------------------------------------------------------------------------------------------------------- */
-
 struct farming {
     struct job *job;
     const struct job_farm *farm;
@@ -215,8 +213,6 @@ int job_farm_run(struct job *job, struct base_threads *threads, const struct job
         return base_fail(err, f.failed.code, "%s", f.failed.text);
     return atomic_load(&f.stop) ? JOB_STOPPED : 0;
 }
-
-/* --- workers ---------------------------------------------------------------------------------------------------------- */
 
 /* A task on its way through a worker. */
 struct queued {

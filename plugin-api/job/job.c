@@ -14,8 +14,6 @@
 
 static const double LOOK_S = 0.05; /* longest wait between two looks whether everybody is still there */
 
-/* --- opening -------------------------------------------------------------------------------------------------------- */
-
 static const char MODULE[] = "lull-mpi.so";
 
 /* What launchers leave in the environment: Open MPI, any with PMIx, MPICH and Slurm. */
@@ -83,8 +81,6 @@ void job_watch(struct job *job, double timeout_s, const volatile sig_atomic_t *i
     job->interrupted = interrupted;
 }
 
-/* --- who is who ------------------------------------------------------------------------------------------------------ */
-
 int job_rank(const struct job *job) { return job ? job->transport->rank : 0; }
 
 int job_count(const struct job *job) { return job ? job->transport->count : 1; }
@@ -111,8 +107,6 @@ int job_threads(const struct job *job)
     const long share = (online < quota ? online : quota) / processes;
     return share < 1 ? 1 : share < available ? (int)share : available;
 }
-
-/* --- failures -------------------------------------------------------------------------------------------------------- */
 
 int job_failed(const struct job *job, struct base_err *err)
 {
@@ -151,8 +145,6 @@ static int look_round(struct job *job, int rank, double waited_s)
     int rc = job->interrupted && *job->interrupted ? job_find_dead(job) : 0;
     return rc ? rc : job_give_up(job, rank, waited_s);
 }
-
-/* --- messages -------------------------------------------------------------------------------------------------------- */
 
 int job_send(struct job *job, int rank, void *message, size_t size)
 {
@@ -212,8 +204,6 @@ int job_receive(struct job *job, double wait_s, int *rank, struct job_message **
     return rc;
 }
 
-/* --- the handshake --------------------------------------------------------------------------------------------------- */
-
 static int say_hello(struct job *job, const char *settings, int threads)
 {
     size_t size = sizeof(struct job_hello) + strlen(settings) + 1;
@@ -271,8 +261,6 @@ int job_handshake(struct job *job, const char *settings, int threads, struct bas
     }
     return job_failed(job, err);
 }
-
-/* --- the end ---------------------------------------------------------------------------------------------------------- */
 
 /* A worker: its last message, and the end that rank 0 says. */
 static void say_farewell(struct job *job, int status, const char *text)

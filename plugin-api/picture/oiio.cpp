@@ -56,8 +56,6 @@ int complain(const char *name, std::string why, base_err *err)
                      why.empty() ? "unknown reason" : why.c_str());
 }
 
-/* --- which channels --- */
-
 std::vector<ImageSpec> list_parts(ImageInput &input)
 {
     std::vector<ImageSpec> parts{input.spec()};
@@ -137,8 +135,6 @@ int choose(ImageInput &input, const pic_request &q, pic_choice *out, base_err *e
     }
     return rc;
 }
-
-/* --- pixels --- */
 
 int check_size(const ImageSpec &spec, const char *name, base_err *err)
 {
@@ -342,8 +338,6 @@ int read_pixels(ImageInput &input, const pic_request &q, const header &h, pic_im
     return 0;
 }
 
-/* --- files and memory --- */
-
 /* Keeps alpha as stored: pbrt never premultiplies. */
 ImageSpec raw_config()
 {
@@ -496,8 +490,6 @@ int open_file(const char *path, opened *out, base_err *err)
     out->input = ImageInput::open(path, &config);
     return out->input ? 0 : complain(path, OIIO::geterror(), err);
 }
-
-/* --- headers --- */
 
 int find_window(const ImageSpec &spec, const char *name, pic_window *out, base_err *err)
 {

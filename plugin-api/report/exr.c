@@ -26,8 +26,6 @@ struct source {
     double *noisy_error; /* by block; NULL: it was not denoised */
 };
 
-/* --- blocks ----------------------------------------------------------------------------------------------------------- */
-
 static int read_block_size(const char *text, uint32_t *width, uint32_t *height)
 {
     char *end;
@@ -124,8 +122,6 @@ static int read_layer(struct source *s, int layer, struct base_err *err)
     pic_release(&image);
     return rc;
 }
-
-/* --- JSON ------------------------------------------------------------------------------------------------------------- */
 
 static double number(const char *text)
 {

@@ -23,7 +23,7 @@ struct sheet {
     uint16_t delay[2];              /* of a frame, in seconds: what is divided, by what */
 };
 
-/* --- a moving picture as an animated PNG ------------------------------------------------------------------------------
+/* A moving picture as an animated PNG.
  * Browsers show it and play it in a loop; other programs show its first frame. Frames are compressed by libpng; what is
  * around them follows "Portable Network Graphics (PNG) Specification (Third Edition)", W3C 2025, 11.3.6. */
 
@@ -113,8 +113,6 @@ static int write_frame(struct sheet *s, struct base_err *err)
     free(png);
     return 0;
 }
-
-/* --- the sheet --------------------------------------------------------------------------------------------------------- */
 
 static double scale_of(const struct sheet *s, double spp)
 {

@@ -201,8 +201,6 @@ int seq_manifest_read(const char *dir, struct seq_manifest *m, struct base_err *
     return rc;
 }
 
-/* --- writing --- */
-
 static void put_crc(cJSON *to, const char *name, uint32_t crc, int *failed)
 {
     char text[16];
@@ -291,8 +289,6 @@ void seq_manifest_identity(const struct seq_manifest *m, struct base_identity *t
     for (uint32_t i = 0; i < m->n_levels; i++)
         base_identity_add(to, "level", "%u", m->levels[i]);
 }
-
-/* --- blocks --- */
 
 uint32_t seq_manifest_find(const struct seq_manifest *m, uint32_t id)
 {

@@ -49,8 +49,6 @@ __attribute__((format(printf, 3, 4))) static void say(const struct lull_search *
     search->log(search->log_context, level, text);
 }
 
-/* --- a file ----------------------------------------------------------------------------------------------------------- */
-
 static int read_at(int fd, void *out, size_t size, uint64_t offset)
 {
     return offset <= INT64_MAX && pread(fd, out, size, (off_t)offset) == (ssize_t)size;
@@ -101,8 +99,6 @@ static const char *find_fault(const char *path)
     close(fd);
     return fault;
 }
-
-/* --- one library ----------------------------------------------------------------------------------------------------- */
 
 /* Tells about, and where possible undoes, what loading did to the process. */
 static void compare_process(const struct lull_search *search, const char *path, const struct lull_process_state *before)
@@ -176,8 +172,6 @@ static void list_ids(lull_entry_fn entry, uint32_t count, char *text, size_t roo
     for (uint32_t i = 0; i < count && used < room; i++)
         used += (size_t)snprintf(text + used, room - used, "%s%s", i > 0 ? ", " : "", entry(i)->id);
 }
-
-/* --- directories ----------------------------------------------------------------------------------------------------- */
 
 /* lib/lull beside the running program's own folder: the build tree and the installed tree have the same shape. */
 static const char *beside_program(char path[LULL_PATH_MAX])
@@ -278,8 +272,6 @@ static int is_hidden(const struct lull_search *search, const char *name, size_t 
         found = find_file(dir, name, "", path);
     return found;
 }
-
-/* --- public ---------------------------------------------------------------------------------------------------------- */
 
 static int32_t visit_library(const struct lull_search *search, struct lull_found *found,
                              int32_t (*visit)(void *context, const struct lull_found *found), void *context)

@@ -75,8 +75,6 @@ void lc_check_leaks(struct lc *c)
     repeat(c, short_session, 10, "a frame with RESTART");
 }
 
-/* --- allocation ------------------------------------------------------------------------------------------------------- */
-
 /* create and begin_frame with the k-th allocation failing, for every k: an error or success, never a crash or a leak. */
 void lc_check_out_of_memory(struct lc *c)
 {

@@ -63,8 +63,6 @@ void lc_check_normalisers(struct lc *c)
     compare_layouts(c, list, COUNT(list), 0);
 }
 
-/* --- a crop ------------------------------------------------------------------------------------------------------------ */
-
 /* The same blocks as the window of a larger picture: a view that does not begin at the origin. */
 void lc_check_window(struct lc *c)
 {
@@ -97,8 +95,6 @@ void lc_check_window(struct lc *c)
     }
     lc_session_close(&s);
 }
-
-/* --- planes ------------------------------------------------------------------------------------------------------------ */
 
 /* One evaluate call on a spoilt image: 0 refused, 1 answered. */
 enum spoil { SPOIL_ABSENT, SPOIL_CUT, SPOIL_TYPE, SPOIL_NORMALISER, SPOIL_CHANNELS, SPOIL_WEIGHT, SPOIL_COUNT };
@@ -177,8 +173,6 @@ void lc_check_broken_planes(struct lc *c)
                           what[spoil]);
     }
 }
-
-/* --- values ------------------------------------------------------------------------------------------------------------ */
 
 /* Steps with a value poked into every `every`-th pixel (all planes); returns the flags that all answers share. */
 static uint32_t steps_with_value(struct lc *c, float value, int every)

@@ -27,8 +27,6 @@ const struct lull_param *lc_param(const struct lc *c, uint32_t i)
     return (const void *)((const char *)c->criterion->params + (size_t)i * c->criterion->param_stride);
 }
 
-/* --- symbols --------------------------------------------------------------------------------------------------------- */
-
 struct bytes {
     const char *data;
     uint64_t size;
@@ -92,8 +90,6 @@ void lc_check_symbols(struct lc *c)
         LC_EXPECT(c, entries == 1, "does not export %s", LULL_ENTRY_NAME);
 }
 
-/* --- loading --------------------------------------------------------------------------------------------------------- */
-
 static const int signals[] = {SIGINT, SIGTERM, SIGHUP,  SIGQUIT, SIGILL,  SIGABRT, SIGFPE, SIGSEGV,
                               SIGBUS, SIGPIPE, SIGALRM, SIGUSR1, SIGUSR2, SIGCHLD, SIGPROF};
 enum { SIGNALS = sizeof signals / sizeof *signals };
@@ -121,8 +117,6 @@ void lc_check_load(struct lc *c)
         LC_EXPECT(c, before[i].sa_handler == after.sa_handler, "loading changed the handling of signal %d", signals[i]);
     }
 }
-
-/* --- entry ----------------------------------------------------------------------------------------------------------- */
 
 void lc_check_entry(struct lc *c)
 {

@@ -45,8 +45,6 @@ void lc_check_concurrent(struct lc *c)
     }
 }
 
-/* --- several instances at once ---------------------------------------------------------------------------------------- */
-
 struct instance_thread {
     struct lc *check;
     struct lc_log log;
@@ -85,8 +83,6 @@ void lc_check_instances(struct lc *c)
     }
     c->concurrent = 0;
 }
-
-/* --- floating point --------------------------------------------------------------------------------------------------- */
 
 /* Every call already compares the control register; here with a host that flushes subnormals and traps nothing. */
 void lc_check_fp(struct lc *c)

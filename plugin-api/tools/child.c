@@ -19,8 +19,6 @@
 /* LeakSanitizer's, in its builds. */
 __attribute__((weak)) int __lsan_do_recoverable_leak_check(void);
 
-/* --- child ------------------------------------------------------------------------------------------------------------- */
-
 static pthread_mutex_t report_mutex = PTHREAD_MUTEX_INITIALIZER;
 
 static void report_line(struct lc *c, char kind, const char *format, va_list args)
@@ -70,8 +68,6 @@ _Noreturn static void child_main(struct lc *c, void (*fn)(struct lc *c, const vo
         _exit(1);
     _exit(0); /* no atexit handlers: they are the library's business, and it is never unloaded */
 }
-
-/* --- parent ------------------------------------------------------------------------------------------------------------ */
 
 __attribute__((format(printf, 3, 4))) static void keep(struct lc_report *r, char kind, const char *format, ...)
 {

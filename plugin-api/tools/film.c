@@ -15,8 +15,6 @@ const uint32_t lc_plane_channels[LULL_PLANE_COUNT] = {3, 1, 1, 1, 3, 3, 3, 1};
 const char *const lc_plane_names[LULL_PLANE_COUNT] = {"COLOR", "WEIGHT", "SPP",    "MOMENT2",
                                                       "HALF",  "ALBEDO", "NORMAL", "DEPTH"};
 
-/* --- film ------------------------------------------------------------------------------------------------------------ */
-
 int lc_film_init(struct lc_film *f, int32_t width, int32_t height, int32_t block_w, int32_t block_h, uint32_t seed)
 {
     int32_t columns = (width + block_w - 1) / block_w, rows = (height + block_h - 1) / block_h;
@@ -150,8 +148,6 @@ void lc_film_frame(const struct lc_film *f, struct lull_frame *frame, uint32_t p
         .rgb_to_xyz = BASE_RGB_TO_XYZ,
     };
 }
-
-/* --- image ----------------------------------------------------------------------------------------------------------- */
 
 static size_t type_size(int32_t type) { return type == LULL_TYPE_F64 ? 8 : type == LULL_TYPE_F16 ? 2 : 4; }
 

@@ -31,8 +31,6 @@ static const struct lc_check {
 } checks[] = {LC_CHECKS(ROW)};
 enum { CHECKS = sizeof checks / sizeof *checks };
 
-/* --- command line ----------------------------------------------------------------------------------------------------- */
-
 static int add_only(void *into, const char *name, struct base_err *err)
 {
     struct arguments *a = into;
@@ -85,8 +83,6 @@ static const struct base_options options = {
         "\vCRITERION is NAME (looked for in LULL_PLUGIN_PATH and in lib/lull beside this program), PATH (every criterion of "
         "the library) or PATH:ID. Each check runs in a process of its own; the output is TAP.\n\n"
         "Exit status: 0 all checks passed, 1 one failed, 2 wrong usage or no such criterion."};
-
-/* --- finding ---------------------------------------------------------------------------------------------------------- */
 
 /* In a child: reports the path and then the ids to check as notes; refuses what is no criterion. */
 static void find(struct lc *c, const void *arg)
@@ -171,8 +167,6 @@ static int prepare(struct lc *c)
     c->planes = c->required_only ? c->req.planes_required : c->req.planes_used;
     return LC_EXPECT(c, status == LULL_OK, "requirements failed (%d): %s", status, err.message) ? 0 : -1;
 }
-
-/* --- running ---------------------------------------------------------------------------------------------------------- */
 
 struct task {
     const char *id;

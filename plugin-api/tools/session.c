@@ -49,8 +49,6 @@ int32_t lc_begin(struct lc *c, struct lull_instance *instance, const struct lull
     return status;
 }
 
-/* --- decisions ------------------------------------------------------------------------------------------------------- */
-
 void lc_decision_preset(struct lull_decision *d)
 {
     *d = (struct lull_decision){
@@ -107,8 +105,6 @@ int lc_log_compare(struct lc *c, const struct lc_log *expected, const struct lc_
     int same = expected->count == got->count;
     return LC_EXPECT(c, same, "%s: %zu answers, %zu before", what, got->count, expected->count) ? 0 : -1;
 }
-
-/* --- asking ------------------------------------------------------------------------------------------------------------ */
 
 enum { GARBAGE = 0xa5 };
 
@@ -250,8 +246,6 @@ int lc_session_judge(struct lc_session *s, struct lc_image *image, struct lull_d
         lc_decision_check(s->check, &s->film.blocks[i], &decisions[i]);
     return 1;
 }
-
-/* --- sessions ---------------------------------------------------------------------------------------------------------- */
 
 /* A frame struct with a tail, and rectangles with gaps, as the manner asks for. */
 static int begin(struct lc_session *s, uint32_t flags)

@@ -6,8 +6,6 @@
 #include "plugin/translate.h"
 #include "sequence/simulate.h"
 
-/* --- memory ------------------------------------------------------------------------------------------------------------ */
-
 int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form, struct base_err *err)
 {
     const size_t pixels = (size_t)form->width * (size_t)form->height;
@@ -55,8 +53,6 @@ void gd_block_view_release(struct gd_block_view *seen)
     free(seen->memory);
     *seen = (struct gd_block_view){0};
 }
-
-/* --- what a display shows ---------------------------------------------------------------------------------------------- */
 
 /* Luminance of the light that it sends for a picture [P][3]; lightness: L* of it, or NULL. */
 static void show(struct gd_block_view *seen, const struct lull_kit *kit, const float *picture, float *light,
@@ -133,8 +129,6 @@ static void show_apart(struct gd_block_view *seen, const struct lull_kit *kit, d
     for (size_t i = 0; i < pixels; i++)
         seen->apart[i] = seen->apart_lightness[0][i] - seen->apart_lightness[1][i];
 }
-
-/* --- judging ----------------------------------------------------------------------------------------------------------- */
 
 struct ggn_kept_errors gd_block_view_errors(struct gd_block_view *seen, const struct gd_look *look,
                                             const struct lull_kit *kit, const struct lull_block *b, int blend,

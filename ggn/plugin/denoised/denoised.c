@@ -78,8 +78,6 @@ struct lull_instance {
     struct frame frame;
 };
 
-/* --- one block --------------------------------------------------------------------------------------------------------- */
-
 /* The larger of both errors, NaN where there is none; *now gets both. */
 static double error_of(struct lull_instance *in, struct gd_block_view *seen, const struct lull_block *b,
                        struct lull_kit_tally *tally, struct past *now)
@@ -174,8 +172,6 @@ static void log_response(const struct lull_instance *in, const struct lull_block
              b->id, (unsigned long long)b->spp, now->halves, now->crossed, in->viewer.stop_error);
     gp_log(&in->kit, LULL_LOG_DEBUG, line);
 }
-
-/* --- a question -------------------------------------------------------------------------------------------------------- */
 
 static const struct lull_block *block_at(const struct lull_kit_batch *batch, uint32_t i)
 {
@@ -280,8 +276,6 @@ static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, 
     }
     return status;
 }
-
-/* --- instance ---------------------------------------------------------------------------------------------------------- */
 
 static void frame_release(struct frame *f)
 {
@@ -422,8 +416,6 @@ static int32_t create(const struct lull_host *host, const struct lull_pair *pair
     *instance = in;
     return LULL_OK;
 }
-
-/* --- state ------------------------------------------------------------------------------------------------------------- */
 
 struct state_header {
     char magic[8];

@@ -6,8 +6,6 @@
 /* Pixels of a rectangle that more than one block share, at most: the denoiser takes 600 bytes a pixel while it works. */
 static const int64_t MOST_SHARED = 1 << 20;
 
-/* --- form -------------------------------------------------------------------------------------------------------------- */
-
 /* A side of a block with what is around it wherever it lies, as far as the area and its margin reach. */
 static int64_t widened(int32_t side, int32_t area)
 {
@@ -49,8 +47,6 @@ int gd_look_open(struct gd_look *look, const struct gd_form *form, const char *l
 
 void gd_look_close(struct gd_look *look) { lull_denoised_close(&look->pair); }
 
-/* --- what is there ----------------------------------------------------------------------------------------------------- */
-
 /* Whether the halves of a pixel are numbers; if so, whether they differ. */
 static int is_good(const double mean[3], const double half[3], int *differ)
 {
@@ -84,8 +80,6 @@ enum gd_halves gd_halves_of(const struct lull_view *view, const struct lull_bloc
     *tally = count;
     return structured ? GD_HALVES_STRUCTURED : GD_HALVES_PLAIN;
 }
-
-/* --- reading ----------------------------------------------------------------------------------------------------------- */
 
 static struct lull_denoised_rect in_box(const struct gd_look *look, struct lull_rect r)
 {
@@ -156,8 +150,6 @@ void gd_look_put(struct gd_look *look, const struct lull_view *view, const struc
 {
     read_part(look, gp_rect_of(block), view, block, tally);
 }
-
-/* --- denoising --------------------------------------------------------------------------------------------------------- */
 
 static int cancelled(void *data)
 {

@@ -47,8 +47,6 @@ static const char *const how_to_get_it = "lull-denoiser-setup fetches it, script
                                          "pip install pyoidn into a Python; or install Open Image Denoise 2 and name its "
                                          "library by LULL_OIDN=FILE";
 
-/* --- finding ----------------------------------------------------------------------------------------------------------- */
-
 static const char *const file_name = "libOpenImageDenoise.so.2";
 
 /* path: the library or a folder that holds it, itself or in lib/. */
@@ -121,8 +119,6 @@ static void *find(const char *path, struct base_err *err)
     return library;
 }
 
-/* --- device ------------------------------------------------------------------------------------------------------------ */
-
 static int take_symbols(struct library *o, struct base_err *err)
 {
     const struct {
@@ -186,8 +182,6 @@ static int make_device(struct library *o, struct shared *s, struct base_err *err
     return base_fail(err, BASE_EINVAL, "Open Image Denoise is of version %d.%d.%d: version 2 is needed", major,
                      o->get_device_int(o->device, "versionMinor"), o->get_device_int(o->device, "versionPatch"));
 }
-
-/* --- filter ------------------------------------------------------------------------------------------------------------ */
 
 static void give(const struct library *o, filter_t filter, const char *name, struct shared *s, int which)
 {
@@ -283,8 +277,6 @@ static int denoise(struct library *o, const char *path, struct shared *s, struct
     int rc = o->device ? 0 : make_device(o, s, err);
     return rc || s->form.width == 0 ? rc : run_all(o, s, err);
 }
-
-/* --- serving ----------------------------------------------------------------------------------------------------------- */
 
 /* Whoever asks has gone, perhaps in the middle of a run. Not by PR_SET_PDEATHSIG: the thread that started this program may
  * end long before its process. */
