@@ -28,20 +28,39 @@ struct lc {
     uint32_t planes;              /* mask of those that frames supply */
     uint32_t workers;             /* threads for concurrent checks, at least 2 */
     uint64_t seed, misuse;        /* of the random calls outside the rules, and how many */
-    int report_fd;
-    char *doing; /* what lc_doing said last; the parent reads it too */
-    int failed;
+    struct lc_report *report;
     int concurrent; /* the check itself runs threads: their number says nothing */
 };
 
-/* One line each to the report; a check with a failure is "not ok". Thread safe. */
-__attribute__((format(printf, 2, 3))) void lc_fail(struct lc *c, const char *format, ...);
-__attribute__((format(printf, 2, 3))) void lc_note(struct lc *c, const char *format, ...);
-__attribute__((format(printf, 2, 3))) void lc_skip(struct lc *c, const char *format, ...);
-__attribute__((format(printf, 2, 3))) void lc_refuse(struct lc *c, const char *format, ...); /* wrong usage */
+enum { LC_LINES_MAX = 24, LC_LINE_SIZE = 800 };
+
+/* What a child process says, in memory that its parent sees too. */
+struct lc_report {
+    int failures, skipped;
+    int refused;             /* what the command line asks for cannot be done */
+    int completed;           /* the function returned */
+    char kind[LC_LINES_MAX]; /* of each line */
+    unsigned line_count;     /* kept, first come first served */
+    unsigned lines_left_out;
+    char lines[LC_LINES_MAX][LC_LINE_SIZE];
+    char doing[LC_LINE_SIZE]; /* what lc_doing said last */
+};
+
+/* One line to the report; a check with a failure is "not ok". Thread safe. */
+__attribute__((format(printf, 3, 4))) void lc_say(struct lc *c, char kind, const char *format, ...);
+#define lc_fail(c, ...) lc_say((c), 'F', __VA_ARGS__)
+#define lc_note(c, ...) lc_say((c), 'N', __VA_ARGS__)
+#define lc_skip(c, ...) lc_say((c), 'S', __VA_ARGS__)
+#define lc_refuse(c, ...) lc_say((c), 'R', __VA_ARGS__) /* wrong usage */
 
 /* What comes now, for the report if the process does not survive it. Not thread safe. */
 __attribute__((format(printf, 2, 3))) void lc_doing(struct lc *c, const char *format, ...);
+
+/* Forks; the child calls fn(c, arg), the parent waits, at most limit_s, and fills *report. What the child prints, or a signal
+ * that ends it, is a failure; what lc_doing said last is then noted. Returns 0, or -1 if no process could be made. Not thread
+ * safe. */
+int lc_child_run(struct lc *c, void (*fn)(struct lc *c, const void *arg), const void *arg, unsigned limit_s,
+                 struct lc_report *report);
 
 #define LC_EXPECT(c, condition, ...) ((condition) ? 1 : (lc_fail((c), __VA_ARGS__), 0))
 

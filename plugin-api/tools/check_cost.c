@@ -26,10 +26,10 @@ static void repeat(struct lc *c, void (*once)(struct lc *), int times, const cha
 {
     enum { PARTS = 3 };
     long count[PARTS] = {0}, bytes[PARTS] = {0}, files[PARTS] = {0};
-    if (c->failed)
+    if (c->report->failures)
         return;
     for (int part = 0; part < PARTS; part++) {
-        for (int i = 0; i < times && !c->failed; i++)
+        for (int i = 0; i < times && !c->report->failures; i++)
             once(c);
         files[part] = descriptors();
         lc_alloc_live(&count[part], &bytes[part]);
@@ -90,7 +90,7 @@ void lc_check_out_of_memory(struct lc *c)
     lc_film_frame(&film, &frame, c->planes);
     long k = 0;
     int done = 0;
-    for (; k < MOST && !done && !c->failed; k++) {
+    for (; k < MOST && !done && !c->report->failures; k++) {
         struct lull_instance *instance = NULL;
         struct lull_error err = {.struct_size = sizeof err};
         lc_alloc_fail_after(k);

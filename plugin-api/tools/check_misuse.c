@@ -49,7 +49,7 @@ static void call_lookup(struct lc_misuse *m)
 static void disturb(struct lc_misuse *m)
 {
     const uint64_t most = m->check->misuse, end = m->calls + lc_draw(m, 40);
-    while (m->calls < end && m->calls < most && !m->check->failed) {
+    while (m->calls < end && m->calls < most && !m->check->report->failures) {
         const uint32_t which = lc_draw(m, 20);
         if (which < 3)
             lc_misuse_create(m);
@@ -106,11 +106,11 @@ static void live(struct lc_misuse *m, const struct lc_log *expected)
         lc_film_frame(&m->s.film, &frame, m->s.planes);
         m->open = m->s.open = LC_EXPECT(c, lc_begin(c, m->s.instance, &frame, NULL) == LULL_OK,
                                         "after %llu refused calls no frame can be begun", (unsigned long long)m->refused);
-        for (int step = 0; step < LC_STEPS && !c->failed; step++) {
+        for (int step = 0; step < LC_STEPS && !c->report->failures; step++) {
             disturb_session(m);
             lc_session_step(&m->s);
         }
-        if (!c->failed)
+        if (!c->report->failures)
             lc_log_compare(c, expected, &m->s.log, lc_deterministic(c), "after refused calls");
         end_frame(m);
         disturb_session(m);
@@ -125,7 +125,7 @@ void lc_check_misuse(struct lc *c)
     struct lc_misuse m = {.check = c, .random = c->seed, .state = c->criterion->get_extension(LULL_EXT_STATE)};
     struct lc_log expected;
     if (lc_slots_init(&m.slots, c) == 0 && lc_run(c, NULL, &expected) == 0) {
-        while (m.calls < c->misuse && !c->failed)
+        while (m.calls < c->misuse && !c->report->failures)
             live(&m, &expected);
     }
     lc_note(c, "%llu calls, %llu of them had to be refused", (unsigned long long)m.calls, (unsigned long long)m.refused);

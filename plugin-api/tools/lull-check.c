@@ -2,8 +2,9 @@
  *
  * lull-check: holds a stopping criterion against the whole contract of lull/criterion.h.
  */
-#include "child.h"
+#include "check.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -195,7 +196,7 @@ static void print_report(const struct arguments *a, struct totals *t, const char
         printf("not ok %d - %s: %s\n", t->checks, name, title);
     else if (!a->quiet)
         printf("ok %d - %s: %s", t->checks, name, title);
-    for (int i = 0; i < r->line_count; i++) {
+    for (unsigned i = 0; i < r->line_count; i++) {
         if (r->failures > 0)
             printf("#   %s\n", r->lines[i]);
         else if (!a->quiet && r->kind[i] == 'S')
@@ -206,7 +207,7 @@ static void print_report(const struct arguments *a, struct totals *t, const char
     if (r->failures == 0 && !a->quiet)
         putchar('\n');
     if (r->lines_left_out > 0)
-        printf("#   and %d more\n", r->lines_left_out);
+        printf("#   and %u more\n", r->lines_left_out);
     fflush(stdout);
 }
 
@@ -282,7 +283,7 @@ static int check_spec(const struct arguments *a, const char *spec, struct totals
         print_report(a, t, "find", "the library can be loaded and its tables read", r);
     } else {
         c.path = r->lines[0];
-        for (int i = 1; i < r->line_count && status == LC_EXIT_OK; i++)
+        for (unsigned i = 1; i < r->line_count && status == LC_EXIT_OK; i++)
             status = check_criterion(a, &c, r->lines[i], t);
     }
     free(r);
