@@ -53,6 +53,9 @@ __attribute__((format(printf, 3, 4))) void lc_say(struct lc *c, char kind, const
 #define lc_skip(c, ...) lc_say((c), 'S', __VA_ARGS__)
 #define lc_refuse(c, ...) lc_say((c), 'R', __VA_ARGS__) /* wrong usage */
 
+/* Memory of the check's own, as malloc returned it. Where there is none, the check has failed and its process ends. */
+void *lc_need(struct lc *c, void *memory);
+
 /* What comes now, for the report if the process does not survive it. Not thread safe. */
 __attribute__((format(printf, 2, 3))) void lc_doing(struct lc *c, const char *format, ...);
 
@@ -155,13 +158,14 @@ struct lc_film {
 extern const uint32_t lc_plane_channels[LULL_PLANE_COUNT];
 extern const char *const lc_plane_names[LULL_PLANE_COUNT];
 
-/* Blocks of block_w x block_h, smaller at the right and bottom edge, LC_BLOCKS_MAX at most. 0 or -1 (out of memory). */
-int lc_film_init(struct lc_film *f, int32_t width, int32_t height, int32_t block_w, int32_t block_h, uint32_t seed);
+/* Blocks of block_w x block_h, smaller at the right and bottom edge, LC_BLOCKS_MAX at most. */
+void lc_film_init(struct lc_film *f, struct lc *c, int32_t width, int32_t height, int32_t block_w, int32_t block_h,
+                  uint32_t seed);
 void lc_film_release(struct lc_film *f);
 /* The frame that suits the criterion: two by one blocks and the rest at the edges, one of them 1x1. The blocks are of the
  * size it was made for if that is the only one it takes or if nominal is set, else small, which saves time. */
 enum { LC_FILM_BLOCKS = 6 };
-int lc_film_init_for(struct lc_film *f, const struct lull_requirements *req, uint32_t seed, int nominal);
+void lc_film_init_for(struct lc_film *f, struct lc *c, uint32_t seed, int nominal);
 /* Adds samples until the block has spp; nothing if it has. */
 void lc_film_advance(struct lc_film *f, uint32_t id, uint64_t spp);
 void lc_film_frame(const struct lc_film *f, struct lull_frame *frame, uint32_t planes);
@@ -187,8 +191,9 @@ struct lc_image {
     size_t guarded[LULL_PLANE_COUNT]; /* bytes if from lc_guard_alloc, else 0 */
 };
 
-/* Stores the film's planes of the mask. 0 or -1. Overwrites *image, which needs lc_image_release afterwards. */
-int lc_image_build(struct lc_image *image, const struct lc_film *f, const struct lc_layout *layout, uint32_t planes);
+/* Stores the film's planes of the mask. Overwrites *image, which needs lc_image_release afterwards. */
+void lc_image_build(struct lc_image *image, struct lc *c, const struct lc_film *f, const struct lc_layout *layout,
+                    uint32_t planes);
 void lc_image_release(struct lc_image *image);
 struct lull_plane *lc_image_plane(struct lc_image *image, unsigned plane);
 /* Overwrites what is stored at a pixel of a float image with default layout, if the image has the plane: in one plane, or
@@ -198,27 +203,17 @@ void lc_image_poke(struct lc_image *image, int32_t x, int32_t y, float value);
 
 /* --- guarded memory ---------------------------------------------------------------------------------------------------- */
 
-/* Memory that ends right before a page that cannot be touched; size bytes, zeroed. NULL if there is none. */
-void *lc_guard_alloc(size_t size);
+/* Memory that ends right before a page that cannot be touched; size bytes, zeroed. */
+void *lc_guard_alloc(struct lc *c, size_t size);
 void lc_guard_free(void *memory, size_t size);
 
-/* Such memory for what calls are given: each thing takes the next of these pieces, and after the last one the first. No call
- * of the random ones, and no life with short structs, is given as many things. */
-enum { LC_SLOTS = 10, LC_SLOT_SIZE = 8192 };
-struct lc_slots {
-    void *at[LC_SLOTS]; /* owns */
-    unsigned next;
-};
-
-/* Not 0 without memory (which is reported); to be released all the same. */
-int lc_slots_init(struct lc_slots *s, struct lc *c);
-void lc_slots_release(struct lc_slots *s);
-/* A copy of so many bytes (NULL: garbage), eight at least. */
-void *lc_place(struct lc_slots *s, const void *from, size_t size);
+/* Such memory for what calls are given, until the process ends: a copy of so many bytes (NULL: garbage), eight at least.
+ * There are ten pieces in turn; no call of the random ones, and no life with short structs, is given as many things. */
+void *lc_place(struct lc *c, const void *from, size_t size);
 /* The same of a struct, which says that it has so many bytes. */
-void *lc_place_struct(struct lc_slots *s, const void *from, size_t size);
+void *lc_place_struct(struct lc *c, const void *from, size_t size);
 /* Elements of `size` bytes, `stride` apart; with a stride that is too short, room without elements. */
-void *lc_place_array(struct lc_slots *s, const void *from, size_t size, uint32_t count, uint32_t stride);
+void *lc_place_array(struct lc *c, const void *from, size_t size, uint32_t count, uint32_t stride);
 
 /* --- sessions -------------------------------------------------------------------------------------------------------- */
 
@@ -274,13 +269,13 @@ uint32_t lc_session_advance(struct lc_session *s, uint32_t *ids);
 /* Adds samples, asks about the blocks that have not stopped, logs the answers. Not 0 if that failed (which is reported). */
 int lc_session_step(struct lc_session *s);
 int lc_session_steps(struct lc_session *s, int steps);
-/* Only the asking: status of the call, answers into decisions[film.block_count] by id; reports nothing but broken rules. */
-int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const uint32_t *ids, uint32_t count,
+/* Only the asking, by an image that is released then (NULL: that of the film): status of the call, answers into
+ * decisions[film.block_count] by id; reports nothing but broken rules. */
+int32_t lc_session_ask(struct lc_session *s, struct lc_image *image, const uint32_t *ids, uint32_t count,
                        struct lull_decision *decisions, struct lull_error *err);
-int lc_session_image(struct lc_session *s, struct lc_image *image);
-/* The asking about all blocks as they are, LC_FILM_BLOCKS at most, by an image that is released then (NULL: that of the
- * film); answers into decisions by id. Returns whether there were any, each held against the header's rules; else "evaluate
- * WHAT: …" is reported. */
+void lc_session_image(struct lc_session *s, struct lc_image *image);
+/* The same about all blocks as they are, LC_FILM_BLOCKS at most. Returns whether there were answers, each held against the
+ * header's rules; else "evaluate WHAT: …" is reported. */
 int lc_session_judge(struct lc_session *s, struct lc_image *image, struct lull_decision decisions[LC_FILM_BLOCKS],
                      const char *what);
 void lc_session_close(struct lc_session *s);

@@ -82,9 +82,9 @@ void lc_check_window(struct lc *c)
         lc_film_advance(&s.film, i, s.spp);
     }
     int32_t status = lc_begin(c, s.instance, &frame, &err);
-    struct lc_image image;
-    if (LC_EXPECT(c, status == LULL_OK, "begin_frame of a crop: %d, %s", status, err.message) &&
-        lc_session_image(&s, &image) == 0) {
+    if (LC_EXPECT(c, status == LULL_OK, "begin_frame of a crop: %d, %s", status, err.message)) {
+        struct lc_image image;
+        lc_session_image(&s, &image);
         image.view.x0 += DX, image.view.x1 += DX, image.view.y0 += DY, image.view.y1 += DY;
         struct lull_decision d[LC_FILM_BLOCKS];
         for (uint32_t i = 0; i < s.film.block_count; i++) {
@@ -109,22 +109,19 @@ static int32_t ask_spoilt(struct lc *c, unsigned plane, enum spoil spoil)
     struct lull_decision decision[LC_FILM_BLOCKS];
     uint32_t id = 0;
     struct lull_error err = {.struct_size = sizeof err};
-    int32_t status = 1;
-    if (lc_session_image(&s, &image) == 0) {
-        struct lull_plane *p = lc_image_plane(&image, plane);
-        switch (spoil) {
-        case SPOIL_ABSENT: p->data = NULL; break;
-        case SPOIL_CUT: image.view.plane_count = plane; break;
-        case SPOIL_TYPE: p->type = 99; break;
-        case SPOIL_NORMALISER: p->normaliser = -1; break;
-        case SPOIL_CHANNELS: p->channels = lc_plane_channels[plane] - 1; break;
-        default: p->normaliser = LULL_NORM_WEIGHT; lc_image_plane(&image, LULL_PLANE_WEIGHT)->data = NULL;
-        }
-        status = lc_session_ask(&s, &image, &id, 1, decision, &err);
-        lc_image_release(&image);
-        if (status != LULL_OK && lc_session_steps(&s, 2) != 0)
-            lc_note(c, "that was after a refused evaluate");
+    lc_session_image(&s, &image);
+    struct lull_plane *p = lc_image_plane(&image, plane);
+    switch (spoil) {
+    case SPOIL_ABSENT: p->data = NULL; break;
+    case SPOIL_CUT: image.view.plane_count = plane; break;
+    case SPOIL_TYPE: p->type = 99; break;
+    case SPOIL_NORMALISER: p->normaliser = -1; break;
+    case SPOIL_CHANNELS: p->channels = lc_plane_channels[plane] - 1; break;
+    default: p->normaliser = LULL_NORM_WEIGHT; lc_image_plane(&image, LULL_PLANE_WEIGHT)->data = NULL;
     }
+    int32_t status = lc_session_ask(&s, &image, &id, 1, decision, &err);
+    if (status != LULL_OK && lc_session_steps(&s, 2) != 0)
+        lc_note(c, "that was after a refused evaluate");
     lc_session_close(&s);
     return status;
 }
@@ -133,8 +130,9 @@ void lc_check_missing(struct lc *c)
 {
     struct lull_instance *instance = lc_create(c, NULL);
     struct lc_film film;
-    if (!instance || lc_film_init_for(&film, &c->req, 1, 0) != 0)
+    if (!instance)
         return;
+    lc_film_init_for(&film, c, 1, 0);
     for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
         if (!(c->req.planes_required & LULL_PLANE_BIT(p)))
             continue;
@@ -188,8 +186,7 @@ static uint32_t steps_with_value(struct lc *c, float value, int every)
         struct lc_image image;
         for (uint32_t i = 0; i < s.film.block_count; i++)
             lc_film_advance(&s.film, i, s.spp);
-        if (lc_session_image(&s, &image) != 0)
-            break;
+        lc_session_image(&s, &image);
         for (int32_t i = 0; i < s.film.width * s.film.height; i += every)
             lc_image_poke(&image, i % s.film.width, i / s.film.width, value);
         if (!lc_session_judge(&s, &image, d, what))
@@ -218,8 +215,7 @@ void lc_check_flat(struct lc *c)
     static const struct lc_paint paints[] = {{0, 0, 0}, {0.5, 0.5, 0}, {0, 1, 1}}; /* black, constant, half black */
     for (size_t i = 0; i < COUNT(paints); i++) {
         struct lc_film film;
-        if (lc_film_init_for(&film, &c->req, 1, 0) != 0)
-            return;
+        lc_film_init_for(&film, c, 1, 0);
         film.paint = &paints[i];
         lc_run_film(c, &film);
     }
@@ -249,8 +245,8 @@ static int grey_stops_at(struct lc *c, int fireflies)
     int step = 0, action = LULL_CONTINUE, sized = c->req.block_width > 0 && c->req.block_height > 0;
     const int32_t w = sized ? (int32_t)c->req.block_width : BLOCK_SIDE;
     const int32_t h = sized ? (int32_t)c->req.block_height : BLOCK_SIDE;
-    if (!LC_EXPECT(c, lc_film_init(&film, w, h, w, h, 1) == 0, "out of memory") ||
-        lc_session_open_film(&s, c, NULL, &film) != 0)
+    lc_film_init(&film, c, w, h, w, h, 1);
+    if (lc_session_open_film(&s, c, NULL, &film) != 0)
         return 0;
     s.film.paint = &grey;
     for (; step < LC_STEPS && action == LULL_CONTINUE; step += action == LULL_CONTINUE, s.spp *= 2) {
@@ -258,8 +254,7 @@ static int grey_stops_at(struct lc *c, int fireflies)
         struct lull_decision d[LC_FILM_BLOCKS];
         const struct lull_block *b = &s.film.blocks[0];
         lc_film_advance(&s.film, b->id, s.spp);
-        if (lc_session_image(&s, &image) != 0)
-            break;
+        lc_session_image(&s, &image);
         if (fireflies) {
             light_pixel(&image, b, (b->x1 - b->x0) / 4, 1);
             light_pixel(&image, b, (b->x1 - b->x0) / 2, 0);

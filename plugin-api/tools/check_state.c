@@ -77,9 +77,7 @@ static void damage(struct lc *c, const struct lull_state *state, struct lc_sessi
             break;
     }
     for (uint64_t at = 0; at < whole->size; at += stride) {
-        struct lc_buffer bad = {.data = malloc((size_t)whole->size), .size = whole->size};
-        if (!bad.data)
-            return;
+        struct lc_buffer bad = {.data = lc_need(c, malloc((size_t)whole->size)), .size = whole->size};
         memcpy(bad.data, whole->data, (size_t)whole->size);
         bad.data[at] = (char)~bad.data[at];
         load(state, s, &bad, NULL);

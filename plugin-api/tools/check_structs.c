@@ -21,7 +21,6 @@ struct short_calls {
 struct life {
     struct lc *check;
     const struct short_structs *cut;
-    struct lc_slots slots;
     struct lull_instance *instance;
     struct lull_error *err;
     struct short_calls calls;
@@ -32,15 +31,14 @@ static void short_evaluate(struct life *l, const struct lc_film *film, uint32_t 
     const struct lc_layout layout = {0};
     struct lull_decision presets[LC_FILM_BLOCKS];
     struct lc_image image;
-    if (lc_image_build(&image, film, &layout, planes) != 0)
-        return;
+    lc_image_build(&image, l->check, film, &layout, planes);
     for (int i = 0; i < LC_FILM_BLOCKS; i++)
         lc_decision_preset(&presets[i]);
     struct lull_view v = image.view;
-    v.planes = lc_place(&l->slots, v.planes, sizeof *v.planes * LULL_PLANE_COUNT);
-    v.all = lc_place(&l->slots, film->blocks, sizeof *v.all * LC_FILM_BLOCKS);
-    struct lull_decision *d = lc_place(&l->slots, presets, sizeof presets);
-    const struct lull_view *view = lc_place_struct(&l->slots, &v, sizeof v - l->cut->view);
+    v.planes = lc_place(l->check, v.planes, sizeof *v.planes * LULL_PLANE_COUNT);
+    v.all = lc_place(l->check, film->blocks, sizeof *v.all * LC_FILM_BLOCKS);
+    struct lull_decision *d = lc_place(l->check, presets, sizeof presets);
+    const struct lull_view *view = lc_place_struct(l->check, &v, sizeof v - l->cut->view);
     l->calls.evaluate =
         l->check->criterion->evaluate(l->instance, view, v.all, sizeof *v.all, d, sizeof *d, LC_FILM_BLOCKS, l->err);
     for (int i = 0; i < LC_FILM_BLOCKS && l->calls.evaluate == LULL_OK; i++)
@@ -53,13 +51,12 @@ static void short_frame(struct life *l)
     struct lc *c = l->check;
     struct lc_film film;
     struct lull_frame frame;
-    if (lc_film_init_for(&film, &c->req, 1, 0) != 0)
-        return;
+    lc_film_init_for(&film, c, 1, 0);
     for (uint32_t i = 0; i < film.block_count; i++)
         lc_film_advance(&film, i, c->req.first_spp + c->req.first_spp % 2 + 2);
     lc_film_frame(&film, &frame, c->planes);
-    frame.blocks = lc_place(&l->slots, film.rects, sizeof *film.rects * film.block_count);
-    const struct lull_frame *at = lc_place_struct(&l->slots, &frame, sizeof frame - l->cut->frame);
+    frame.blocks = lc_place(c, film.rects, sizeof *film.rects * film.block_count);
+    const struct lull_frame *at = lc_place_struct(c, &frame, sizeof frame - l->cut->frame);
     l->calls.begin_frame = c->criterion->begin_frame(l->instance, at, l->err);
     if (l->calls.begin_frame == LULL_OK) {
         short_evaluate(l, &film, frame.planes);
@@ -75,19 +72,16 @@ static struct short_calls short_life(struct lc *c, const struct short_structs *c
     struct lull_requirements req = {0};
     struct lc_host host;
     lc_host_init(&host, c, 1);
-    if (lc_slots_init(&l.slots, c) == 0) {
-        const struct lull_host *h = lc_place_struct(&l.slots, &host.host, sizeof host.host - cut->host);
-        l.err = lc_place_struct(&l.slots, &blank, sizeof blank - cut->error);
-        l.calls.create = c->criterion->create(h, c->pairs, c->pair_count, sizeof *c->pairs, &l.instance, l.err);
-    }
+    const struct lull_host *h = lc_place_struct(c, &host.host, sizeof host.host - cut->host);
+    l.err = lc_place_struct(c, &blank, sizeof blank - cut->error);
+    l.calls.create = c->criterion->create(h, c->pairs, c->pair_count, sizeof *c->pairs, &l.instance, l.err);
     if (l.calls.create == LULL_OK) {
-        struct lull_requirements *r = lc_place_struct(&l.slots, &req, sizeof req - cut->requirements);
+        struct lull_requirements *r = lc_place_struct(c, &req, sizeof req - cut->requirements);
         l.calls.requirements = c->criterion->requirements(l.instance, r, l.err);
         memcpy(&l.calls.got, r, sizeof req - cut->requirements);
         short_frame(&l);
         c->criterion->destroy(l.instance);
     }
-    lc_slots_release(&l.slots);
     return l.calls;
 }
 

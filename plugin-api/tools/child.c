@@ -42,6 +42,21 @@ void lc_say(struct lc *c, char kind, const char *format, ...)
     pthread_mutex_unlock(&mutex);
 }
 
+/* Of the pipe that the child holds open while it lives; a byte in it means a good end. */
+static int ends[2];
+
+/* The end of a check. No atexit handlers: they are the library's business, and it is never unloaded. */
+_Noreturn static void end(void) { _exit(write(ends[1], "", 1) != 1); }
+
+void *lc_need(struct lc *c, void *memory)
+{
+    if (!memory) {
+        lc_fail(c, "out of memory");
+        end();
+    }
+    return memory;
+}
+
 void lc_doing(struct lc *c, const char *format, ...)
 {
     va_list args;
@@ -50,20 +65,20 @@ void lc_doing(struct lc *c, const char *format, ...)
     va_end(args);
 }
 
-/* Waits until the child has closed the pipe, into which it writes a byte before a good end; 0: it did not in time. */
-static int wait_for_end(int fd, unsigned limit_s, struct lc_report *report)
+/* Waits until the child's pipe is closed; 0: it was not in time. */
+static int wait_for_end(unsigned limit_s, struct lc_report *report)
 {
     const double end_s = base_clock_wall_s() + limit_s;
     for (;;) {
         const double left_s = end_s - base_clock_wall_s();
-        struct pollfd p = {.fd = fd, .events = POLLIN};
+        struct pollfd p = {.fd = ends[0], .events = POLLIN};
         char byte;
         int ready = left_s > 0 ? poll(&p, 1, (int)(1e3 * left_s)) : 0;
         if (ready < 0 && errno == EINTR)
             continue;
         if (ready <= 0)
             return 0;
-        if (read(fd, &byte, 1) <= 0)
+        if (read(ends[0], &byte, 1) <= 0)
             return 1;
         report->completed = 1;
     }
@@ -86,10 +101,10 @@ static void keep_output(struct lc *c, FILE *output)
 }
 
 /* Waits for the child and says how it ended, what it was at if that was no good end, and what it printed. */
-static void gather(struct lc *c, pid_t pid, int fd, unsigned limit_s, FILE *output)
+static void gather(struct lc *c, pid_t pid, unsigned limit_s, FILE *output)
 {
     struct lc_report *r = c->report;
-    int status = 0, in_time = wait_for_end(fd, limit_s, r);
+    int status = 0, in_time = wait_for_end(limit_s, r);
     if (!in_time)
         kill(pid, SIGKILL);
     waitpid(pid, &status, 0);
@@ -112,7 +127,6 @@ static void gather(struct lc *c, pid_t pid, int fd, unsigned limit_s, FILE *outp
 int lc_child_run(struct lc *c, void (*fn)(struct lc *c, const void *arg), const void *arg, unsigned limit_s,
                  struct lc_report *report)
 {
-    int ends[2];
     FILE *output = tmpfile();
     c->report = mmap(NULL, sizeof *report, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (!output || c->report == MAP_FAILED || pipe(ends) != 0) {
@@ -134,12 +148,11 @@ int lc_child_run(struct lc *c, void (*fn)(struct lc *c, const void *arg), const 
         fn(c, arg);
         if (__lsan_do_recoverable_leak_check && __lsan_do_recoverable_leak_check() != 0)
             lc_fail(c, "LeakSanitizer found leaks");
-        _exit(write(ends[1], "", 1) !=
-              1); /* no atexit handlers: they are the library's business, and it is never unloaded */
+        end();
     }
     close(ends[1]);
     if (pid > 0)
-        gather(c, pid, ends[0], limit_s, output);
+        gather(c, pid, limit_s, output);
     close(ends[0]);
     fclose(output);
     *report = *c->report;

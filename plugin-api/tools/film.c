@@ -15,17 +15,13 @@ const uint32_t lc_plane_channels[LULL_PLANE_COUNT] = {3, 1, 1, 1, 3, 3, 3, 1};
 const char *const lc_plane_names[LULL_PLANE_COUNT] = {"COLOR", "WEIGHT", "SPP",    "MOMENT2",
                                                       "HALF",  "ALBEDO", "NORMAL", "DEPTH"};
 
-int lc_film_init(struct lc_film *f, int32_t width, int32_t height, int32_t block_w, int32_t block_h, uint32_t seed)
+void lc_film_init(struct lc_film *f, struct lc *c, int32_t width, int32_t height, int32_t block_w, int32_t block_h,
+                  uint32_t seed)
 {
     int32_t columns = (width + block_w - 1) / block_w, rows = (height + block_h - 1) / block_h;
     *f = (struct lc_film){.width = width, .height = height, .seed = seed, .block_count = (uint32_t)(columns * rows)};
-    for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
-        f->sum[p] = calloc((size_t)width * (size_t)height * lc_plane_channels[p], sizeof(double));
-        if (!f->sum[p]) {
-            lc_film_release(f);
-            return -1;
-        }
-    }
+    for (unsigned p = 0; p < LULL_PLANE_COUNT; p++)
+        f->sum[p] = lc_need(c, calloc((size_t)width * (size_t)height * lc_plane_channels[p], sizeof(double)));
     for (int32_t i = 0; i < columns * rows; i++) {
         int32_t x0 = i % columns * block_w, y0 = i / columns * block_h;
         int32_t x1 = x0 + block_w < width ? x0 + block_w : width, y1 = y0 + block_h < height ? y0 + block_h : height;
@@ -33,15 +29,15 @@ int lc_film_init(struct lc_film *f, int32_t width, int32_t height, int32_t block
         f->blocks[i] =
             (struct lull_block){.id = (uint32_t)i, .x0 = x0, .y0 = y0, .x1 = x1, .y1 = y1, .thread_s = (double)NAN};
     }
-    return 0;
 }
 
-int lc_film_init_for(struct lc_film *f, const struct lull_requirements *req, uint32_t seed, int nominal)
+void lc_film_init_for(struct lc_film *f, struct lc *c, uint32_t seed, int nominal)
 {
+    const struct lull_requirements *req = &c->req;
     int own_size = nominal || !(req->flags & LULL_REQ_FLEXIBLE);
     int32_t w = req->block_width > 0 && own_size ? (int32_t)req->block_width : 24;
     int32_t h = req->block_height > 0 && own_size ? (int32_t)req->block_height : 16;
-    return lc_film_init(f, 2 * w + 1, h + 1, w, h, seed);
+    lc_film_init(f, c, 2 * w + 1, h + 1, w, h, seed);
 }
 
 void lc_film_release(struct lc_film *f)
@@ -205,15 +201,14 @@ static void store_block(const struct lc_film *f, const struct lull_block *b, uns
         }
 }
 
-static int build_plane(struct lc_image *image, const struct lc_film *f, unsigned plane, const struct lc_layout *wanted)
+static void build_plane(struct lc_image *image, struct lc *c, const struct lc_film *f, unsigned plane,
+                        const struct lc_layout *wanted)
 {
     struct lc_layout l = layout_of(wanted, plane);
     int64_t size = (int64_t)type_size(l.type), channels = lc_plane_channels[plane] + (l.padded ? 1 : 0);
     int64_t pixels = (int64_t)f->width * f->height;
     size_t bytes = (size_t)(size * channels * pixels);
-    char *memory = l.guard ? lc_guard_alloc(bytes) : malloc(bytes);
-    if (!memory)
-        return -1;
+    char *memory = l.guard ? lc_guard_alloc(c, bytes) : lc_need(c, malloc(bytes));
     image->memory[plane] = memory;
     image->guarded[plane] = l.guard ? bytes : 0;
     struct lull_plane *p = lc_image_plane(image, plane);
@@ -235,18 +230,16 @@ static int build_plane(struct lc_image *image, const struct lc_film *f, unsigned
     p->data = memory;
     for (uint32_t i = 0; i < f->block_count; i++)
         store_block(f, &f->blocks[i], plane, &l, p);
-    return 0;
 }
 
-int lc_image_build(struct lc_image *image, const struct lc_film *f, const struct lc_layout *layout, uint32_t planes)
+void lc_image_build(struct lc_image *image, struct lc *c, const struct lc_film *f, const struct lc_layout *layout,
+                    uint32_t planes)
 {
     uint32_t count = LULL_PLANE_COUNT + layout->extra_planes;
     uint32_t stride = (uint32_t)sizeof(struct lull_plane) + layout->plane_slack;
     if (layout->normaliser == LULL_NORM_WEIGHT)
         planes |= LULL_PLANE_BIT(LULL_PLANE_WEIGHT);
-    *image = (struct lc_image){.descriptors = malloc((size_t)count * stride)};
-    if (!image->descriptors)
-        return -1;
+    *image = (struct lc_image){.descriptors = lc_need(c, malloc((size_t)count * stride))};
     memset(image->descriptors, 0xa5, (size_t)count * stride); /* garbage between, and in planes from the future */
     image->view = (struct lull_view){.struct_size = sizeof image->view,
                                      .x1 = f->width,
@@ -260,12 +253,9 @@ int lc_image_build(struct lc_image *image, const struct lc_film *f, const struct
                                      .elapsed_s = (double)NAN};
     for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
         *lc_image_plane(image, p) = (struct lull_plane){.scale = 1};
-        if ((planes & LULL_PLANE_BIT(p)) && build_plane(image, f, p, layout) != 0) {
-            lc_image_release(image);
-            return -1;
-        }
+        if (planes & LULL_PLANE_BIT(p))
+            build_plane(image, c, f, p, layout);
     }
-    return 0;
 }
 
 void lc_image_release(struct lc_image *image)

@@ -19,7 +19,6 @@ static const uint32_t INVALID = CODE(LULL_E_INVALID), VERSION = CODE(LULL_E_VERS
 struct lc_misuse {
     struct lc *check;
     uint64_t random, calls, refused;
-    struct lc_slots slots;       /* what calls are given */
     struct lc_session s;         /* what must not be disturbed */
     struct lc_image image;       /* of its film */
     struct lull_instance *loose; /* owns; whatever it is given */

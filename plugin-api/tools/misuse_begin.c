@@ -91,9 +91,9 @@ static void loosen_frame(struct lc_misuse *m, struct frame_call *k)
 static void send_frame(struct lc_misuse *m, const struct frame_call *k)
 {
     struct lull_frame f = k->frame;
-    const void *rects = lc_place_array(&m->slots, k->rects, sizeof *k->rects, f.block_count, f.block_stride);
+    const void *rects = lc_place_array(m->check, k->rects, sizeof *k->rects, f.block_count, f.block_stride);
     f.blocks = k->no_blocks ? NULL : rects;
-    const struct lull_frame *at = lc_place_struct(&m->slots, &f, k->size);
+    const struct lull_frame *at = lc_place_struct(m->check, &f, k->size);
     struct lull_error *err = lc_announce(m, "begin_frame");
     int32_t status = m->check->criterion->begin_frame(m->instance, k->no_frame ? NULL : at, err);
     lc_judge(m, "begin_frame", status, err);

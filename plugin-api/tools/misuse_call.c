@@ -45,7 +45,7 @@ struct lull_error *lc_announce(struct lc_misuse *m, const char *function)
              function, m->codes ? m->what : "as it should be");
     if (form == 0)
         return NULL;
-    return lc_place_struct(&m->slots, &blank, form == 1 ? lc_too_small(m, sizeof blank) : sizeof blank);
+    return lc_place_struct(m->check, &blank, form == 1 ? lc_too_small(m, sizeof blank) : sizeof blank);
 }
 
 void lc_judge(struct lc_misuse *m, const char *function, int32_t status, const struct lull_error *err)

@@ -102,8 +102,8 @@ void lc_misuse_create(struct lc_misuse *m)
     for (uint32_t n = lc_how_many(m); n > 0; n--)
         spoil_create(m, &k);
     struct lull_instance *const none = (struct lull_instance *)(void *)&k, *instance = none;
-    const struct lull_host *host = lc_place_struct(&m->slots, &k.host, k.host_size);
-    const struct lull_pair *pairs = lc_place(&m->slots, k.pairs, (size_t)k.pair_count * k.pair_stride);
+    const struct lull_host *host = lc_place_struct(m->check, &k.host, k.host_size);
+    const struct lull_pair *pairs = lc_place(m->check, k.pairs, (size_t)k.pair_count * k.pair_stride);
     struct lull_error *err = lc_announce(m, "create");
     int32_t status =
         c->criterion->create(k.host_size == sizeof k.host && lc_draw(m, 2) ? NULL : host, k.no_pairs ? NULL : pairs,
@@ -126,7 +126,7 @@ void lc_misuse_requirements(struct lc_misuse *m)
         lc_wrong(m, INVALID, "no struct to fill");
     if (which == 2)
         lc_wrong(m, VERSION, "a short struct to fill");
-    struct lull_requirements *r = lc_place_struct(&m->slots, &req, size);
+    struct lull_requirements *r = lc_place_struct(m->check, &req, size);
     struct lull_error *err = lc_announce(m, "requirements");
     int32_t status = m->check->criterion->requirements(m->instance, which == 1 ? NULL : r, err);
     lc_judge(m, "requirements", status, err);

@@ -123,11 +123,11 @@ static void send_evaluate(struct lc_misuse *m, const struct evaluate_call *k)
     struct lull_decision presets[LC_FILM_BLOCKS];
     for (uint32_t i = 0; i < k->count; i++)
         lc_decision_preset(&presets[i]);
-    const void *planes = lc_place_array(&m->slots, k->planes, sizeof *k->planes, v.plane_count, v.plane_stride);
-    const void *blocks = lc_place_array(&m->slots, k->blocks, sizeof *k->blocks, k->count, k->block_stride);
-    char *out = lc_place_array(&m->slots, presets, sizeof *presets, k->count, k->decision_stride);
+    const void *planes = lc_place_array(m->check, k->planes, sizeof *k->planes, v.plane_count, v.plane_stride);
+    const void *blocks = lc_place_array(m->check, k->blocks, sizeof *k->blocks, k->count, k->block_stride);
+    char *out = lc_place_array(m->check, presets, sizeof *presets, k->count, k->decision_stride);
     v.planes = k->no_planes ? NULL : planes;
-    const struct lull_view *view = lc_place_struct(&m->slots, &v, k->size);
+    const struct lull_view *view = lc_place_struct(m->check, &v, k->size);
     struct lull_error *err = lc_announce(m, "evaluate");
     int32_t status =
         m->check->criterion->evaluate(m->instance, k->no_view ? NULL : view, k->no_blocks ? NULL : blocks, k->block_stride,

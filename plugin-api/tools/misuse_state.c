@@ -32,7 +32,7 @@ void lc_misuse_save(struct lc_misuse *m)
         return; /* there is nothing to be written */
     if (which == 3)
         writer.write = NULL;
-    const struct lull_writer *at = lc_place_struct(&m->slots, &writer, size);
+    const struct lull_writer *at = lc_place_struct(m->check, &writer, size);
     struct lull_error *err = lc_announce(m, "save");
     int32_t status = m->state->save(m->instance, which == 1 ? NULL : at, err);
     free(b.data);
@@ -42,7 +42,7 @@ void lc_misuse_save(struct lc_misuse *m)
 static void send_load(struct lc_misuse *m, struct lc_buffer *b, int no_reader, int no_read, uint32_t size)
 {
     struct lull_reader reader = {.context = b, .read = no_read ? NULL : lc_buffer_read};
-    const struct lull_reader *at = lc_place_struct(&m->slots, &reader, size);
+    const struct lull_reader *at = lc_place_struct(m->check, &reader, size);
     struct lull_error *err = lc_announce(m, "load");
     int32_t status = m->state->load(m->instance, no_reader ? NULL : at, err);
     lc_judge(m, "load", status, err);
@@ -62,9 +62,7 @@ void lc_misuse_load(struct lc_misuse *m)
 
 void lc_loose_load(struct lc_misuse *m)
 {
-    struct lc_buffer b = {.size = m->saved.size, .data = malloc((size_t)m->saved.size + 1)};
-    if (!b.data)
-        return;
+    struct lc_buffer b = {.size = m->saved.size, .data = lc_need(m->check, malloc((size_t)m->saved.size))};
     memcpy(b.data, m->saved.data, (size_t)b.size);
     lc_wrong(m, MAY, "a damaged state");
     for (uint32_t n = 1 + lc_draw(m, 4); n > 0; n--) {

@@ -109,14 +109,13 @@ int lc_log_compare(struct lc *c, const struct lc_log *expected, const struct lc_
 enum { GARBAGE = 0xa5 };
 
 /* Elements of `size` bytes, with slack behind each, as a newer host would have them: those with these ids, NULL: the first.
- * The caller frees it; NULL: no memory. */
-static char *spread(const void *from, size_t size, const uint32_t *ids, uint32_t count, uint32_t slack)
+ * The caller frees it. */
+static char *spread(struct lc *c, const void *from, size_t size, const uint32_t *ids, uint32_t count, uint32_t slack)
 {
     const size_t stride = size + slack;
-    char *to = malloc(count * stride + 1);
-    if (to)
-        memset(to, GARBAGE, count * stride);
-    for (uint32_t i = 0; to && i < count; i++)
+    char *to = lc_need(c, malloc(count * stride + 1));
+    memset(to, GARBAGE, count * stride);
+    for (uint32_t i = 0; i < count; i++)
         memcpy(to + i * stride, (const char *)from + (ids ? ids[i] : i) * size, size);
     return to;
 }
@@ -138,24 +137,22 @@ static void take_decisions(struct lc_session *s, const char *at, const uint32_t 
 static int32_t ask_some(struct lc_session *s, const struct lc_image *image, const uint32_t *ids, uint32_t count,
                         struct lull_decision *decisions, struct lull_error *err)
 {
+    struct lc *c = s->check;
     const uint32_t slack = s->manner.slack;
     struct lull_view v = image->view;
     v.struct_size += slack;
     for (uint32_t i = 0; i < count; i++)
         lc_decision_preset(&decisions[ids[i]]);
-    void *view = spread(&v, sizeof v, NULL, 1, slack), *out = spread(decisions, sizeof *decisions, ids, count, slack);
-    void *blocks = spread(s->film.blocks, sizeof *s->film.blocks, ids, count, slack);
-    int32_t status = LULL_E_MEMORY;
-    if (view && blocks && out) {
-        struct lull_process_state before;
-        lull_process_state_read(&before);
-        status = s->check->criterion->evaluate(s->instance, view, blocks, (uint32_t)sizeof *s->film.blocks + slack, out,
-                                               (uint32_t)sizeof *decisions + slack, count, err);
-        const char *changed = lull_process_state_restore(&before);
-        LC_EXPECT(s->check, !changed, "evaluate changed %s", changed);
-        if (status == LULL_OK)
-            take_decisions(s, out, ids, count, decisions);
-    }
+    void *view = spread(c, &v, sizeof v, NULL, 1, slack), *out = spread(c, decisions, sizeof *decisions, ids, count, slack);
+    void *blocks = spread(c, s->film.blocks, sizeof *s->film.blocks, ids, count, slack);
+    struct lull_process_state before;
+    lull_process_state_read(&before);
+    int32_t status = c->criterion->evaluate(s->instance, view, blocks, (uint32_t)sizeof *s->film.blocks + slack, out,
+                                            (uint32_t)sizeof *decisions + slack, count, err);
+    const char *changed = lull_process_state_restore(&before);
+    LC_EXPECT(c, !changed, "evaluate changed %s", changed);
+    if (status == LULL_OK)
+        take_decisions(s, out, ids, count, decisions);
     free(view);
     free(blocks);
     free(out);
@@ -205,12 +202,15 @@ static int32_t ask_concurrently(struct lc_session *s, const struct lc_image *ima
     return status;
 }
 
-int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const uint32_t *ids, uint32_t count,
+int32_t lc_session_ask(struct lc_session *s, struct lc_image *image, const uint32_t *ids, uint32_t count,
                        struct lull_decision *decisions, struct lull_error *err)
 {
-    double start = base_clock_wall_s();
     int32_t status = LULL_OK;
     uint32_t order[LC_BLOCKS_MAX];
+    struct lc_image own;
+    if (!image)
+        lc_session_image(s, image = &own);
+    double start = base_clock_wall_s();
     for (uint32_t i = 0; i < count; i++)
         order[i] = s->manner.ask == LC_ASK_REVERSED ? ids[count - 1 - i] : ids[i];
     if (s->manner.ask == LC_ASK_SINGLY)
@@ -224,22 +224,18 @@ int32_t lc_session_ask(struct lc_session *s, const struct lc_image *image, const
         status = ask_some(s, image, order, count, decisions, err);
     s->evaluate_s += base_clock_wall_s() - start;
     s->evaluated += count;
+    lc_image_release(image);
     return status;
 }
 
 int lc_session_judge(struct lc_session *s, struct lc_image *image, struct lull_decision decisions[LC_FILM_BLOCKS],
                      const char *what)
 {
-    struct lc_image own;
-    if (!image && lc_session_image(s, &own) != 0)
-        return 0;
-    image = image ? image : &own;
     uint32_t ids[LC_FILM_BLOCKS] = {0}, count = s->film.block_count;
     struct lull_error err = {.struct_size = sizeof err};
     for (uint32_t i = 0; i < count; i++)
         ids[i] = i;
     int32_t status = lc_session_ask(s, image, ids, count, decisions, &err);
-    lc_image_release(image);
     if (!LC_EXPECT(s->check, status == LULL_OK, "evaluate %s: %d, %s", what, status, err.message))
         return 0;
     for (uint32_t i = 0; i < count; i++)
@@ -250,6 +246,7 @@ int lc_session_judge(struct lc_session *s, struct lc_image *image, struct lull_d
 /* A frame struct with a tail, and rectangles with gaps, as the manner asks for. */
 static int begin(struct lc_session *s, uint32_t flags)
 {
+    struct lc *c = s->check;
     const uint32_t slack = s->manner.slack, count = s->film.block_count;
     struct lull_error err = {.struct_size = sizeof err};
     struct lull_frame f;
@@ -257,21 +254,18 @@ static int begin(struct lc_session *s, uint32_t flags)
     f.struct_size += slack;
     f.flags |= s->manner.frame_flags | flags;
     f.block_stride += slack;
-    void *rects = spread(s->film.rects, sizeof *s->film.rects, NULL, count, slack);
+    void *rects = spread(c, s->film.rects, sizeof *s->film.rects, NULL, count, slack);
     f.blocks = rects;
-    void *frame = spread(&f, sizeof f, NULL, 1, slack);
-    int32_t status = LULL_E_MEMORY;
-    if (frame && rects) {
-        status = lc_begin(s->check, s->instance, frame, &err);
-        /* what begin_frame was given is gone now: a criterion that kept a pointer reads garbage */
-        memset(frame, GARBAGE, sizeof f + slack);
-        memset(rects, GARBAGE, (size_t)count * f.block_stride);
-    }
+    void *frame = spread(c, &f, sizeof f, NULL, 1, slack);
+    int32_t status = lc_begin(c, s->instance, frame, &err);
+    /* what begin_frame was given is gone now: a criterion that kept a pointer reads garbage */
+    memset(frame, GARBAGE, sizeof f + slack);
+    memset(rects, GARBAGE, (size_t)count * f.block_stride);
     free(frame);
     free(rects);
-    if (!LC_EXPECT(s->check, status == LULL_OK, "begin_frame failed (%d): %s", status, err.message))
+    if (!LC_EXPECT(c, status == LULL_OK, "begin_frame failed (%d): %s", status, err.message))
         return -1;
-    s->spp = s->check->req.first_spp > 2 ? s->check->req.first_spp : 2;
+    s->spp = c->req.first_spp > 2 ? c->req.first_spp : 2;
     s->spp += s->spp % 2;
     s->step = 0;
     s->log.count = 0;
@@ -296,32 +290,25 @@ int lc_session_open_film(struct lc_session *s, struct lc *c, const struct lc_man
 int lc_session_open(struct lc_session *s, struct lc *c, const struct lc_manner *manner)
 {
     struct lc_film film;
-    *s = (struct lc_session){0};
-    int made = lc_film_init_for(&film, &c->req, manner ? 1 + manner->seed : 1, manner && manner->nominal) == 0;
-    return LC_EXPECT(c, made, "out of memory") ? lc_session_open_film(s, c, manner, &film) : -1;
+    lc_film_init_for(&film, c, manner ? 1 + manner->seed : 1, manner && manner->nominal);
+    return lc_session_open_film(s, c, manner, &film);
 }
 
 int lc_session_restart(struct lc_session *s)
 {
-    struct lc_film fresh;
-    int made = lc_film_init_for(&fresh, &s->check->req, s->film.seed, s->manner.nominal) == 0;
-    if (!LC_EXPECT(s->check, made, "out of memory"))
-        return -1;
+    const uint32_t seed = s->film.seed;
     lc_film_release(&s->film);
-    s->film = fresh;
+    lc_film_init_for(&s->film, s->check, seed, s->manner.nominal);
     return begin(s, LULL_FRAME_RESTART);
 }
 
-int lc_session_image(struct lc_session *s, struct lc_image *image)
+void lc_session_image(struct lc_session *s, struct lc_image *image)
 {
-    int built = lc_image_build(image, &s->film, &s->manner.layout, s->planes) == 0;
-    if (!LC_EXPECT(s->check, built, "out of memory"))
-        return -1;
+    lc_image_build(image, s->check, &s->film, &s->manner.layout, s->planes);
     if (s->manner.no_all) {
         image->view.all = NULL;
         image->view.all_count = 0;
     }
-    return 0;
 }
 
 /* Samples for the next step, as the first block that continues has asked for them: at least a quarter more, at most twice
@@ -354,14 +341,10 @@ uint32_t lc_session_advance(struct lc_session *s, uint32_t *ids)
 int lc_session_step(struct lc_session *s)
 {
     struct lull_decision decisions[LC_BLOCKS_MAX];
-    uint32_t ids[LC_BLOCKS_MAX];
+    uint32_t ids[LC_BLOCKS_MAX] = {0};
     const uint32_t count = lc_session_advance(s, ids);
-    struct lc_image image;
-    if (lc_session_image(s, &image) != 0)
-        return -1;
     struct lull_error err = {.struct_size = sizeof err};
-    int32_t status = lc_session_ask(s, &image, ids, count, decisions, &err);
-    lc_image_release(&image);
+    int32_t status = lc_session_ask(s, NULL, ids, count, decisions, &err);
     if (!LC_EXPECT(s->check, status == LULL_OK, "evaluate failed (%d): %s", status, err.message))
         return -1;
     for (uint32_t i = 0; i < count; i++) {
