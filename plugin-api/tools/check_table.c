@@ -106,11 +106,10 @@ void lc_check_load(struct lc *c)
     for (int i = 0; i < SIGNALS; i++)
         sigaction(signals[i], NULL, &before[i]);
     struct lull_search search = {.log = note_log, .log_context = c};
-    struct lull_found *found = malloc(sizeof *found);
+    struct lull_found found;
     struct lull_error err = {.struct_size = sizeof err};
-    if (!found || lull_open(&search, c->path, found, &err) != LULL_OK)
+    if (lull_open(&search, c->path, &found, &err) != LULL_OK)
         lc_fail(c, "%s", err.message);
-    free(found);
     for (int i = 0; i < SIGNALS; i++) {
         struct sigaction after;
         sigaction(signals[i], NULL, &after);

@@ -5,45 +5,42 @@
 #include "check.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "base/interrupt.h"
 #include "base/options.h"
 
-enum { PAIRS_MAX = 64, NAMES_MAX = 64, SPECS_MAX = 256 };
+enum { PAIRS_MAX = 64, SPECS_MAX = 256 };
+
+#define ROW(function, name, title) {name, title, lc_check_##function},
+static const struct {
+    const char *name, *title;
+    void (*run)(struct lc *c);
+} checks[] = {LC_CHECKS(ROW)};
+enum { CHECKS = sizeof checks / sizeof *checks };
 
 struct arguments {
     struct lc lc; /* what the checks get */
     struct lull_pair pairs[PAIRS_MAX];
-    const char *only[NAMES_MAX];
-    int only_count;
+    int only_some;
+    char only[CHECKS]; /* which */
     const char *specs[SPECS_MAX];
     int spec_count;
     unsigned limit_s;
     int quiet, list;
 };
 
-#define ROW(function, name, title) {name, title, lc_check_##function},
-static const struct lc_check {
-    const char *name, *title;
-    void (*run)(struct lc *c);
-} checks[] = {LC_CHECKS(ROW)};
-enum { CHECKS = sizeof checks / sizeof *checks };
-
 static int add_only(void *into, const char *name, struct base_err *err)
 {
     struct arguments *a = into;
-    int known = 0;
     for (int k = 0; k < CHECKS; k++)
-        known |= strcmp(checks[k].name, name) == 0;
-    if (!known)
-        return base_fail(err, BASE_EINVAL, "no such check; --list names them");
-    if (a->only_count == NAMES_MAX)
-        return base_fail(err, BASE_EINVAL, "more than %d checks", NAMES_MAX);
-    a->only[a->only_count++] = name;
-    return 0;
+        if (strcmp(checks[k].name, name) == 0) {
+            a->only[k] = 1;
+            a->only_some = 1;
+            return 0;
+        }
+    return base_fail(err, BASE_EINVAL, "no such check; --list names them");
 }
 
 /* Splits the text, which is argv's, at its first '='. */
@@ -90,31 +87,29 @@ static void find(struct lc *c, const void *arg)
 {
     const char *spec = arg;
     struct lull_search search = {0};
-    struct lull_found *found = malloc(sizeof *found);
-    struct lull_error err = {.struct_size = sizeof err, .message = "out of memory"};
+    struct lull_found found;
+    struct lull_error err = {.struct_size = sizeof err};
     lc_doing(c, "in loading the library, or in its entry");
-    if (!found || lull_open(&search, spec, found, &err) != LULL_OK) {
+    if (lull_open(&search, spec, &found, &err) != LULL_OK) {
         size_t last = strlen(spec) > 0 ? strlen(spec) - 1 : 0;
         int senseless = spec[0] == '\0' || spec[0] == ':' || spec[last] == ':';
         if (senseless || err.code == LULL_E_KEY || (err.code == LULL_E_IO && access(spec, R_OK) != 0))
             lc_refuse(c, "%s", err.message);
         else
             lc_fail(c, "%s", err.message);
-        free(found);
         return;
     }
-    lc_note(c, "%s", found->path);
-    const char *id = found->criterion->id;
+    lc_note(c, "%s", found.path);
+    const char *id = found.criterion->id;
     size_t length = strlen(spec), id_length = strlen(id);
     int is_path = strchr(spec, '/') || (length > 3 && strcmp(spec + length - 3, ".so") == 0);
     int names_id = length > id_length && spec[length - id_length - 1] == ':' && strcmp(spec + length - id_length, id) == 0;
-    lull_entry_fn entry = lc_entry(found->path);
+    lull_entry_fn entry = lc_entry(found.path);
     if (!is_path || names_id)
         lc_note(c, "%s", id);
     else
         for (uint32_t i = 0; entry(i) != NULL; i++)
             lc_note(c, "%s", entry(i)->id);
-    free(found);
 }
 
 /* Loads the criterion, in a child. */
@@ -211,82 +206,58 @@ static void print_report(const struct arguments *a, struct totals *t, const char
     fflush(stdout);
 }
 
-static int wanted(const struct arguments *a, const struct lc_check *check)
-{
-    for (int i = 0; i < a->only_count; i++)
-        if (strcmp(a->only[i], check->name) == 0)
-            return 1;
-    return a->only_count == 0;
-}
-
 static int no_process(void)
 {
     fputs("lull-check: cannot start a process\n", stderr);
     return LC_EXIT_FAILED;
 }
 
-/* Those from `task.check` up to `end`. */
-static int run_checks(const struct arguments *a, struct lc *c, struct task task, int end, struct totals *t,
-                      struct lc_report *r)
+static int check_criterion(const struct arguments *a, struct lc *c, const char *id, struct totals *t)
 {
-    for (; task.check < end; task.check++) {
-        const struct lc_check *check = &checks[task.check];
-        if (!wanted(a, check))
+    static struct lc_report made, r;
+    struct task task = {id, CHECKS};
+    if (lc_child_run(c, run_task, &task, a->limit_s, &made) != 0)
+        return no_process();
+    if (made.refused) { /* the command line's parameters are wrong */
+        fprintf(stderr, "lull-check: %s: %s\n", id, made.lines[0]);
+        return LC_EXIT_USAGE;
+    }
+    if (!a->quiet)
+        printf("# %s:%s\n", c->path, id);
+    for (task.check = 0; task.check < CHECKS; task.check++) {
+        if (task.check == LC_WITHOUT_INSTANCE && (made.failures > 0 || made.skipped)) {
+            print_report(a, t, "create", "an instance can be made", &made);
+            break;
+        }
+        if (a->only_some && !a->only[task.check])
             continue;
-        if (lc_child_run(c, run_task, &task, a->limit_s, r) != 0)
+        if (lc_child_run(c, run_task, &task, a->limit_s, &r) != 0)
             return no_process();
-        print_report(a, t, check->name, check->title, r);
+        print_report(a, t, checks[task.check].name, checks[task.check].title, &r);
     }
     return LC_EXIT_OK;
 }
 
-static int check_criterion(const struct arguments *a, struct lc *c, const char *id, struct totals *t)
-{
-    struct lc_report *r = malloc(sizeof *r), *made = malloc(sizeof *made);
-    const struct task make_one = {id, CHECKS};
-    int result = LC_EXIT_OK;
-    if (!r || !made || lc_child_run(c, run_task, &make_one, a->limit_s, made) != 0) {
-        result = no_process();
-    } else if (made->refused) { /* the command line's parameters are wrong */
-        fprintf(stderr, "lull-check: %s: %s\n", id, made->lines[0]);
-        result = LC_EXIT_USAGE;
-    } else {
-        if (!a->quiet)
-            printf("# %s:%s\n", c->path, id);
-        result = run_checks(a, c, (struct task){id, 0}, LC_WITHOUT_INSTANCE, t, r);
-        const int usable = made->failures == 0 && !made->skipped;
-        if (!usable)
-            print_report(a, t, "create", "an instance can be made", made);
-        if (result == LC_EXIT_OK && usable)
-            result = run_checks(a, c, (struct task){id, LC_WITHOUT_INSTANCE}, CHECKS, t, r);
-    }
-    free(r);
-    free(made);
-    return result;
-}
-
 static int check_spec(const struct arguments *a, const char *spec, struct totals *t)
 {
+    static struct lc_report r;
     struct lc c = a->lc;
-    struct lc_report *r = malloc(sizeof *r);
-    if (!r || lc_child_run(&c, find, spec, a->limit_s, r) != 0) {
-        free(r);
-        return no_process();
-    }
     int status = LC_EXIT_OK;
-    if (r->refused) {
-        fprintf(stderr, "lull-check: %s\n", r->lines[0]);
-        status = LC_EXIT_USAGE;
-    } else if (r->failures > 0) {
+    if (lc_child_run(&c, find, spec, a->limit_s, &r) != 0)
+        return no_process();
+    if (r.refused) {
+        fprintf(stderr, "lull-check: %s\n", r.lines[0]);
+        return LC_EXIT_USAGE;
+    }
+    if (r.failures > 0) {
         if (!a->quiet)
             printf("# %s\n", spec);
-        print_report(a, t, "find", "the library can be loaded and its tables read", r);
-    } else {
-        c.path = r->lines[0];
-        for (unsigned i = 1; i < r->line_count && status == LC_EXIT_OK; i++)
-            status = check_criterion(a, &c, r->lines[i], t);
+        print_report(a, t, "find", "the library can be loaded and its tables read", &r);
+        return LC_EXIT_OK;
     }
-    free(r);
+    c.path = r.lines[0];
+    for (unsigned i = 1; i < r.line_count && status == LC_EXIT_OK; i++)
+        status = check_criterion(a, &c, r.lines[i], t);
     return status;
 }
 
