@@ -131,6 +131,10 @@ struct lc_host {
     atomic_uchar taken[LC_WORKERS_MAX]; /* which worker numbers are */
 };
 
+/* fn for each of `count` arguments of `size` bytes, at the same time: the first in the caller's thread, each other in one of its
+ * own if there is one. LC_WORKERS_MAX at most. */
+void lc_at_once(void *(*fn)(void *arg), void *args, size_t size, uint32_t count);
+
 /* max_workers is 2 * threads, so that two evaluate calls may each run `threads` tasks. */
 void lc_host_init(struct lc_host *h, struct lc *c, uint32_t threads);
 

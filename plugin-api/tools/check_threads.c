@@ -5,7 +5,6 @@
  */
 #include "check.h"
 
-#include <pthread.h>
 #include <string.h>
 
 #if defined(__SSE__)
@@ -48,8 +47,7 @@ void lc_check_concurrent(struct lc *c)
 struct instance_thread {
     struct lc *check;
     struct lc_log log;
-    pthread_t id;
-    int result, started;
+    int result;
 };
 
 static void *instance_run(void *arg)
@@ -71,16 +69,12 @@ void lc_check_instances(struct lc *c)
         return;
     c->concurrent = 1;
     struct instance_thread threads[THREADS];
-    for (int i = 0; i < THREADS; i++) {
-        threads[i] = (struct instance_thread){.check = c, .result = -1};
-        threads[i].started = pthread_create(&threads[i].id, NULL, instance_run, &threads[i]) == 0;
-    }
-    for (int i = 0; i < THREADS; i++) {
-        if (threads[i].started)
-            pthread_join(threads[i].id, NULL);
+    for (int i = 0; i < THREADS; i++)
+        threads[i].check = c;
+    lc_at_once(instance_run, threads, sizeof *threads, THREADS);
+    for (int i = 0; i < THREADS; i++)
         if (threads[i].result == 0)
             lc_log_compare(c, &expected, &threads[i].log, lc_deterministic(c), "one of three concurrent instances");
-    }
     c->concurrent = 0;
 }
 

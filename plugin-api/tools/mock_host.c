@@ -8,6 +8,19 @@
 #include <sched.h>
 #include <string.h>
 
+void lc_at_once(void *(*fn)(void *arg), void *args, size_t size, uint32_t count)
+{
+    pthread_t ids[LC_WORKERS_MAX];
+    unsigned char started[LC_WORKERS_MAX] = {0};
+    for (uint32_t t = 1; t < count; t++)
+        started[t] = pthread_create(&ids[t], NULL, fn, (char *)args + t * size) == 0;
+    for (uint32_t t = 0; t < count; t++)
+        if (started[t])
+            pthread_join(ids[t], NULL);
+        else
+            fn((char *)args + t * size);
+}
+
 /* A number that nobody else has; whoever finds none waits. */
 static uint32_t worker_take(struct lc_host *h)
 {
@@ -49,18 +62,9 @@ static int32_t parallel_for(const struct lull_host *host, uint64_t count, lull_t
     uint64_t wanted = h->cancel && count > 1 ? 1 : count;
     uint32_t threads = wanted < h->threads ? (uint32_t)wanted : h->threads;
     struct job jobs[LC_WORKERS_MAX];
-    pthread_t ids[LC_WORKERS_MAX];
-    unsigned char started[LC_WORKERS_MAX] = {0};
-    for (uint32_t t = 0; t < threads; t++) {
+    for (uint32_t t = 0; t < threads; t++)
         jobs[t] = (struct job){h, fn, arg, wanted, t, threads};
-        started[t] = t > 0 && pthread_create(&ids[t], NULL, job_run, &jobs[t]) == 0;
-    }
-    for (uint32_t t = 0; t < threads; t++)
-        if (!started[t])
-            job_run(&jobs[t]);
-    for (uint32_t t = 0; t < threads; t++)
-        if (started[t])
-            pthread_join(ids[t], NULL);
+    lc_at_once(job_run, jobs, sizeof *jobs, threads);
     return wanted < count ? LULL_E_CANCELLED : LULL_OK;
 }
 

@@ -5,7 +5,6 @@
 #include "check.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -167,8 +166,6 @@ struct ask_thread {
     struct lull_error err;
     uint32_t first, count, step;
     int32_t status;
-    pthread_t id;
-    int started;
 };
 
 static void *ask_thread_run(void *arg)
@@ -184,16 +181,11 @@ static int32_t ask_concurrently(struct lc_session *s, const struct lc_image *ima
 {
     enum { THREADS = 4 };
     struct ask_thread threads[THREADS];
-    for (uint32_t t = 0; t < THREADS; t++) {
-        threads[t] = (struct ask_thread){s, image, ids, decisions, *err, t, count, THREADS, LULL_OK, 0, 0};
-        threads[t].started = pthread_create(&threads[t].id, NULL, ask_thread_run, &threads[t]) == 0;
-        if (!threads[t].started)
-            ask_thread_run(&threads[t]);
-    }
+    for (uint32_t t = 0; t < THREADS; t++)
+        threads[t] = (struct ask_thread){s, image, ids, decisions, *err, t, count, THREADS, LULL_OK};
+    lc_at_once(ask_thread_run, threads, sizeof *threads, THREADS);
     int32_t status = LULL_OK;
     for (uint32_t t = 0; t < THREADS; t++) {
-        if (threads[t].started)
-            pthread_join(threads[t].id, NULL);
         if (threads[t].status != LULL_OK) {
             status = threads[t].status;
             *err = threads[t].err;
