@@ -13,7 +13,80 @@
  */
 #include "misuse.h"
 
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+
+uint32_t lc_draw(struct lc_misuse *m, uint32_t below) /* SplitMix64 (Steele, Lea, Flood 2014) */
+{
+    uint64_t x = m->random += UINT64_C(0x9e3779b97f4a7c15);
+    x = (x ^ (x >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
+    x = (x ^ (x >> 27)) * UINT64_C(0x94d049bb133111eb);
+    return (uint32_t)((x ^ (x >> 31)) >> 32) % below;
+}
+
+double lc_nonsense(struct lc_misuse *m)
+{
+    static const double numbers[] = {(double)NAN, (double)INFINITY, -(double)INFINITY, 0, -1, 1e300, -1e300, 1e-320, 5e18};
+    return numbers[lc_draw(m, sizeof numbers / sizeof *numbers)];
+}
+
+void lc_wrong(struct lc_misuse *m, uint32_t codes, const char *what)
+{
+    size_t length = strlen(m->what);
+    snprintf(m->what + length, sizeof m->what - length, "%s%s", m->codes ? ", " : "", what);
+    if (m->codes == 0)
+        m->codes = codes;
+    else if (codes == MAY || m->codes == MAY)
+        m->codes = codes == m->codes ? MAY : REFUSED;
+    else
+        m->codes |= codes;
+}
+
+uint32_t lc_too_small(struct lc_misuse *m, size_t size) { return 8 * lc_draw(m, (uint32_t)(size / 8)); }
+
+static const char untouched[] = "untouched";
+
+struct lull_error *lc_announce(struct lc_misuse *m, const char *function)
+{
+    struct lull_error blank = {.code = INT_MAX, .message = "untouched"};
+    const uint32_t form = lc_draw(m, 8);
+    m->calls++;
+    lc_doing(m->check, "call %llu of seed %llu: %s: %s", (unsigned long long)m->calls, (unsigned long long)m->check->seed,
+             function, m->codes ? m->what : "as it should be");
+    if (form == 0)
+        return NULL;
+    return lc_place_struct(m->check, &blank, form == 1 ? lc_too_small(m, sizeof blank) : sizeof blank);
+}
+
+void lc_judge(struct lc_misuse *m, int32_t status, const struct lull_error *err)
+{
+    const uint32_t allowed = m->codes ? m->codes : CODE(LULL_OK);
+    struct lc *c = m->check;
+    const char *call = c->report->doing;
+    m->refused += (allowed & CODE(LULL_OK)) == 0;
+    if (status > LULL_OK || status < LULL_E_INTERNAL || !(allowed & CODE(status))) {
+        char fitting[64] = "";
+        for (int32_t s = LULL_OK; s >= LULL_E_INTERNAL; s--)
+            if (allowed & CODE(s))
+                snprintf(fitting + strlen(fitting), sizeof fitting - strlen(fitting), " %d", s);
+        lc_fail(c, "%s: status %d, expected%s", call, status, fitting);
+    } else if (err && err->struct_size == sizeof *err) {
+        int terminated = memchr(err->message, '\0', sizeof err->message) != NULL;
+        int fits = status == LULL_OK ? err->code == INT_MAX && strcmp(err->message, untouched) == 0
+                                     : err->code == status && terminated && err->message[0] != '\0' &&
+                                           strcmp(err->message, untouched) != 0;
+        LC_EXPECT(c, fits, "%s: status %d, but the error says %d, \"%.200s\"", call, status, err->code, err->message);
+    }
+}
+
+uint32_t lc_how_many(struct lc_misuse *m)
+{
+    const uint32_t another = lc_draw(m, 4), more = lc_draw(m, 16);
+    return 1u + (another == 0) + (more == 0);
+}
 
 static void call_loose(struct lc_misuse *m)
 {
@@ -22,13 +95,13 @@ static void call_loose(struct lc_misuse *m)
         m->loose = lc_create(m->check, m->s.manner.host);
     if (!m->loose)
         return;
-    lc_make_up(m, m->loose);
+    m->instance = m->loose;
     if (which < 2)
         lc_loose_begin(m);
     else if (which == 2 && m->state && m->saved.size > 0)
         lc_loose_load(m);
     else
-        lc_loose_evaluate(m);
+        lc_misuse_evaluate(m, 1);
 }
 
 /* Calls that answer with a pointer. */
@@ -51,6 +124,9 @@ static void disturb(struct lc_misuse *m)
     const uint64_t most = m->check->misuse, end = m->calls + lc_draw(m, 40);
     while (m->calls < end && m->calls < most && !m->check->report->failures) {
         const uint32_t which = lc_draw(m, 20);
+        m->instance = m->s.instance;
+        m->codes = 0;
+        m->what[0] = '\0';
         if (which < 3)
             lc_misuse_create(m);
         else if (which < 4)
@@ -58,7 +134,7 @@ static void disturb(struct lc_misuse *m)
         else if (which < 7)
             lc_misuse_begin(m);
         else if (which < 12)
-            lc_misuse_evaluate(m);
+            lc_misuse_evaluate(m, 0);
         else if (which < 14 && m->state)
             (which == 12 ? lc_misuse_save : lc_misuse_load)(m);
         else if (which < 19)

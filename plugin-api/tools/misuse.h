@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT
  *
- * Calls outside the rules, for check_misuse.c; a file for each call.
+ * Calls outside the rules, for check_misuse.c.
  *
- * A call is made up from a good one: lc_make_up begins it, lc_wrong notes each thing that is spoilt and which codes fit it,
- * lc_announce says it to whoever finds the process dead, and lc_judge holds the answer against the codes. One thread.
+ * A call is made up from a good one: lc_wrong notes each thing that is spoilt and which codes fit it, lc_announce says it to
+ * whoever finds the process dead, and lc_judge holds the answer against the codes. One thread.
  */
 #ifndef LULL_CHECK_MISUSE_H
 #define LULL_CHECK_MISUSE_H
@@ -32,7 +32,7 @@ struct lc_misuse {
     char what[400];
 };
 
-/* --- misuse_call.c: what a call with wrong arguments is ---------------------------------------------------------------- */
+/* --- check_misuse.c: what a call with wrong arguments is --------------------------------------------------------------- */
 
 /* A random number below `below`. */
 uint32_t lc_draw(struct lc_misuse *m, uint32_t below);
@@ -43,29 +43,29 @@ uint32_t lc_too_small(struct lc_misuse *m, size_t size);
 /* How many things are to be wrong: one, sometimes several. */
 uint32_t lc_how_many(struct lc_misuse *m);
 
-void lc_make_up(struct lc_misuse *m, struct lull_instance *instance);
 /* Notes what is wrong. Of several wrong things any may be complained about; a call is open to the criterion only if each
  * is. */
 void lc_wrong(struct lc_misuse *m, uint32_t codes, const char *what);
 /* An error struct, a short one, or none. */
 struct lull_error *lc_announce(struct lc_misuse *m, const char *function);
-/* Is this one of the expected statuses, and does the error say the same? */
-void lc_judge(struct lc_misuse *m, const char *function, int32_t status, const struct lull_error *err);
+/* Is this one of the expected statuses of the call that was announced, and does the error say the same? */
+void lc_judge(struct lc_misuse *m, int32_t status, const struct lull_error *err);
 
 /* --- the calls --------------------------------------------------------------------------------------------------------- */
 
-/* To the session's instance (create: to none): what the header says is refused. */
+/* What the header says is refused. */
 void lc_misuse_create(struct lc_misuse *m);
 void lc_misuse_requirements(struct lc_misuse *m);
 void lc_misuse_begin(struct lc_misuse *m);
-void lc_misuse_evaluate(struct lc_misuse *m);
 /* Of the extension lull.state/1, which the criterion has. */
 void lc_misuse_save(struct lc_misuse *m);
 void lc_misuse_load(struct lc_misuse *m);
 
-/* To the instance that lc_make_up was given: what the header leaves open. */
+/* What the header leaves open. */
 void lc_loose_begin(struct lc_misuse *m);
-void lc_loose_evaluate(struct lc_misuse *m);
 void lc_loose_load(struct lc_misuse *m); /* of m->saved, which is not empty */
+
+/* Either. */
+void lc_misuse_evaluate(struct lc_misuse *m, int loose);
 
 #endif

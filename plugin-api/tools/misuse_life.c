@@ -3,6 +3,8 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 enum { PAIRS_MAX = 72, TEXT_MAX = 6000 };
 
@@ -98,7 +100,6 @@ void lc_misuse_create(struct lc_misuse *m)
                             .host_size = sizeof k.host};
     for (uint32_t i = 0; i < c->pair_count; i++)
         k.pairs[i] = c->pairs[i];
-    lc_make_up(m, NULL);
     for (uint32_t n = lc_how_many(m); n > 0; n--)
         spoil_create(m, &k);
     struct lull_instance *const none = (struct lull_instance *)(void *)&k, *instance = none;
@@ -108,7 +109,7 @@ void lc_misuse_create(struct lc_misuse *m)
     int32_t status =
         c->criterion->create(k.host_size == sizeof k.host && lc_draw(m, 2) ? NULL : host, k.no_pairs ? NULL : pairs,
                              k.pair_count, k.pair_stride, k.no_place ? NULL : &instance, err);
-    lc_judge(m, "create", status, err);
+    lc_judge(m, status, err);
     LC_EXPECT(c, (status == LULL_OK) == (instance != none), "call %llu: create: status %d, and the instance is %stouched",
               (unsigned long long)m->calls, status, instance == none ? "un" : "");
     if (instance != none)
@@ -118,7 +119,6 @@ void lc_misuse_create(struct lc_misuse *m)
 void lc_misuse_requirements(struct lc_misuse *m)
 {
     struct lull_requirements req = {0};
-    lc_make_up(m, m->s.instance);
     const uint32_t which = lc_draw(m, 4), size = which == 2 ? lc_too_small(m, sizeof req) : (uint32_t)sizeof req;
     if (which == 0)
         lc_wrong(m, INVALID, "no instance"), m->instance = NULL;
@@ -129,5 +129,73 @@ void lc_misuse_requirements(struct lc_misuse *m)
     struct lull_requirements *r = lc_place_struct(m->check, &req, size);
     struct lull_error *err = lc_announce(m, "requirements");
     int32_t status = m->check->criterion->requirements(m->instance, which == 1 ? NULL : r, err);
-    lc_judge(m, "requirements", status, err);
+    lc_judge(m, status, err);
+}
+
+/* What is wrong with a call about a stream, in words: none, a short struct, one that cannot work, and what fails in the end.
+ * Returns which: 0 no instance, then these. */
+static uint32_t spoil_stream(struct lc_misuse *m, uint32_t full_size, uint32_t *size, const char *const words[4])
+{
+    const uint32_t which = lc_draw(m, 5);
+    *size = which == 2 ? lc_too_small(m, full_size) : full_size;
+    if (!m->open)
+        lc_wrong(m, CODE(LULL_E_STATE), "no frame is open");
+    if (which == 0)
+        lc_wrong(m, INVALID, "no instance"), m->instance = NULL;
+    else if (which < 4)
+        lc_wrong(m, which == 2 ? VERSION : INVALID, words[which - 1]);
+    else if (m->open && m->saved.size > 0)
+        lc_wrong(m, REFUSED, words[3]);
+    return which;
+}
+
+void lc_misuse_save(struct lc_misuse *m)
+{
+    static const char *const words[] = {"no writer", "a short writer", "a writer that cannot write", "writing fails"};
+    struct lc_buffer b = {.limit = m->saved.size > 0 ? lc_draw(m, (uint32_t)m->saved.size) : 0};
+    struct lull_writer writer = {.context = &b, .write = lc_buffer_write};
+    uint32_t size, which = spoil_stream(m, sizeof writer, &size, words);
+    if (m->codes == 0)
+        return; /* there is nothing to be written */
+    if (which == 3)
+        writer.write = NULL;
+    const struct lull_writer *at = lc_place_struct(m->check, &writer, size);
+    struct lull_error *err = lc_announce(m, "save");
+    int32_t status = m->state->save(m->instance, which == 1 ? NULL : at, err);
+    free(b.data);
+    lc_judge(m, status, err);
+}
+
+static void send_load(struct lc_misuse *m, struct lc_buffer *b, int no_reader, int no_read, uint32_t size)
+{
+    struct lull_reader reader = {.context = b, .read = no_read ? NULL : lc_buffer_read};
+    const struct lull_reader *at = lc_place_struct(m->check, &reader, size);
+    struct lull_error *err = lc_announce(m, "load");
+    int32_t status = m->state->load(m->instance, no_reader ? NULL : at, err);
+    lc_judge(m, status, err);
+}
+
+void lc_misuse_load(struct lc_misuse *m)
+{
+    static const char *const words[] = {"no reader", "a short reader", "a reader that cannot read", "a state cut short"};
+    struct lc_buffer b = {.data = m->saved.data, .size = m->saved.size};
+    uint32_t size, which = spoil_stream(m, sizeof(struct lull_reader), &size, words);
+    if (m->codes == 0)
+        return;
+    if (which == 4 && m->open)
+        b.size = lc_draw(m, (uint32_t)m->saved.size);
+    send_load(m, &b, which == 1, which == 3, size);
+}
+
+void lc_loose_load(struct lc_misuse *m)
+{
+    struct lc_buffer b = {.size = m->saved.size, .data = lc_need(m->check, malloc((size_t)m->saved.size))};
+    memcpy(b.data, m->saved.data, (size_t)b.size);
+    lc_wrong(m, MAY, "a damaged state");
+    for (uint32_t n = 1 + lc_draw(m, 4); n > 0; n--) {
+        char *at = &b.data[lc_draw(m, (uint32_t)b.size)];
+        *at = (char)lc_draw(m, 256);
+    }
+    send_load(m, &b, 0, 0, sizeof(struct lull_reader));
+    free(b.data);
 }
