@@ -7,26 +7,20 @@
 
 #include <string.h>
 
-/* Every struct that the host passes, each of so many bytes fewer than in version 1.0. */
-struct short_structs {
-    size_t host, requirements, frame, view, error;
-};
+/* What a call is given that says its size: one struct for each call, and the error for all. */
+enum { HOST, REQUIREMENTS, FRAME, VIEW, CALLS, ERROR = CALLS, STRUCTS };
 
-struct short_calls {
-    int32_t create, requirements, begin_frame, evaluate;
+/* An instance that is given structs which end where nothing can be read beyond. */
+struct life {
+    struct lc *check;
+    size_t cut[STRUCTS]; /* bytes fewer than in version 1.0 */
+    struct lull_instance *instance;
+    struct lull_error *err;
+    int32_t status[CALLS]; /* 1: not called, as evaluate is after a create or begin_frame that failed */
     struct lull_requirements got;
 };
 
-/* An instance, and what it is given. */
-struct life {
-    struct lc *check;
-    const struct short_structs *cut;
-    struct lull_instance *instance;
-    struct lull_error *err;
-    struct short_calls calls;
-};
-
-static void short_evaluate(struct life *l, const struct lc_film *film, uint32_t planes)
+static void evaluate(struct life *l, const struct lc_film *film, uint32_t planes)
 {
     const struct lc_layout layout = {0};
     struct lull_decision presets[LC_FILM_BLOCKS];
@@ -38,15 +32,15 @@ static void short_evaluate(struct life *l, const struct lc_film *film, uint32_t 
     v.planes = lc_place(l->check, v.planes, sizeof *v.planes * LULL_PLANE_COUNT);
     v.all = lc_place(l->check, film->blocks, sizeof *v.all * LC_FILM_BLOCKS);
     struct lull_decision *d = lc_place(l->check, presets, sizeof presets);
-    const struct lull_view *view = lc_place_struct(l->check, &v, sizeof v - l->cut->view);
-    l->calls.evaluate =
+    const struct lull_view *view = lc_place_struct(l->check, &v, sizeof v - l->cut[VIEW]);
+    l->status[VIEW] =
         l->check->criterion->evaluate(l->instance, view, v.all, sizeof *v.all, d, sizeof *d, LC_FILM_BLOCKS, l->err);
-    for (int i = 0; i < LC_FILM_BLOCKS && l->calls.evaluate == LULL_OK; i++)
+    for (int i = 0; i < LC_FILM_BLOCKS && l->status[VIEW] == LULL_OK; i++)
         lc_decision_check(l->check, &film->blocks[i], &d[i]);
     lc_image_release(&image);
 }
 
-static void short_frame(struct life *l)
+static void open_frame(struct life *l)
 {
     struct lc *c = l->check;
     struct lc_film film;
@@ -56,77 +50,75 @@ static void short_frame(struct life *l)
         lc_film_advance(&film, i, c->req.first_spp + c->req.first_spp % 2 + 2);
     lc_film_frame(&film, &frame, c->planes);
     frame.blocks = lc_place(c, film.rects, sizeof *film.rects * film.block_count);
-    const struct lull_frame *at = lc_place_struct(c, &frame, sizeof frame - l->cut->frame);
-    l->calls.begin_frame = c->criterion->begin_frame(l->instance, at, l->err);
-    if (l->calls.begin_frame == LULL_OK) {
-        short_evaluate(l, &film, frame.planes);
+    const struct lull_frame *at = lc_place_struct(c, &frame, sizeof frame - l->cut[FRAME]);
+    l->status[FRAME] = c->criterion->begin_frame(l->instance, at, l->err);
+    if (l->status[FRAME] == LULL_OK) {
+        evaluate(l, &film, frame.planes);
         c->criterion->end_frame(l->instance);
     }
     lc_film_release(&film);
 }
 
-static struct short_calls short_life(struct lc *c, const struct short_structs *cut)
+static void live(struct life *l)
 {
-    struct life l = {.check = c, .cut = cut, .calls = {1, 1, 1, 1, {0}}};
+    struct lc *c = l->check;
     const struct lull_error blank = {0};
     struct lull_requirements req = {0};
     struct lc_host host;
     lc_host_init(&host, c, 1);
-    const struct lull_host *h = lc_place_struct(c, &host.host, sizeof host.host - cut->host);
-    l.err = lc_place_struct(c, &blank, sizeof blank - cut->error);
-    l.calls.create = c->criterion->create(h, c->pairs, c->pair_count, sizeof *c->pairs, &l.instance, l.err);
-    if (l.calls.create == LULL_OK) {
-        struct lull_requirements *r = lc_place_struct(c, &req, sizeof req - cut->requirements);
-        l.calls.requirements = c->criterion->requirements(l.instance, r, l.err);
-        memcpy(&l.calls.got, r, sizeof req - cut->requirements);
-        short_frame(&l);
-        c->criterion->destroy(l.instance);
-    }
-    return l.calls;
+    for (int i = 0; i < CALLS; i++)
+        l->status[i] = 1;
+    const struct lull_host *h = lc_place_struct(c, &host.host, sizeof host.host - l->cut[HOST]);
+    l->err = lc_place_struct(c, &blank, sizeof blank - l->cut[ERROR]);
+    l->status[HOST] = c->criterion->create(h, c->pairs, c->pair_count, sizeof *c->pairs, &l->instance, l->err);
+    if (l->status[HOST] != LULL_OK)
+        return;
+    struct lull_requirements *r = lc_place_struct(c, &req, sizeof req - l->cut[REQUIREMENTS]);
+    l->status[REQUIREMENTS] = c->criterion->requirements(l->instance, r, l->err);
+    memcpy(&l->got, r, sizeof req - l->cut[REQUIREMENTS]);
+    open_frame(l);
+    c->criterion->destroy(l->instance);
 }
 
 void lc_check_older(struct lc *c)
 {
-    struct short_structs exact = {0};
-    struct short_calls calls = short_life(c, &exact);
+    struct life exact = {.check = c}, no_message = {.check = c, .cut = {[ERROR] = sizeof(struct lull_error) - 8}};
+    const int32_t *status = exact.status;
+    live(&exact);
+    LC_EXPECT(c, status[REQUIREMENTS] == LULL_OK && status[VIEW] == LULL_OK,
+              "structs of exactly version 1.0: create %d, requirements %d, begin_frame %d, evaluate %d", status[HOST],
+              status[REQUIREMENTS], status[FRAME], status[VIEW]);
     LC_EXPECT(c,
-              calls.create == LULL_OK && calls.requirements == LULL_OK && calls.begin_frame == LULL_OK &&
-                  calls.evaluate == LULL_OK,
-              "structs of exactly version 1.0: create %d, requirements %d, begin_frame %d, evaluate %d", calls.create,
-              calls.requirements, calls.begin_frame, calls.evaluate);
-    LC_EXPECT(c,
-              calls.got.planes_used == c->req.planes_used && calls.got.first_spp == c->req.first_spp &&
-                  calls.got.bytes_per_block == c->req.bytes_per_block,
+              exact.got.planes_used == c->req.planes_used && exact.got.first_spp == c->req.first_spp &&
+                  exact.got.bytes_per_block == c->req.bytes_per_block,
               "requirements differ for a struct of exactly version 1.0");
 
     /* the error struct is for the caller's convenience: a short one is not written, or not beyond its end */
-    struct short_structs no_message = {.error = sizeof(struct lull_error) - 8};
-    calls = short_life(c, &no_message);
-    LC_EXPECT(c, calls.evaluate == LULL_OK, "an error struct of 8 bytes makes a call fail (%d)", calls.evaluate);
-    struct short_structs one_short = {.host = 8, .error = sizeof(struct lull_error) - 8};
-    calls = short_life(c, &one_short);
-    LC_EXPECT(c, calls.create != LULL_OK, "create succeeds with a host struct shorter than 1.0");
+    struct life short_host = no_message;
+    short_host.cut[HOST] = 8;
+    live(&no_message);
+    LC_EXPECT(c, no_message.status[VIEW] == LULL_OK, "an error struct of 8 bytes makes a call fail (%d)",
+              no_message.status[VIEW]);
+    live(&short_host);
+    LC_EXPECT(c, short_host.status[HOST] != LULL_OK, "create succeeds with a host struct shorter than 1.0");
 }
 
 void lc_check_too_short(struct lc *c)
 {
-    struct short_structs cut = {0};
-    struct short_calls calls;
-    const struct {
+    static const struct {
         const char *what, *call;
-        size_t *cut, size;
-        const int32_t *status;
-    } structs[] = {{"host struct", "create", &cut.host, sizeof(struct lull_host), &calls.create},
-                   {"struct", "requirements", &cut.requirements, sizeof(struct lull_requirements), &calls.requirements},
-                   {"frame struct", "begin_frame", &cut.frame, sizeof(struct lull_frame), &calls.begin_frame},
-                   {"view struct", "evaluate", &cut.view, sizeof(struct lull_view), &calls.evaluate}};
+        size_t size;
+    } structs[CALLS] = {[HOST] = {"host struct", "create", sizeof(struct lull_host)},
+                        [REQUIREMENTS] = {"struct", "requirements", sizeof(struct lull_requirements)},
+                        [FRAME] = {"frame struct", "begin_frame", sizeof(struct lull_frame)},
+                        [VIEW] = {"view struct", "evaluate", sizeof(struct lull_view)}};
     for (int only_8 = 0; only_8 < 2; only_8++)
-        for (size_t i = 0; i < sizeof structs / sizeof *structs; i++) {
-            *structs[i].cut = only_8 ? structs[i].size - 8 : 8;
-            calls = short_life(c, &cut);
-            LC_EXPECT(c, *structs[i].status == LULL_E_VERSION, "%s %s: %s %d", structs[i].what,
-                      only_8 ? "of 8 bytes" : "shorter than 1.0", structs[i].call, *structs[i].status);
-            *structs[i].cut = 0;
+        for (int i = 0; i < CALLS; i++) {
+            struct life l = {.check = c};
+            l.cut[i] = only_8 ? structs[i].size - 8 : 8;
+            live(&l);
+            LC_EXPECT(c, l.status[i] == LULL_E_VERSION, "%s %s: %s %d", structs[i].what,
+                      only_8 ? "of 8 bytes" : "shorter than 1.0", structs[i].call, l.status[i]);
         }
 }
 
