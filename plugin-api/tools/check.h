@@ -147,6 +147,41 @@ struct lc_paint {
 
 enum { LC_BLOCKS_MAX = 20, LC_STEPS = 7 }; /* blocks of a film, steps of a session */
 
+/* How an image is stored. All zero: tight interleaved float estimates, top-down. */
+struct lc_layout {
+    int32_t type;
+    int32_t normaliser; /* ONE, SPP (HALF then uses HALF_SPP) or WEIGHT */
+    int padded;         /* a fourth, unused channel of NaN */
+    int planar;         /* channel planes */
+    int bottom_up;
+    int right_left;
+    int guard;             /* each plane between two pages that cannot be read */
+    double scale;          /* 0 = 1 */
+    uint32_t extra_planes; /* unknown planes after the known ones */
+    uint32_t plane_slack;  /* bytes between plane descriptors */
+};
+
+enum lc_ask { LC_ASK_ALL, LC_ASK_TWICE, LC_ASK_REVERSED, LC_ASK_SINGLY, LC_ASK_CONCURRENTLY };
+
+/* How a session asks, and about which film. All zero, or NULL in the place of one: no host, all due blocks in one call, tight
+ * structs, the frame that suits the criterion. */
+struct lc_manner {
+    const struct lull_host *host;
+    struct lc_layout layout;
+    enum lc_ask ask;
+    uint32_t slack;    /* bytes between the elements of arrays and after structs, filled with garbage */
+    int required_only; /* supply only the required planes */
+    int no_all;        /* view.all is NULL */
+    uint32_t frame_flags;
+
+    int nominal; /* blocks of the size that the criterion was made for */
+    struct {
+        int32_t width, height, block_width, block_height;
+    } size;                       /* all 0: what suits the criterion */
+    const struct lc_paint *paint; /* borrows; NULL: a gradient with noise */
+    uint32_t seed;
+};
+
 /* A picture of blocks with made-up noise that falls with the number of samples. All estimates are multiples of 1/256
  * below 8 in magnitude, so that every storage type holds them exactly and answers can be compared across types. */
 struct lc_film {
@@ -162,31 +197,15 @@ struct lc_film {
 extern const uint32_t lc_plane_channels[LULL_PLANE_COUNT];
 extern const char *const lc_plane_names[LULL_PLANE_COUNT];
 
-/* Blocks of block_w x block_h, smaller at the right and bottom edge, LC_BLOCKS_MAX at most. */
-void lc_film_init(struct lc_film *f, struct lc *c, int32_t width, int32_t height, int32_t block_w, int32_t block_h,
-                  uint32_t seed);
-void lc_film_release(struct lc_film *f);
-/* The frame that suits the criterion: two by one blocks and the rest at the edges, one of them 1x1. The blocks are of the
- * size it was made for if that is the only one it takes or if nominal is set, else small, which saves time. */
+/* Of the manner's size: blocks smaller at the right and bottom edge, LC_BLOCKS_MAX at most. The frame that suits the
+ * criterion has two by one blocks and the rest at the edges, one of them 1x1. They are of the size it was made for if that
+ * is the only one it takes or if nominal is set, else small, which saves time. */
 enum { LC_FILM_BLOCKS = 6 };
-void lc_film_init_for(struct lc_film *f, struct lc *c, uint32_t seed, int nominal);
+void lc_film_init(struct lc_film *f, struct lc *c, const struct lc_manner *manner);
+void lc_film_release(struct lc_film *f);
 /* Adds samples until the block has spp; nothing if it has. */
 void lc_film_advance(struct lc_film *f, uint32_t id, uint64_t spp);
 void lc_film_frame(const struct lc_film *f, struct lull_frame *frame, uint32_t planes);
-
-/* How an image is stored. All zero: tight interleaved float estimates, top-down. */
-struct lc_layout {
-    int32_t type;
-    int32_t normaliser; /* ONE, SPP (HALF then uses HALF_SPP) or WEIGHT */
-    int padded;         /* a fourth, unused channel of NaN */
-    int planar;         /* channel planes */
-    int bottom_up;
-    int right_left;
-    int guard;             /* each plane between two pages that cannot be read */
-    double scale;          /* 0 = 1 */
-    uint32_t extra_planes; /* unknown planes after the known ones */
-    uint32_t plane_slack;  /* bytes between plane descriptors */
-};
 
 struct lc_image {
     struct lull_view view;
@@ -221,21 +240,6 @@ void *lc_place_array(struct lc *c, const void *from, size_t size, uint32_t count
 
 /* --- sessions -------------------------------------------------------------------------------------------------------- */
 
-enum lc_ask { LC_ASK_ALL, LC_ASK_TWICE, LC_ASK_REVERSED, LC_ASK_SINGLY, LC_ASK_CONCURRENTLY };
-
-/* How a session asks. All zero, or NULL in the place of one: no host, all due blocks in one call, tight structs. */
-struct lc_manner {
-    const struct lull_host *host;
-    struct lc_layout layout;
-    enum lc_ask ask;
-    uint32_t slack;    /* bytes between the elements of arrays and after structs, filled with garbage */
-    int required_only; /* supply only the required planes */
-    int no_all;        /* view.all is NULL */
-    int nominal;       /* blocks of the size that the criterion was made for */
-    uint32_t frame_flags;
-    uint32_t seed;
-};
-
 struct lc_answer {
     uint32_t id;
     uint64_t spp;
@@ -264,8 +268,6 @@ struct lc_session {
 
 /* Makes an instance and begins the frame. Not 0 if that failed (which is reported). */
 int lc_session_open(struct lc_session *s, struct lc *c, const struct lc_manner *manner);
-/* The same with a film of the caller's choice (taken over). */
-int lc_session_open_film(struct lc_session *s, struct lc *c, const struct lc_manner *manner, struct lc_film *film);
 /* Begins the frame again (RESTART) with no samples and an empty log. */
 int lc_session_restart(struct lc_session *s);
 /* Adds samples to the blocks that have not stopped. Returns how many, their ids in ids[film.block_count]. */
@@ -273,11 +275,11 @@ uint32_t lc_session_advance(struct lc_session *s, uint32_t *ids);
 /* Adds samples, asks about the blocks that have not stopped, logs the answers. Not 0 if that failed (which is reported). */
 int lc_session_step(struct lc_session *s);
 int lc_session_steps(struct lc_session *s, int steps);
+void lc_session_image(struct lc_session *s, struct lc_image *image);
 /* Only the asking, by an image that is released then (NULL: that of the film): status of the call, answers into
  * decisions[film.block_count] by id; reports nothing but broken rules. */
 int32_t lc_session_ask(struct lc_session *s, struct lc_image *image, const uint32_t *ids, uint32_t count,
                        struct lull_decision *decisions, struct lull_error *err);
-void lc_session_image(struct lc_session *s, struct lc_image *image);
 /* The same about all blocks as they are, LC_FILM_BLOCKS at most. Returns whether there were answers, each held against the
  * header's rules; else "evaluate WHAT: …" is reported. */
 int lc_session_judge(struct lc_session *s, struct lc_image *image, struct lull_decision decisions[LC_FILM_BLOCKS],
@@ -291,8 +293,6 @@ int lc_run(struct lc *c, const struct lc_manner *manner, struct lc_log *log);
 int lc_run_as(struct lc *c, const struct lc_manner *manner, const struct lc_log *expected, int exact, const char *what);
 /* Two sessions, the second of which must be like the first, bit for bit. */
 void lc_run_both(struct lc *c, const struct lc_manner *a, const struct lc_manner *b, const char *what);
-/* A session with a film of the caller's choice (taken over). Not 0 if it cannot be opened (which is reported). */
-int lc_run_film(struct lc *c, struct lc_film *film);
 /* Reports the first difference as "what: …". exact: bit for bit; else the actions and, within 0.1 %, the numbers. */
 int lc_log_compare(struct lc *c, const struct lc_log *expected, const struct lc_log *got, int exact, const char *what);
 

@@ -84,7 +84,7 @@ void lc_check_out_of_memory(struct lc *c)
         return;
     }
     struct lc_film film;
-    lc_film_init_for(&film, c, 1, 0);
+    lc_film_init(&film, c, NULL);
     struct lull_frame frame;
     lc_film_frame(&film, &frame, c->planes);
     long k = 0;
@@ -142,10 +142,8 @@ void lc_check_time(struct lc *c)
     int flexible = (c->req.flags & LULL_REQ_FLEXIBLE) != 0;
     int32_t w = c->req.block_width > 0 ? (int32_t)c->req.block_width : 200;
     int32_t h = c->req.block_height > 0 ? (int32_t)c->req.block_height : 200;
-    struct lc_film film;
     struct lc_session s;
-    lc_film_init(&film, c, 2 * w, h, w, h, 1);
-    if (lc_session_open_film(&s, c, NULL, &film) != 0)
+    if (lc_session_open(&s, c, &(struct lc_manner){.size = {2 * w, h, w, h}}) != 0)
         return;
     lc_session_steps(&s, LC_STEPS);
     if (s.evaluated > 0)

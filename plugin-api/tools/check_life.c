@@ -52,7 +52,7 @@ void lc_check_order(struct lc *c)
     struct lc_session unopened = {.check = c, .instance = lc_create(c, NULL), .planes = c->planes, .open = 1};
     if (!unopened.instance)
         return;
-    lc_film_init_for(&unopened.film, c, 1, 0);
+    lc_film_init(&unopened.film, c, NULL);
     LC_EXPECT(c, evaluate_nothing(&unopened) == LULL_E_STATE, "evaluate before begin_frame is not refused");
     lc_session_close(&unopened); /* with the end of a frame that was never begun */
 
@@ -78,10 +78,13 @@ void lc_check_zero_blocks(struct lc *c)
 
 static void run_frame(struct lc *c, int32_t width, int32_t height, int32_t block_w, int32_t block_h)
 {
-    struct lc_film film;
-    lc_film_init(&film, c, width, height, block_w, block_h, 1);
-    if (lc_run_film(c, &film) != 0)
+    const struct lc_manner sized = {.size = {width, height, block_w, block_h}};
+    struct lc_session s;
+    if (lc_session_open(&s, c, &sized) == 0)
+        lc_session_steps(&s, LC_STEPS);
+    else
         lc_note(c, "that was a frame of %dx%d in blocks of %dx%d", width, height, block_w, block_h);
+    lc_session_close(&s);
 }
 
 void lc_check_shapes(struct lc *c)
@@ -107,9 +110,10 @@ void lc_check_block_size(struct lc *c)
     }
     struct lull_instance *instance = lc_create(c, NULL);
     struct lc_film film;
-    int32_t w = (int32_t)c->req.block_width, h = (int32_t)c->req.block_height;
+    const int32_t w = (int32_t)c->req.block_width, h = (int32_t)c->req.block_height;
+    const struct lc_manner larger = {.size = {2 * w + 10, 2 * h + 10, w + 5, h + 5}};
     if (instance) {
-        lc_film_init(&film, c, 2 * w + 10, 2 * h + 10, w + 5, h + 5, 1);
+        lc_film_init(&film, c, &larger);
         struct lull_frame frame;
         lc_film_frame(&film, &frame, c->planes);
         int32_t status = lc_begin(c, instance, &frame, NULL);

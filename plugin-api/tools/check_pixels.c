@@ -132,7 +132,7 @@ void lc_check_missing(struct lc *c)
     struct lc_film film;
     if (!instance)
         return;
-    lc_film_init_for(&film, c, 1, 0);
+    lc_film_init(&film, c, NULL);
     for (unsigned p = 0; p < LULL_PLANE_COUNT; p++) {
         if (!(c->req.planes_required & LULL_PLANE_BIT(p)))
             continue;
@@ -214,10 +214,8 @@ void lc_check_flat(struct lc *c)
 {
     static const struct lc_paint paints[] = {{0, 0, 0}, {0.5, 0.5, 0}, {0, 1, 1}}; /* black, constant, half black */
     for (size_t i = 0; i < COUNT(paints); i++) {
-        struct lc_film film;
-        lc_film_init_for(&film, c, 1, 0);
-        film.paint = &paints[i];
-        lc_run_film(c, &film);
+        struct lc_log log;
+        lc_run(c, &(struct lc_manner){.paint = &paints[i]}, &log);
     }
 }
 
@@ -241,14 +239,11 @@ static int grey_stops_at(struct lc *c, int fireflies)
 {
     static const struct lc_paint grey = {(double)GREY, (double)GREY, 0};
     struct lc_session s;
-    struct lc_film film;
     int step = 0, action = LULL_CONTINUE, sized = c->req.block_width > 0 && c->req.block_height > 0;
     const int32_t w = sized ? (int32_t)c->req.block_width : BLOCK_SIDE;
     const int32_t h = sized ? (int32_t)c->req.block_height : BLOCK_SIDE;
-    lc_film_init(&film, c, w, h, w, h, 1);
-    if (lc_session_open_film(&s, c, NULL, &film) != 0)
+    if (lc_session_open(&s, c, &(struct lc_manner){.size = {w, h, w, h}, .paint = &grey}) != 0)
         return 0;
-    s.film.paint = &grey;
     for (; step < LC_STEPS && action == LULL_CONTINUE; step += action == LULL_CONTINUE, s.spp *= 2) {
         struct lc_image image;
         struct lull_decision d[LC_FILM_BLOCKS];

@@ -45,7 +45,7 @@ static void open_frame(struct life *l)
     struct lc *c = l->check;
     struct lc_film film;
     struct lull_frame frame;
-    lc_film_init_for(&film, c, 1, 0);
+    lc_film_init(&film, c, NULL);
     for (uint32_t i = 0; i < film.block_count; i++)
         lc_film_advance(&film, i, c->req.first_spp + c->req.first_spp % 2 + 2);
     lc_film_frame(&film, &frame, c->planes);

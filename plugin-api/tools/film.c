@@ -15,11 +15,18 @@ const uint32_t lc_plane_channels[LULL_PLANE_COUNT] = {3, 1, 1, 1, 3, 3, 3, 1};
 const char *const lc_plane_names[LULL_PLANE_COUNT] = {"COLOR", "WEIGHT", "SPP",    "MOMENT2",
                                                       "HALF",  "ALBEDO", "NORMAL", "DEPTH"};
 
-void lc_film_init(struct lc_film *f, struct lc *c, int32_t width, int32_t height, int32_t block_w, int32_t block_h,
-                  uint32_t seed)
+void lc_film_init(struct lc_film *f, struct lc *c, const struct lc_manner *manner)
 {
-    int32_t columns = (width + block_w - 1) / block_w, rows = (height + block_h - 1) / block_h;
-    *f = (struct lc_film){.width = width, .height = height, .seed = seed, .block_count = (uint32_t)(columns * rows)};
+    const struct lc_manner plain = {0}, *m = manner ? manner : &plain;
+    const struct lull_requirements *req = &c->req;
+    const int own_size = m->nominal || !(req->flags & LULL_REQ_FLEXIBLE), sized = m->size.width > 0;
+    const int32_t nominal_w = req->block_width > 0 && own_size ? (int32_t)req->block_width : 24;
+    const int32_t nominal_h = req->block_height > 0 && own_size ? (int32_t)req->block_height : 16;
+    const int32_t block_w = sized ? m->size.block_width : nominal_w, block_h = sized ? m->size.block_height : nominal_h;
+    const int32_t width = sized ? m->size.width : 2 * block_w + 1, height = sized ? m->size.height : block_h + 1;
+    const int32_t columns = (width + block_w - 1) / block_w, rows = (height + block_h - 1) / block_h;
+    *f = (struct lc_film){
+        .width = width, .height = height, .seed = 1 + m->seed, .block_count = (uint32_t)(columns * rows), .paint = m->paint};
     for (unsigned p = 0; p < LULL_PLANE_COUNT; p++)
         f->sum[p] = lc_need(c, calloc((size_t)width * (size_t)height * lc_plane_channels[p], sizeof(double)));
     for (int32_t i = 0; i < columns * rows; i++) {
@@ -29,15 +36,6 @@ void lc_film_init(struct lc_film *f, struct lc *c, int32_t width, int32_t height
         f->blocks[i] =
             (struct lull_block){.id = (uint32_t)i, .x0 = x0, .y0 = y0, .x1 = x1, .y1 = y1, .thread_s = (double)NAN};
     }
-}
-
-void lc_film_init_for(struct lc_film *f, struct lc *c, uint32_t seed, int nominal)
-{
-    const struct lull_requirements *req = &c->req;
-    int own_size = nominal || !(req->flags & LULL_REQ_FLEXIBLE);
-    int32_t w = req->block_width > 0 && own_size ? (int32_t)req->block_width : 24;
-    int32_t h = req->block_height > 0 && own_size ? (int32_t)req->block_height : 16;
-    lc_film_init(f, c, 2 * w + 1, h + 1, w, h, seed);
 }
 
 void lc_film_release(struct lc_film *f)

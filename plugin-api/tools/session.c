@@ -265,12 +265,12 @@ static int begin(struct lc_session *s, uint32_t flags)
     return 0;
 }
 
-int lc_session_open_film(struct lc_session *s, struct lc *c, const struct lc_manner *manner, struct lc_film *film)
+int lc_session_open(struct lc_session *s, struct lc *c, const struct lc_manner *manner)
 {
-    *s = (struct lc_session){.check = c, .film = *film};
+    *s = (struct lc_session){.check = c};
     if (manner)
         s->manner = *manner;
-    *film = (struct lc_film){0};
+    lc_film_init(&s->film, c, &s->manner);
     s->planes = s->manner.required_only ? c->req.planes_required : c->planes;
     s->instance = lc_create(c, s->manner.host);
     if (s->instance && begin(s, 0) == 0)
@@ -279,18 +279,10 @@ int lc_session_open_film(struct lc_session *s, struct lc *c, const struct lc_man
     return -1;
 }
 
-int lc_session_open(struct lc_session *s, struct lc *c, const struct lc_manner *manner)
-{
-    struct lc_film film;
-    lc_film_init_for(&film, c, manner ? 1 + manner->seed : 1, manner && manner->nominal);
-    return lc_session_open_film(s, c, manner, &film);
-}
-
 int lc_session_restart(struct lc_session *s)
 {
-    const uint32_t seed = s->film.seed;
     lc_film_release(&s->film);
-    lc_film_init_for(&s->film, s->check, seed, s->manner.nominal);
+    lc_film_init(&s->film, s->check, &s->manner);
     return begin(s, LULL_FRAME_RESTART);
 }
 
@@ -379,16 +371,6 @@ int lc_run(struct lc *c, const struct lc_manner *manner, struct lc_log *log)
     *log = s.log;
     lc_session_close(&s);
     return result;
-}
-
-int lc_run_film(struct lc *c, struct lc_film *film)
-{
-    struct lc_session s;
-    if (lc_session_open_film(&s, c, NULL, film) != 0)
-        return -1;
-    lc_session_steps(&s, LC_STEPS);
-    lc_session_close(&s);
-    return 0;
 }
 
 int lc_run_as(struct lc *c, const struct lc_manner *manner, const struct lc_log *expected, int exact, const char *what)
