@@ -185,21 +185,14 @@ struct totals {
 static void print_report(const struct arguments *a, struct totals *t, const char *name, const char *title,
                          const struct lc_report *r)
 {
+    const int bad = r->failures > 0, shown = bad || !a->quiet;
     t->checks++;
-    t->failed += r->failures > 0;
-    if (r->failures > 0)
-        printf("not ok %d - %s: %s\n", t->checks, name, title);
-    else if (!a->quiet)
-        printf("ok %d - %s: %s", t->checks, name, title);
-    for (unsigned i = 0; i < r->line_count; i++) {
-        if (r->failures > 0)
-            printf("#   %s\n", r->lines[i]);
-        else if (!a->quiet && r->kind[i] == 'S')
-            printf(" # SKIP %s", r->lines[i]);
-        else if (!a->quiet)
-            printf(" (%s)", r->lines[i]);
-    }
-    if (r->failures == 0 && !a->quiet)
+    t->failed += bad;
+    if (shown)
+        printf("%sok %d - %s: %s", bad ? "not " : "", t->checks, name, title);
+    for (unsigned i = 0; i < r->line_count && shown; i++)
+        printf(bad ? "\n#   %s" : r->kind[i] == 'S' ? " # SKIP %s" : " (%s)", r->lines[i]);
+    if (shown)
         putchar('\n');
     if (r->lines_left_out > 0)
         printf("#   and %u more\n", r->lines_left_out);

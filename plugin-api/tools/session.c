@@ -5,6 +5,7 @@
 #include "check.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -57,25 +58,20 @@ void lc_decision_preset(struct lull_decision *d)
 void lc_decision_check(struct lc *c, const struct lull_block *b, const struct lull_decision *d)
 {
     const uint32_t known = LULL_DECISION_TOO_EARLY | LULL_DECISION_BAD_INPUT;
-    unsigned id = b->id;
-    unsigned long long spp = b->spp;
-    LC_EXPECT(c, d->action == LULL_CONTINUE || d->action == LULL_STOP, "block %u at %llu spp: unknown action %d", id, spp,
-              d->action);
-    LC_EXPECT(c, (d->flags & ~known) == 0, "block %u at %llu spp: unknown decision flags %#x", id, spp, d->flags);
-    if (d->action == LULL_CONTINUE)
-        LC_EXPECT(c, d->next_spp == 0 || d->next_spp > b->spp, "block %u at %llu spp: next_spp %llu is not later", id, spp,
-                  (unsigned long long)d->next_spp);
-    LC_EXPECT(c, isnan(d->p_noisy) || (d->p_noisy >= 0 && d->p_noisy <= 1), "block %u at %llu spp: p_noisy is %g", id, spp,
-              d->p_noisy);
-    LC_EXPECT(c, isnan(d->error) || (d->error >= 0 && isfinite(d->error)), "block %u at %llu spp: error is %g", id, spp,
-              d->error);
-    LC_EXPECT(c, isnan(d->predicted_spp) || (d->predicted_spp >= 0 && isfinite(d->predicted_spp)),
-              "block %u at %llu spp: predicted_spp is %g", id, spp, d->predicted_spp);
-    LC_EXPECT(c, b->spp > 0 || d->action == LULL_CONTINUE, "block %u is stopped without any sample", id);
-    LC_EXPECT(c, d->action == LULL_CONTINUE || !(d->flags & LULL_DECISION_TOO_EARLY),
-              "block %u at %llu spp: stopped, although too early to say", id, spp);
-    LC_EXPECT(c, b->spp >= c->req.first_spp || d->action == LULL_CONTINUE,
-              "block %u is stopped at %llu spp, before first_spp", id, spp);
+    const int continues = d->action == LULL_CONTINUE;
+    const unsigned long long spp = b->spp, next = d->next_spp;
+    const double predicted = d->predicted_spp;
+    char at[64];
+    snprintf(at, sizeof at, "block %u at %llu spp", b->id, spp);
+    LC_EXPECT(c, continues || d->action == LULL_STOP, "%s: unknown action %d", at, d->action);
+    LC_EXPECT(c, (d->flags & ~known) == 0, "%s: unknown decision flags %#x", at, d->flags);
+    LC_EXPECT(c, !continues || next == 0 || next > spp, "%s: next_spp %llu is not later", at, next);
+    LC_EXPECT(c, isnan(d->p_noisy) || (d->p_noisy >= 0 && d->p_noisy <= 1), "%s: p_noisy is %g", at, d->p_noisy);
+    LC_EXPECT(c, isnan(d->error) || (d->error >= 0 && isfinite(d->error)), "%s: error is %g", at, d->error);
+    LC_EXPECT(c, isnan(predicted) || (predicted >= 0 && isfinite(predicted)), "%s: predicted_spp is %g", at, predicted);
+    LC_EXPECT(c, spp > 0 || continues, "block %u is stopped without any sample", b->id);
+    LC_EXPECT(c, continues || !(d->flags & LULL_DECISION_TOO_EARLY), "%s: stopped, although too early to say", at);
+    LC_EXPECT(c, spp >= c->req.first_spp || continues, "block %u is stopped at %llu spp, before first_spp", b->id, spp);
 }
 
 static int same_number(double a, double b, int exact)
