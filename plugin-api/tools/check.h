@@ -59,9 +59,9 @@ void *lc_need(struct lc *c, void *memory);
 /* What comes now, for the report if the process does not survive it. Not thread safe. */
 __attribute__((format(printf, 2, 3))) void lc_doing(struct lc *c, const char *format, ...);
 
-/* Forks; the child calls fn(c, arg), the parent waits, at most limit_s, and fills *report. What the child prints, or a signal
- * that ends it, is a failure; what lc_doing said last is then noted. Returns 0, or -1 if no process could be made. Not thread
- * safe. */
+/* Forks; the child calls fn(c, arg), the parent waits, at most limit_s, and fills *report. What the child prints, or a
+ * signal that ends it, is a failure; what lc_doing said last is then noted. Returns 0, or -1 if no process could be made.
+ * Not thread safe. */
 int lc_child_run(struct lc *c, void (*fn)(struct lc *c, const void *arg), const void *arg, unsigned limit_s,
                  struct lc_report *report);
 
@@ -131,8 +131,8 @@ struct lc_host {
     atomic_uchar taken[LC_WORKERS_MAX]; /* which worker numbers are */
 };
 
-/* fn for each of `count` arguments of `size` bytes, at the same time: the first in the caller's thread, each other in one of its
- * own if there is one. LC_WORKERS_MAX at most. */
+/* fn for each of `count` arguments of `size` bytes, at the same time: the first in the caller's thread, each other in one of
+ * its own if there is one. LC_WORKERS_MAX at most. */
 void lc_at_once(void *(*fn)(void *arg), void *args, size_t size, uint32_t count);
 
 /* max_workers is 2 * threads, so that two evaluate calls may each run `threads` tasks. */
@@ -163,8 +163,8 @@ struct lc_layout {
 
 enum lc_ask { LC_ASK_ALL, LC_ASK_TWICE, LC_ASK_REVERSED, LC_ASK_SINGLY, LC_ASK_CONCURRENTLY };
 
-/* How a session asks, and about which film. All zero, or NULL in the place of one: no host, all due blocks in one call, tight
- * structs, the frame that suits the criterion. */
+/* How a session asks, and about which film. All zero, or NULL in the place of one: no host, all due blocks in one call,
+ * tight structs, the frame that suits the criterion. */
 struct lc_manner {
     const struct lull_host *host;
     struct lc_layout layout;
@@ -211,7 +211,7 @@ struct lc_image {
     struct lull_view view;
     char *descriptors;                /* owns */
     void *memory[LULL_PLANE_COUNT];   /* owns */
-    size_t guarded[LULL_PLANE_COUNT]; /* bytes if from lc_guard_alloc, else 0 */
+    size_t guarded[LULL_PLANE_COUNT]; /* bytes, if it lies between pages that cannot be read; else 0 */
 };
 
 /* Stores the film's planes of the mask. Overwrites *image, which needs lc_image_release afterwards. */
@@ -226,12 +226,9 @@ void lc_image_poke(struct lc_image *image, int32_t x, int32_t y, float value);
 
 /* --- guarded memory ---------------------------------------------------------------------------------------------------- */
 
-/* Memory that ends right before a page that cannot be touched; size bytes, zeroed. */
-void *lc_guard_alloc(struct lc *c, size_t size);
-void lc_guard_free(void *memory, size_t size);
-
-/* Such memory for what calls are given, until the process ends: a copy of so many bytes (NULL: garbage), eight at least.
- * There are ten pieces in turn; no call of the random ones, and no life with short structs, is given as many things. */
+/* Memory for what calls are given, right before a page that cannot be touched: a copy of so many bytes (NULL: garbage),
+ * eight at least. There are ten pieces in turn; no call of the random ones, and no life with short structs, is given as many
+ * things. */
 void *lc_place(struct lc *c, const void *from, size_t size);
 /* The same of a struct, which says that it has so many bytes. */
 void *lc_place_struct(struct lc *c, const void *from, size_t size);

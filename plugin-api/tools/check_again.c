@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
  *
- * The same questions put in other ways: once more, in another order, to other instances, by the host's workers, in concurrent
- * calls, with another floating-point environment. Run a TSan build of lull-check and of the criterion to find races, not only
- * their results.
+ * The same questions put in other ways: once more, in another order, to other instances, by the host's workers, in
+ * concurrent calls, with another floating-point environment. Run a TSan build of lull-check and of the criterion to find
+ * races, not only their results.
  */
 #include "check.h"
 

@@ -2,11 +2,14 @@
  *
  * Made-up renders: a gradient with noise, and its storage in every form the ABI allows.
  */
+#define _DEFAULT_SOURCE 1 /* MAP_ANONYMOUS */
 #include "check.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include "base/colour.h"
 #include "base/half.h"
@@ -143,6 +146,58 @@ void lc_film_frame(const struct lc_film *f, struct lull_frame *frame, uint32_t p
     };
 }
 
+static size_t page_size(void) { return (size_t)sysconf(_SC_PAGESIZE); }
+
+/* Whole pages for so many bytes. */
+static size_t pages_of(size_t size) { return (size + page_size() - 1) / page_size() * page_size(); }
+
+/* Memory that ends right before a page that cannot be touched; zeroed. */
+static void *guard_alloc(struct lc *c, size_t size)
+{
+    const size_t page = page_size(), inner = pages_of(size);
+    char *base = mmap(NULL, inner + 2 * page, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (base == MAP_FAILED || mprotect(base + page, inner, PROT_READ | PROT_WRITE) != 0)
+        lc_need(c, NULL);
+    return base + page + inner - size;
+}
+
+static void guard_free(void *memory, size_t size)
+{
+    const size_t page = page_size(), inner = pages_of(size);
+    munmap((char *)memory + size - inner - page, inner + 2 * page);
+}
+
+void *lc_place(struct lc *c, const void *from, size_t size)
+{
+    enum { PIECES = 10, PIECE_SIZE = 8192 };
+    static char *pieces[PIECES];
+    static unsigned next;
+    char **piece = &pieces[next++ % PIECES];
+    *piece = *piece ? *piece : guard_alloc(c, PIECE_SIZE);
+    size_t room = size < 8 ? 8 : (size + 7) / 8 * 8;
+    char *at = *piece + PIECE_SIZE - room;
+    memset(at, 0xa5, room);
+    if (from && size > 0)
+        memcpy(at, from, size);
+    return at;
+}
+
+void *lc_place_struct(struct lc *c, const void *from, size_t size)
+{
+    uint32_t struct_size = (uint32_t)size;
+    void *at = lc_place(c, from, size);
+    memcpy(at, &struct_size, sizeof struct_size);
+    return at;
+}
+
+void *lc_place_array(struct lc *c, const void *from, size_t size, uint32_t count, uint32_t stride)
+{
+    char *at = lc_place(c, NULL, (size_t)count * stride);
+    for (uint32_t i = 0; i < count && stride >= size; i++)
+        memcpy(at + (size_t)i * stride, (const char *)from + i * size, size);
+    return at;
+}
+
 static size_t type_size(int32_t type) { return type == LULL_TYPE_F64 ? 8 : type == LULL_TYPE_F16 ? 2 : 4; }
 
 static void store(char *at, int32_t type, double v)
@@ -206,7 +261,7 @@ static void build_plane(struct lc_image *image, struct lc *c, const struct lc_fi
     int64_t size = (int64_t)type_size(l.type), channels = lc_plane_channels[plane] + (l.padded ? 1 : 0);
     int64_t pixels = (int64_t)f->width * f->height;
     size_t bytes = (size_t)(size * channels * pixels);
-    char *memory = l.guard ? lc_guard_alloc(c, bytes) : lc_need(c, malloc(bytes));
+    char *memory = l.guard ? guard_alloc(c, bytes) : lc_need(c, malloc(bytes));
     image->memory[plane] = memory;
     image->guarded[plane] = l.guard ? bytes : 0;
     struct lull_plane *p = lc_image_plane(image, plane);
@@ -260,7 +315,7 @@ void lc_image_release(struct lc_image *image)
 {
     for (unsigned p = 0; p < LULL_PLANE_COUNT; p++)
         if (image->guarded[p] > 0)
-            lc_guard_free(image->memory[p], image->guarded[p]);
+            guard_free(image->memory[p], image->guarded[p]);
         else
             free(image->memory[p]);
     free(image->descriptors);
