@@ -16,12 +16,13 @@
 
 /* --- a check and its world ------------------------------------------------------------------------------------------- */
 
+enum { LC_PAIRS_MAX = 64 };
 enum { LC_EXIT_OK = 0, LC_EXIT_FAILED = 1, LC_EXIT_USAGE = 2 };
 
 struct lc {
     const char *path;                       /* the library */
     const struct lull_criterion *criterion; /* the one under test */
-    const struct lull_pair *pairs;          /* of the command line, given to every create */
+    struct lull_pair pairs[LC_PAIRS_MAX];   /* of the command line, given to every create */
     uint32_t pair_count;
     struct lull_requirements req; /* of an instance made with them */
     int required_only;            /* frames supply no more planes than it requires */

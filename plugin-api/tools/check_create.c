@@ -12,11 +12,9 @@
 /* Creates with the command line's parameters and one more, and destroys. */
 static int32_t try_pair(struct lc *c, const char *key, const char *value, struct lull_error *err)
 {
-    enum { MOST = 64 };
-    struct lull_pair pairs[MOST + 1];
-    uint32_t count = c->pair_count < MOST ? c->pair_count : MOST;
-    for (uint32_t i = 0; i < count; i++)
-        pairs[i] = c->pairs[i];
+    struct lull_pair pairs[LC_PAIRS_MAX + 1];
+    uint32_t count = c->pair_count;
+    memcpy(pairs, c->pairs, sizeof c->pairs);
     pairs[count++] = (struct lull_pair){key, value};
     struct lull_instance *const untouched = (struct lull_instance *)(void *)&pairs;
     struct lull_instance *instance = untouched;

@@ -11,7 +11,7 @@
 #include "base/interrupt.h"
 #include "base/options.h"
 
-enum { PAIRS_MAX = 64, SPECS_MAX = 256 };
+enum { SPECS_MAX = 256 };
 
 #define ROW(function, name, title) {name, title, lc_check_##function},
 static const struct {
@@ -22,13 +22,13 @@ enum { CHECKS = sizeof checks / sizeof *checks };
 
 struct arguments {
     struct lc lc; /* what the checks get */
-    struct lull_pair pairs[PAIRS_MAX];
     int only_some;
     char only[CHECKS]; /* which */
     const char *specs[SPECS_MAX];
     int spec_count;
     unsigned limit_s;
     int quiet, list;
+    int checks, failed; /* so far */
 };
 
 static int add_only(void *into, const char *name, struct base_err *err)
@@ -50,10 +50,10 @@ static int add_pair(void *into, const char *text, struct base_err *err)
     char *equals = strchr(text, '=');
     if (!equals || equals == text)
         return base_fail(err, BASE_EINVAL, "expected KEY=VALUE");
-    if (a->lc.pair_count == PAIRS_MAX)
-        return base_fail(err, BASE_EINVAL, "more than %d parameters", PAIRS_MAX);
+    if (a->lc.pair_count == LC_PAIRS_MAX)
+        return base_fail(err, BASE_EINVAL, "more than %d parameters", LC_PAIRS_MAX);
     *equals++ = '\0';
-    a->pairs[a->lc.pair_count++] = (struct lull_pair){text, equals};
+    a->lc.pairs[a->lc.pair_count++] = (struct lull_pair){text, equals};
     return 0;
 }
 
@@ -178,18 +178,13 @@ static void run_task(struct lc *c, const void *arg)
     checks[task->check].run(c);
 }
 
-struct totals {
-    int checks, failed;
-};
-
-static void print_report(const struct arguments *a, struct totals *t, const char *name, const char *title,
-                         const struct lc_report *r)
+static void print_report(struct arguments *a, const char *name, const char *title, const struct lc_report *r)
 {
     const int bad = r->failures > 0, shown = bad || !a->quiet;
-    t->checks++;
-    t->failed += bad;
+    a->checks++;
+    a->failed += bad;
     if (shown)
-        printf("%sok %d - %s: %s", bad ? "not " : "", t->checks, name, title);
+        printf("%sok %d - %s: %s", bad ? "not " : "", a->checks, name, title);
     for (unsigned i = 0; i < r->line_count && shown; i++)
         printf(bad ? "\n#   %s" : r->kind[i] == 'S' ? " # SKIP %s" : " (%s)", r->lines[i]);
     if (shown)
@@ -205,7 +200,7 @@ static int no_process(void)
     return LC_EXIT_FAILED;
 }
 
-static int check_criterion(const struct arguments *a, struct lc *c, const char *id, struct totals *t)
+static int check_criterion(struct arguments *a, struct lc *c, const char *id)
 {
     static struct lc_report made, r;
     struct task task = {id, CHECKS};
@@ -219,19 +214,19 @@ static int check_criterion(const struct arguments *a, struct lc *c, const char *
         printf("# %s:%s\n", c->path, id);
     for (task.check = 0; task.check < CHECKS; task.check++) {
         if (task.check == LC_WITHOUT_INSTANCE && (made.failures > 0 || made.skipped)) {
-            print_report(a, t, "create", "an instance can be made", &made);
+            print_report(a, "create", "an instance can be made", &made);
             break;
         }
         if (a->only_some && !a->only[task.check])
             continue;
         if (lc_child_run(c, run_task, &task, a->limit_s, &r) != 0)
             return no_process();
-        print_report(a, t, checks[task.check].name, checks[task.check].title, &r);
+        print_report(a, checks[task.check].name, checks[task.check].title, &r);
     }
     return LC_EXIT_OK;
 }
 
-static int check_spec(const struct arguments *a, const char *spec, struct totals *t)
+static int check_spec(struct arguments *a, const char *spec)
 {
     static struct lc_report r;
     struct lc c = a->lc;
@@ -245,12 +240,12 @@ static int check_spec(const struct arguments *a, const char *spec, struct totals
     if (r.failures > 0) {
         if (!a->quiet)
             printf("# %s\n", spec);
-        print_report(a, t, "find", "the library can be loaded and its tables read", &r);
+        print_report(a, "find", "the library can be loaded and its tables read", &r);
         return LC_EXIT_OK;
     }
     c.path = r.lines[0];
     for (unsigned i = 1; i < r.line_count && status == LC_EXIT_OK; i++)
-        status = check_criterion(a, &c, r.lines[i], t);
+        status = check_criterion(a, &c, r.lines[i]);
     return status;
 }
 
@@ -265,7 +260,7 @@ static int finish(int status)
 
 int main(int argc, char **argv)
 {
-    static struct arguments a = {.lc = {.pairs = a.pairs, .workers = 4, .misuse = 2000, .seed = 1}, .limit_s = 120};
+    static struct arguments a = {.lc = {.workers = 4, .misuse = 2000, .seed = 1}, .limit_s = 120};
     struct base_err err = {0};
     base_interrupt_begin();
     if (!base_options_parse(&options, argc, argv, &a, &err) && a.spec_count == 0 && !a.list)
@@ -279,12 +274,11 @@ int main(int argc, char **argv)
             printf("%-20s %s\n", checks[k].name, checks[k].title);
         return finish(LC_EXIT_OK);
     }
-    struct totals t = {0};
     for (int i = 0; i < a.spec_count; i++) {
-        int status = check_spec(&a, a.specs[i], &t);
+        int status = check_spec(&a, a.specs[i]);
         if (status != LC_EXIT_OK)
             return status;
     }
-    printf("1..%d\n# %d checks, %d failed\n", t.checks, t.checks, t.failed);
-    return finish(t.failed > 0 ? LC_EXIT_FAILED : LC_EXIT_OK);
+    printf("1..%d\n# %d checks, %d failed\n", a.checks, a.checks, a.failed);
+    return finish(a.failed > 0 ? LC_EXIT_FAILED : LC_EXIT_OK);
 }
