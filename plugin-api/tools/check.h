@@ -69,8 +69,8 @@ int lc_child_run(struct lc *c, void (*fn)(struct lc *c, const void *arg), const 
 #define LC_EXPECT(c, condition, ...) ((condition) ? 1 : (lc_fail((c), __VA_ARGS__), 0))
 
 /* Every check in the order of the report: lc_check_FUNCTION, its name, what it holds a criterion to. The first
- * LC_WITHOUT_INSTANCE need none. */
-#define LC_CHECKS(X) \
+ * LC_WITHOUT_INSTANCE need none; those IN a session are given an open one, and may close it. */
+#define LC_CHECKS(X, IN) \
     X(symbols, "symbols", "exports the entry and nothing else") \
     X(load, "load", "loading leaves floating point, threads and signals alone") \
     X(entry, "entry", "the entry ends its list with NULL, also far out") \
@@ -85,20 +85,20 @@ int lc_child_run(struct lc *c, void (*fn)(struct lc *c, const void *arg), const 
     X(strides, "strides", "negative, interleaved and planar strides give the same answers") \
     X(types, "types", "f16, f64, u32 and scaled values give the same answers") \
     X(normalisers, "normalisers", "sums and weighted sums give the same answers") \
-    X(window, "window", "a view that does not begin at the origin") \
+    IN(window, "window", "a view that does not begin at the origin") \
     X(missing, "missing-planes", "required planes are missed, others are not") \
     X(broken_planes, "broken-planes", "planes of an unknown form are refused") \
     X(values, "bad-values", "NaN, infinite, negative and huge pixels") \
     X(flat, "flat", "black, constant and half black blocks") \
     X(firefly, "firefly", "a block is not stopped while a pixel hangs on one sample") \
     X(no_samples, "no-samples", "blocks without samples continue") \
-    X(order, "order", "calls out of order are refused and do no harm") \
-    X(zero_blocks, "zero-blocks", "no blocks to judge") \
+    IN(order, "order", "calls out of order are refused and do no harm") \
+    IN(zero_blocks, "zero-blocks", "no blocks to judge") \
     X(shapes, "shapes", "1x1 frames, 1x1 blocks, blocks at the edge") \
     X(block_size, "block-size", "blocks of another size") \
-    X(invalid, "invalid", "senseless frames and blocks are refused and do no harm") \
-    X(restart, "restart", "RESTART forgets") \
-    X(final, "final", "blocks that get no more samples") \
+    IN(invalid, "invalid", "senseless frames and blocks are refused and do no harm") \
+    IN(restart, "restart", "RESTART forgets") \
+    IN(final, "final", "blocks that get no more samples") \
     X(cancel, "cancel", "cancelled calls do no harm") \
     X(repeat, "repeat", "the same question gets the same answer and leaves no trace") \
     X(batch, "batch", "an answer does not depend on the blocks beside it") \
@@ -111,12 +111,14 @@ int lc_child_run(struct lc *c, void (*fn)(struct lc *c, const void *arg), const 
     X(misuse, "misuse", "random calls outside the rules are refused and leave no trace") \
     X(leaks, "leaks", "create and destroy, frames, failures: what is left does not grow with their number") \
     X(out_of_memory, "out-of-memory", "create and begin_frame survive every failing allocation") \
-    X(evaluate_allocates, "evaluate-allocates", "evaluate allocates nothing") \
+    IN(evaluate_allocates, "evaluate-allocates", "evaluate allocates nothing") \
     X(time, "time", "time per block")
 enum { LC_WITHOUT_INSTANCE = 4 };
 
+struct lc_session;
 #define LC_DECLARE(function, name, title) void lc_check_##function(struct lc *c);
-LC_CHECKS(LC_DECLARE)
+#define LC_DECLARE_IN(function, name, title) void lc_check_##function(struct lc *c, struct lc_session *s);
+LC_CHECKS(LC_DECLARE, LC_DECLARE_IN)
 
 /* --- host -------------------------------------------------------------------------------------------------------------- */
 

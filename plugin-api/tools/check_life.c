@@ -34,20 +34,17 @@ static int32_t evaluate_nothing(struct lc_session *s)
     return status;
 }
 
-void lc_check_order(struct lc *c)
+void lc_check_order(struct lc *c, struct lc_session *s)
 {
-    struct lc_session s;
-    if (lc_session_open(&s, c, NULL) != 0)
-        return;
     struct lull_frame frame;
-    lc_film_frame(&s.film, &frame, s.planes);
-    LC_EXPECT(c, c->criterion->begin_frame(s.instance, &frame, NULL) == LULL_E_STATE,
+    lc_film_frame(&s->film, &frame, s->planes);
+    LC_EXPECT(c, c->criterion->begin_frame(s->instance, &frame, NULL) == LULL_E_STATE,
               "begin_frame while a frame is open, without RESTART, is not refused");
-    c->criterion->end_frame(s.instance);
-    LC_EXPECT(c, evaluate_nothing(&s) == LULL_E_STATE, "evaluate after end_frame is not refused");
-    c->criterion->end_frame(s.instance);
-    LC_EXPECT(c, lc_begin(c, s.instance, &frame, NULL) == LULL_OK, "a second frame cannot be begun");
-    finish_and_compare(c, &s, "second frame against a first");
+    c->criterion->end_frame(s->instance);
+    LC_EXPECT(c, evaluate_nothing(s) == LULL_E_STATE, "evaluate after end_frame is not refused");
+    c->criterion->end_frame(s->instance);
+    LC_EXPECT(c, lc_begin(c, s->instance, &frame, NULL) == LULL_OK, "a second frame cannot be begun");
+    finish_and_compare(c, s, "second frame against a first");
 
     struct lc_session unopened = {.check = c, .instance = lc_create(c, NULL), .planes = c->planes, .open = 1};
     if (!unopened.instance)
@@ -64,16 +61,13 @@ void lc_check_order(struct lc *c)
     }
 }
 
-void lc_check_zero_blocks(struct lc *c)
+void lc_check_zero_blocks(struct lc *c, struct lc_session *s)
 {
-    struct lc_session s;
-    if (lc_session_open(&s, c, NULL) != 0)
-        return;
     for (int i = 0; i < 3; i++) {
-        LC_EXPECT(c, evaluate_nothing(&s) == LULL_OK, "evaluate of no block fails");
-        lc_session_step(&s);
+        LC_EXPECT(c, evaluate_nothing(s) == LULL_OK, "evaluate of no block fails");
+        lc_session_step(s);
     }
-    finish_and_compare(c, &s, "empty calls in between");
+    finish_and_compare(c, s, "empty calls in between");
 }
 
 static void run_frame(struct lc *c, int32_t width, int32_t height, int32_t block_w, int32_t block_h)
@@ -124,52 +118,44 @@ void lc_check_block_size(struct lc *c)
 }
 
 /* Frames and calls that make no sense, in the middle of a good session. */
-void lc_check_invalid(struct lc *c)
+void lc_check_invalid(struct lc *c, struct lc_session *s)
 {
-    struct lc_session s;
-    if (lc_session_open(&s, c, NULL) != 0)
-        return;
-    lc_session_steps(&s, 2);
+    lc_session_steps(s, 2);
     struct lull_frame good, bad;
-    lc_film_frame(&s.film, &good, s.planes);
+    lc_film_frame(&s->film, &good, s->planes);
     good.flags |= LULL_FRAME_RESTART;
     bad = good, bad.blocks = NULL, bad.block_count = 0;
-    LC_EXPECT(c, lc_begin(c, s.instance, &bad, NULL) == LULL_E_INVALID, "a frame without blocks is not refused");
+    LC_EXPECT(c, lc_begin(c, s->instance, &bad, NULL) == LULL_E_INVALID, "a frame without blocks is not refused");
     bad = good, bad.blocks = NULL;
-    LC_EXPECT(c, lc_begin(c, s.instance, &bad, NULL) == LULL_E_INVALID, "blocks at NULL are not refused");
+    LC_EXPECT(c, lc_begin(c, s->instance, &bad, NULL) == LULL_E_INVALID, "blocks at NULL are not refused");
     struct lull_error err = {.struct_size = sizeof err};
-    if (s.film.block_count > 0 && c->req.planes_required != 0) {
+    if (s->film.block_count > 0 && c->req.planes_required != 0) {
         bad = good, bad.planes = 0;
-        LC_EXPECT(c, lc_begin(c, s.instance, &bad, &err) == LULL_E_PLANE, "a frame without planes is not refused");
+        LC_EXPECT(c, lc_begin(c, s->instance, &bad, &err) == LULL_E_PLANE, "a frame without planes is not refused");
         LC_EXPECT(c, err.code == LULL_E_PLANE && err.message[0] != '\0', "a refused frame leaves no message");
     }
-    LC_EXPECT(c, c->criterion->begin_frame(s.instance, NULL, NULL) == LULL_E_INVALID, "a NULL frame is not refused");
+    LC_EXPECT(c, c->criterion->begin_frame(s->instance, NULL, NULL) == LULL_E_INVALID, "a NULL frame is not refused");
 
     struct lc_image image;
-    lc_session_image(&s, &image);
-    struct lull_block block = s.film.blocks[0];
-    block.id = s.film.block_count;
-    int32_t status = evaluate(&s, &image.view, &block);
+    lc_session_image(s, &image);
+    struct lull_block block = s->film.blocks[0];
+    block.id = s->film.block_count;
+    int32_t status = evaluate(s, &image.view, &block);
     LC_EXPECT(c, status == LULL_E_INVALID, "a block that is not in the frame: %d", status);
     block.id = UINT32_MAX;
-    status = evaluate(&s, &image.view, &block);
+    status = evaluate(s, &image.view, &block);
     LC_EXPECT(c, status == LULL_E_INVALID, "block 4294967295: %d", status);
-    status = evaluate(&s, NULL, s.film.blocks);
+    status = evaluate(s, NULL, s->film.blocks);
     LC_EXPECT(c, status == LULL_E_INVALID, "a NULL view: %d", status);
     lc_image_release(&image);
-    finish_and_compare(c, &s, "after refused calls");
+    finish_and_compare(c, s, "after refused calls");
 }
 
-void lc_check_restart(struct lc *c)
+void lc_check_restart(struct lc *c, struct lc_session *s)
 {
-    struct lc_session s;
-    if (lc_session_open(&s, c, NULL) != 0)
-        return;
-    lc_session_steps(&s, 3);
-    if (lc_session_restart(&s) == 0)
-        finish_and_compare(c, &s, "after RESTART");
-    else
-        lc_session_close(&s);
+    lc_session_steps(s, 3);
+    if (lc_session_restart(s) == 0)
+        finish_and_compare(c, s, "after RESTART");
 
     /* RESTART on an instance without an open frame is a plain beginning */
     struct lc_session first;
@@ -178,20 +164,16 @@ void lc_check_restart(struct lc *c)
         finish_and_compare(c, &first, "RESTART of nothing");
 }
 
-void lc_check_final(struct lc *c)
+void lc_check_final(struct lc *c, struct lc_session *s)
 {
-    struct lc_session s;
-    if (lc_session_open(&s, c, NULL) != 0)
-        return;
     int reopens = (c->criterion->capabilities & LULL_CAP_REOPENS) != 0;
     struct lull_decision d[LC_FILM_BLOCKS];
-    lc_session_steps(&s, 2);
-    for (uint32_t i = 0; i < s.film.block_count; i++) {
-        lc_film_advance(&s.film, i, s.spp << (i % 2));
-        s.film.blocks[i].flags = LULL_BLOCK_FINAL | (reopens ? LULL_BLOCK_STOPPED : 0);
+    lc_session_steps(s, 2);
+    for (uint32_t i = 0; i < s->film.block_count; i++) {
+        lc_film_advance(&s->film, i, s->spp << (i % 2));
+        s->film.blocks[i].flags = LULL_BLOCK_FINAL | (reopens ? LULL_BLOCK_STOPPED : 0);
     }
-    lc_session_judge(&s, NULL, d, "of final blocks");
-    lc_session_close(&s);
+    lc_session_judge(s, NULL, d, "of final blocks");
 }
 
 /* A host that wants the call back, and leaves out tasks: an error or a full answer, and no harm to what follows. */

@@ -13,11 +13,13 @@
 
 enum { SPECS_MAX = 256 };
 
-#define ROW(function, name, title) {name, title, lc_check_##function},
+#define ROW(function, name, title) {name, title, lc_check_##function, NULL},
+#define ROW_IN(function, name, title) {name, title, NULL, lc_check_##function},
 static const struct {
     const char *name, *title;
     void (*run)(struct lc *c);
-} checks[] = {LC_CHECKS(ROW)};
+    void (*run_in)(struct lc *c, struct lc_session *s);
+} checks[] = {LC_CHECKS(ROW, ROW_IN)};
 enum { CHECKS = sizeof checks / sizeof *checks };
 
 struct arguments {
@@ -175,7 +177,13 @@ static void run_task(struct lc *c, const void *arg)
     if (find_table(c, task->id) != 0 || (task->check >= LC_WITHOUT_INSTANCE && prepare(c) != 0) || task->check == CHECKS)
         return;
     lc_doing(c, "%s", "");
-    checks[task->check].run(c);
+    struct lc_session s;
+    if (checks[task->check].run) {
+        checks[task->check].run(c);
+    } else if (lc_session_open(&s, c, NULL) == 0) {
+        checks[task->check].run_in(c, &s);
+        lc_session_close(&s);
+    }
 }
 
 static void print_report(struct arguments *a, const char *name, const char *title, const struct lc_report *r)
