@@ -92,9 +92,9 @@ void lc_check_window(struct lc *c, struct lc_session *s)
     }
 }
 
-/* One evaluate call on a spoilt image: 0 refused, 1 answered. */
 enum spoil { SPOIL_ABSENT, SPOIL_CUT, SPOIL_TYPE, SPOIL_NORMALISER, SPOIL_CHANNELS, SPOIL_WEIGHT, SPOIL_COUNT };
 
+/* The status of an evaluate call on a spoilt image; 1: no session could be opened. */
 static int32_t ask_spoilt(struct lc *c, unsigned plane, enum spoil spoil)
 {
     struct lc_session s;
