@@ -186,20 +186,6 @@ static int set_denoise(void *into, const char *value, struct base_err *err)
     return 0;
 }
 
-static int set_stop_map(void *into, const char *value, struct base_err *err)
-{
-    const char **maps = &((struct pt_cli *)into)->paths[PT_STOP_MAPS];
-    int count = 0;
-    if (!base_file_has_ending(value, "png") && !base_file_has_ending(value, "csv"))
-        return expected(err, "a name that ends in .png or .csv");
-    while (count < PT_CLI_MAX_STOP_MAPS && maps[count])
-        count++;
-    if (count == PT_CLI_MAX_STOP_MAPS)
-        return base_fail(err, BASE_EINVAL, "more than %d stop maps", PT_CLI_MAX_STOP_MAPS);
-    maps[count] = value;
-    return 0;
-}
-
 static int set_debug_path(void *into, const char *value, struct base_err *err)
 {
     struct pt_cli *cli = into;
@@ -280,7 +266,7 @@ static void identify_filter(const void *from, struct base_identity *to)
 static const char *const frame_seed_words[] = {"fresh", "fixed", NULL};
 static const char *const effect_words[] = {"auto", "all", NULL};
 static const char *const exr[] = {"exr", NULL}, *const png[] = {"png", NULL}, *const json[] = {"json", NULL},
-                         *const html[] = {"html", "htm", NULL};
+                         *const html[] = {"html", "htm", NULL}, *const png_or_csv[] = {"png", "csv", NULL};
 
 #define TO(member) BASE_TO(struct pt_cli, member)
 
@@ -352,7 +338,13 @@ const struct base_option pt_cli_options[] = {
      .help = "Multi-layer EXR (default: the scene's name in the current folder, if nothing else is asked for)"},
     {"preview", 0, "FILE.png", TO(paths[PT_PREVIEW]), .output = BASE_FILE, .words = png,
      .help = "The image as sRGB, also while rendering"},
-    {"stop-map", 0, "FILE.png|FILE.csv", .set = set_stop_map, .output = BASE_FILE,
+    {"stop-map",
+     0,
+     "FILE.png|FILE.csv",
+     {BASE_STORE_TEXTS, offsetof(struct pt_cli, paths[PT_STOP_MAPS]), offsetof(struct pt_cli, stop_maps),
+      PT_CLI_MAX_STOP_MAPS, "stop maps"},
+     .output = BASE_FILE,
+     .words = png_or_csv,
      .help = "Samples per block as a picture or a table; may be repeated"},
     {"report", 0, "FILE.json", TO(paths[PT_REPORT]), .output = BASE_FILE, .words = json, .help = "Everything about the run"},
     {"live", 0, NULL, TO(live),

@@ -8,7 +8,7 @@
 #include "base/options.h"
 #include "base/outputs.h"
 #include "pbrt/load_options.h"
-#include "render/denoised.h"
+#include "render/output.h"
 #include "render/render.h"
 #include "render/sequence.h"
 
@@ -47,6 +47,7 @@ struct pt_shot_plan {
 struct pt_cli {
     int action;                  /* enum pt_cli_action */
     const char *paths[PT_PATHS]; /* NULL: not given; of a shot with a place for the frame's number */
+    int stop_maps;               /* how many of them there are */
     struct pt_load_options load;
     /* Size and crop are the scene's unless has_crop, and in its integrator what is -1 (max_depth: PT_CLI_SCENES_DEPTH). */
     struct pt_render_config render;

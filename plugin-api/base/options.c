@@ -49,6 +49,7 @@ int base_word_index(const char *const *words, const char *text, size_t length)
 }
 
 static int is_flag(const struct base_option *o) { return !o->arg && !o->words; }
+static int is_text(const struct base_option *o) { return o->to.type == BASE_STORE_TEXT || o->to.type == BASE_STORE_TEXTS; }
 
 /* "a, b or c" with other text between words, and before the last, and before each. */
 static void join(const char *const *words, const char *between, const char *last, const char *before, char *text,
@@ -98,6 +99,8 @@ static int store(const struct base_option *o, void *into, const char *value)
     void *at = (char *)into + o->to.offset;
     if (o->to.type == BASE_STORE_REAL)
         return base_parse_real(value, o->min, o->max, at);
+    if (is_text(o) && o->words && !has_ending(o, value))
+        return 0;
     if (o->to.type == BASE_STORE_TEXTS) {
         int *n = (int *)(void *)((char *)into + o->to.count), full = *n == o->to.room;
         if (!full)
@@ -106,8 +109,6 @@ static int store(const struct base_option *o, void *into, const char *value)
     }
     if (o->to.type != BASE_STORE_TEXT)
         return store_integer(o, at, value);
-    if (o->words && !has_ending(o, value))
-        return 0;
     *(const char **)at = value;
     return 1;
 }
@@ -115,10 +116,10 @@ static int store(const struct base_option *o, void *into, const char *value)
 static int bad_value(const struct base_option *o, const char *value, struct base_err *err)
 {
     char words[256];
-    if (o->words) {
-        join(o->words, ", ", " or ", o->to.type == BASE_STORE_TEXT ? "." : "", words, sizeof words);
+    if (o->words && !(is_text(o) && has_ending(o, value))) {
+        join(o->words, ", ", " or ", is_text(o) ? "." : "", words, sizeof words);
         return base_fail(err, BASE_EINVAL, "--%s %s: expected %s%s", o->name, value,
-                         o->to.type == BASE_STORE_TEXT ? "a name that ends in " : "", words);
+                         is_text(o) ? "a name that ends in " : "", words);
     }
     if (o->to.type == BASE_STORE_TEXTS)
         return base_fail(err, BASE_EINVAL, "--%s %s: more than %d %s", o->name, value, o->to.room, o->to.things);
@@ -356,10 +357,11 @@ static int parse(const struct base_options *options, int argc, char **argv, void
         if (key == ':' || key == '?')
             return bad_option(key, token, err);
         const struct base_option *o = find(options->list, key);
+        const int several = o->set || o->to.type == BASE_STORE_TEXTS; /* or only a part: values are met one by one */
         int rc = take(o, into, optarg, err);
-        if (!rc && o->set && o->input) /* of a row that keeps several, or only a part, values are met one by one */
+        if (!rc && several && o->input)
             rc = add_input(files, optarg, o->input, err);
-        else if (!rc && o->set && o->output)
+        else if (!rc && several && o->output)
             rc = base_outputs_add(&files->outputs, o->name, optarg, err);
         if (rc)
             return rc;

@@ -103,6 +103,7 @@ done
 echo mine >new.ggn.ckpt
 refused "new.ggn.ckpt: not a model file, it would be replaced" $train new.ggn
 refused "m.ggn: this is an input" "$ggn" train -d "$data" --init m.ggn --out m.ggn
+refused "m.ggn: this is an input" "$ggn" replay -d "$data" -m m.ggn -o m.ggn
 cp m.ggn begin.ggn.csv
 refused "begin.ggn.csv: this is an input" "$ggn" train -d "$data" --init begin.ggn.csv --out begin.ggn
 t "a checkpoint replaces a checkpoint, and an empty file" sh -c "for i in 1 2; do $P room.pbrt -q --spp 1 -o k.exr --checkpoint empty.ckp --checkpoint-every 0 || exit 1; done"
