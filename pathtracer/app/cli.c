@@ -1,3 +1,4 @@
+#define _DEFAULT_SOURCE /* strsep */
 #include "cli.h"
 
 #include <math.h>
@@ -13,40 +14,29 @@
 
 static int expected(struct base_err *err, const char *what) { return base_fail(err, BASE_EINVAL, "expected %s", what); }
 
-/* An integer in [low, high] of so many characters. */
-static int get_integer(const char *text, size_t length, int64_t low, int64_t high, int *out)
+/* n integers in [low, high] with one separator character between them. */
+static int get_list(const char *text, const char *separator, int n, int64_t low, int64_t high, int *out)
 {
-    char part[24];
-    int64_t v;
-    if (length >= sizeof part)
+    char copy[128], *rest = copy;
+    if (snprintf(copy, sizeof copy, "%s", text) >= (int)sizeof copy)
         return 0;
-    memcpy(part, text, length);
-    part[length] = '\0';
-    if (!base_parse_integer(part, low, high, &v))
-        return 0;
-    *out = (int)v;
-    return 1;
-}
-
-/* n of them with one separator character between them. */
-static int get_list(const char *text, char separator, int n, int64_t low, int64_t high, int *out)
-{
     for (int i = 0; i < n; i++) {
-        const size_t length = i + 1 < n ? strcspn(text, (char[]){separator, '\0'}) : strlen(text);
-        if ((i + 1 < n && text[length] != separator) || !get_integer(text, length, low, high, &out[i]))
+        const char *part = strsep(&rest, separator);
+        int64_t v;
+        if (!part || !base_parse_integer(part, low, high, &v))
             return 0;
-        text += length + 1;
+        out[i] = (int)v;
     }
-    return 1;
+    return !rest;
 }
 
 static int set_block(void *into, const char *value, struct base_err *err)
 {
     struct pt_cli *cli = into;
     int v[2];
-    if (get_list(value, 'x', 1, 1, 4096, v))
+    if (get_list(value, "x", 1, 1, 4096, v))
         v[1] = v[0];
-    else if (!get_list(value, 'x', 2, 1, 4096, v))
+    else if (!get_list(value, "x", 2, 1, 4096, v))
         return expected(err, "N or WxH, each from 1 to 4096");
     cli->render.block_width = v[0];
     cli->render.block_height = v[1];
@@ -65,7 +55,7 @@ static int set_size(void *into, const char *value, struct base_err *err)
 {
     struct pt_cli *cli = into;
     int v[2];
-    if (!get_list(value, 'x', 2, 1, 32768, v))
+    if (!get_list(value, "x", 2, 1, 32768, v))
         return expected(err, "WxH, each from 1 to 32768");
     if ((double)v[0] * v[1] > PT_CLI_MAX_PIXELS)
         return expected(err, "WxH of at most 2^28 pixels in all");
@@ -77,7 +67,7 @@ static int set_size(void *into, const char *value, struct base_err *err)
 static int set_crop(void *into, const char *value, struct base_err *err)
 {
     struct pt_cli *cli = into;
-    if (!get_list(value, ',', 4, 0, 32768, cli->render.crop) || cli->render.crop[0] >= cli->render.crop[2] ||
+    if (!get_list(value, ",", 4, 0, 32768, cli->render.crop) || cli->render.crop[0] >= cli->render.crop[2] ||
         cli->render.crop[1] >= cli->render.crop[3])
         return expected(err, "X0,Y0,X1,Y1 in pixels with X0 < X1 and Y0 < Y1");
     cli->has_crop = 1;
@@ -189,7 +179,7 @@ static int set_denoise(void *into, const char *value, struct base_err *err)
 static int set_debug_path(void *into, const char *value, struct base_err *err)
 {
     struct pt_cli *cli = into;
-    if (!get_list(value, ',', 3, 0, INT32_MAX, cli->debug))
+    if (!get_list(value, ",", 3, 0, INT32_MAX, cli->debug))
         return expected(err, "X,Y,SAMPLE");
     cli->action = PT_CLI_DEBUG_PATH;
     return 0;
@@ -199,8 +189,10 @@ static int set_quote_pilot(void *into, const char *value, struct base_err *err)
 {
     struct pt_render_config *r = &((struct pt_cli *)into)->render;
     const size_t length = strcspn(value, ":");
-    int spp;
-    if (!get_integer(value, length, 1, INT32_MAX, &spp) ||
+    char text[24];
+    int64_t spp;
+    snprintf(text, sizeof text, "%.*s", (int)length, value);
+    if (length >= sizeof text || !base_parse_integer(text, 1, INT32_MAX, &spp) ||
         (value[length] != '\0' && !base_parse_real(value + length + 1, 0.01, 1e9, &r->pilot_s)))
         return expected(err, "SPP or SPP:SECONDS, samples per pixel from 1, seconds from 0.01");
     r->pilot_spp = (uint64_t)spp;
