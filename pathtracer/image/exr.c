@@ -18,25 +18,13 @@ static void ignore_message(exr_const_context_t file, exr_result_t code, const ch
     (void)text;
 }
 
-/* EXR's windows include their last pixel. */
-static exr_attr_box2i_t box(int x0, int y0, int x1, int y1)
-{
-    exr_attr_box2i_t b;
-    b.min.x = x0;
-    b.min.y = y0;
-    b.max.x = x1 - 1;
-    b.max.y = y1 - 1;
-    return b;
-}
-
 static exr_result_t write_header(exr_context_t file, const struct pt_exr_image *image)
 {
     int part = 0;
     exr_result_t rc = exr_add_part(file, "lull", EXR_STORAGE_SCANLINE, &part);
-    exr_attr_box2i_t display = box(0, 0, image->width, image->height),
-                     stored = box(image->x0, image->y0, image->x1, image->y1);
-    exr_attr_v2f_t centre;
-    centre.x = centre.y = 0.0f;
+    const exr_attr_box2i_t display = {.max.x = image->width - 1, .max.y = image->height - 1}, /* EXR's include their last */
+        stored = {.min.x = image->x0, .min.y = image->y0, .max.x = image->x1 - 1, .max.y = image->y1 - 1};
+    const exr_attr_v2f_t centre = {.x = 0.0f, .y = 0.0f};
     if (rc == EXR_ERR_SUCCESS)
         rc = exr_initialize_required_attr(file, part, &display, &stored, 1.0f, &centre, 1.0f, EXR_LINEORDER_INCREASING_Y,
                                           EXR_COMPRESSION_ZIP);
