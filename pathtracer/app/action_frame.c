@@ -42,12 +42,12 @@ static int record(struct pt_open *o, int *status, struct base_err *err)
     int rc = crc_of(o->frame->paths[PT_SCENE], &config.scene_crc, err);
     if (!rc)
         rc = base_inputs_crc32(&o->scene_files, &config.inputs_crc, err);
+    if (!rc)
+        rc = pt_watch_init(&watch, o, NULL, err);
     if (rc)
         return rc;
-    pt_watch_init(&watch, o, NULL);
-    const struct pt_render_hooks hooks = pt_watch_hooks(&watch);
-    rc = pt_sequence_record(&config, o->scene, o->kernel, o->threads, o->criterion, &hooks, &was_interrupted, err);
-    base_log_clear(o->log);
+    rc = pt_sequence_record(&config, o->scene, o->kernel, o->threads, o->criterion, &watch.hooks, &was_interrupted, err);
+    pt_watch_end(&watch);
     *status = was_interrupted ? PT_EXIT_INTERRUPTED : 0;
     return rc;
 }
@@ -91,12 +91,11 @@ static int shake_hands(const struct pt_open *o, struct job *job, struct base_err
     struct base_identity all = {0};
     uint32_t program_crc = 0; /* two builds may have one version; 0 where the system does not show the file */
     int rc = pt_agree_identity(o, &all, err);
-    if (!rc) {
-        if (crc_of("/proc/self/exe", &program_crc, NULL) != 0)
-            program_crc = 0;
-        base_identity_add(&all, "program-crc", "%08x", (unsigned)program_crc);
+    if (crc_of("/proc/self/exe", &program_crc, NULL) != 0)
+        program_crc = 0;
+    base_identity_add(&all, "program-crc", "%08x", (unsigned)program_crc);
+    if (!rc)
         rc = base_identity_check(&all, err);
-    }
     if (!rc)
         rc = job_handshake(job, all.text, base_threads_count(o->threads), err);
     base_identity_release(&all);

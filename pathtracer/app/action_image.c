@@ -161,21 +161,14 @@ static int render_image(struct pt_open *o, const char *quote, int *status, struc
     struct pt_watch watch;
     char processor[128];
     struct pt_output_info info = describe(o, quote, processor_name(processor));
-    if (frame->resume) {
-        int rc = pt_checkpoint_load(frame->paths[PT_CHECKPOINT], o->render, &o->identity, err);
-        if (rc)
-            return rc;
-    }
-    if (frame->table && plan_blocks(o, err) != 0)
-        return BASE_EINVAL;
-    pt_watch_init(&watch, o, &info);
-    if (o->cli->display) {
-        int rc = pt_watch_display(&watch, err);
-        if (rc)
-            return rc;
-    }
-    const struct pt_render_hooks hooks = pt_watch_hooks(&watch);
-    int rc = pt_render_run(o->render, &hooks, &outcome, err);
+    int rc = frame->resume ? pt_checkpoint_load(frame->paths[PT_CHECKPOINT], o->render, &o->identity, err) : 0;
+    if (!rc && frame->table)
+        rc = plan_blocks(o, err);
+    if (!rc)
+        rc = pt_watch_init(&watch, o, &info, err);
+    if (rc)
+        return rc;
+    rc = pt_render_run(o->render, &watch.hooks, &outcome, err);
     pt_watch_end(&watch);
     struct base_err write_err = {0};
     if (frame->number >= 0 && (rc || pt_action_status(outcome) != 0)) {
@@ -184,10 +177,9 @@ static int render_image(struct pt_open *o, const char *quote, int *status, struc
     }
     info.of.flags = pt_action_status(outcome) != 0 ? LULL_REPORT_INTERRUPTED : 0;
     if (write_outputs(o, info, &write_err) != 0) {
-        if (rc)
-            base_log_say(o->log, "%s", write_err.text); /* besides the render's own error: it tells where the image is */
-        else
-            rc = base_fail(err, write_err.code, "%s", write_err.text);
+        if (!rc)
+            return base_fail(err, write_err.code, "%s", write_err.text);
+        base_log_say(o->log, "%s", write_err.text); /* besides the render's own error: it tells where the image is */
         return rc;
     }
     pt_action_summary(o->render, o->log);

@@ -6,17 +6,6 @@
 #include "render/checkpoint.h"
 #include "watch.h"
 
-struct pilot {
-    struct pt_watch watch; /* first: the data of its hooks */
-    struct pt_quote *quote;
-};
-
-static void ask_quote(void *data, struct pt_render *render, const uint32_t *due, uint32_t count)
-{
-    const struct pilot *pilot = data;
-    pt_quote_ask(pilot->quote, render, due, count);
-}
-
 static int print_quote(const struct pt_open *o, struct pt_quote *quote, int was_interrupted, struct base_err *err)
 {
     const struct pt_cli *cli = o->cli;
@@ -39,25 +28,24 @@ static int open_quote(const struct pt_open *o, struct pt_quote **out, struct bas
 }
 
 /* When the pilot is over the checkpoint is the render's, whoever goes on with it. */
-int pt_action_pilot(struct pt_open *o, struct pt_quote **out, int *status, struct base_err *err)
+int pt_action_pilot(struct pt_open *o, struct pt_quote **quote, int *status, struct base_err *err)
 {
     const char *checkpoint = o->frame->paths[PT_CHECKPOINT];
     enum pt_render_outcome outcome;
-    struct pilot pilot = {0};
-    int rc = open_quote(o, &pilot.quote, err);
+    struct pt_watch watch;
+    int rc = open_quote(o, quote, err);
+    if (!rc)
+        rc = pt_watch_init(&watch, o, NULL, err);
     if (rc)
         return rc;
-    pt_watch_init(&pilot.watch, o, NULL);
-    struct pt_render_hooks hooks = pt_watch_hooks(&pilot.watch);
-    hooks.judged = ask_quote;
-    rc = pt_render_run(o->render, &hooks, &outcome, err);
-    base_log_clear(o->log);
+    watch.hooks.quote = (*quote)->quote;
+    rc = pt_render_run(o->render, &watch.hooks, &outcome, err);
+    pt_watch_end(&watch);
     *status = pt_action_status(outcome);
     if (!rc && checkpoint && outcome == PT_RENDER_PILOT)
         rc = pt_checkpoint_save(checkpoint, o->render, &o->identity, err);
     if (!rc && outcome != PT_RENDER_LOST)
-        rc = pt_quote_finish(pilot.quote, o->render, err);
-    *out = pilot.quote;
+        rc = pt_quote_finish(*quote, o->render, err);
     return rc;
 }
 

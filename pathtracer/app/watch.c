@@ -34,36 +34,6 @@ static void format_quality(const struct pt_open *o, char *text, size_t room)
     }
 }
 
-void pt_watch_init(struct pt_watch *w, const struct pt_open *open, const struct pt_output_info *info)
-{
-    *w = (struct pt_watch){.log = open->log,
-                           .open = open,
-                           .info = info,
-                           .checkpoint_at_s = base_clock_wall_s() + open->cli->checkpoint_every_s};
-    pt_progress_init(&w->progress, w->log);
-    w->progress.map = w->log->terminal && speaks_utf8();
-    format_quality(open, w->progress.quality, sizeof w->progress.quality);
-}
-
-int pt_watch_display(struct pt_watch *w, struct base_err *err)
-{
-    struct lull_error e = {.struct_size = sizeof e};
-    const struct pt_open *o = w->open;
-    int32_t code = lull_host_display_open(o->render->frame, o->cli->display, base_file_name(o->frame->paths[PT_SCENE]),
-                                          &w->display, &e);
-    return code == LULL_OK ? 0 : base_fail(err, pt_host_result(code, &e, NULL), "--display-server %s", e.message);
-}
-
-void pt_watch_end(struct pt_watch *w)
-{
-    struct pt_host_view show;
-    const struct pt_render *r = w->open->render;
-    base_log_clear(w->log);
-    if (w->display && !lull_host_display_close(w->display, pt_host_show(&r->film, r->blocks, &show)))
-        base_log_note(w->log, "--display-server: no viewer has taken the last picture");
-    w->display = NULL;
-}
-
 static const char *path_of(const struct pt_watch *w, enum pt_path which) { return w->open->frame->paths[which]; }
 
 /* A checkpoint that fails on the way costs nothing yet: the next one may succeed. */
@@ -71,7 +41,7 @@ static void save_now_and_then(struct pt_watch *w, const struct pt_render *render
 {
     struct base_err why = {0};
     if (pt_checkpoint_save(path_of(w, PT_CHECKPOINT), render, &w->open->identity, &why) != 0)
-        base_log_say(w->log, "no checkpoint, the render goes on: %s", why.text);
+        base_log_say(w->open->log, "no checkpoint, the render goes on: %s", why.text);
     w->checkpoint_at_s = base_clock_wall_s() + w->open->cli->checkpoint_every_s;
 }
 
@@ -147,8 +117,30 @@ static int suspend(void *data, struct pt_render *render, struct base_err *err)
     return path_of(w, PT_CHECKPOINT) ? pt_checkpoint_save(path_of(w, PT_CHECKPOINT), render, &w->open->identity, err) : 0;
 }
 
-struct pt_render_hooks pt_watch_hooks(struct pt_watch *w)
+int pt_watch_init(struct pt_watch *w, const struct pt_open *open, const struct pt_output_info *info, struct base_err *err)
 {
-    return (struct pt_render_hooks){
-        .slice = after_slice, .interrupted = &base_interrupted, .suspend = suspend, .log = w->log, .data = w};
+    struct lull_error e = {.struct_size = sizeof e};
+    *w = (struct pt_watch){
+        .open = open,
+        .info = info,
+        .hooks = {.slice = after_slice, .interrupted = &base_interrupted, .suspend = suspend, .log = open->log, .data = w},
+        .checkpoint_at_s = base_clock_wall_s() + open->cli->checkpoint_every_s};
+    pt_progress_init(&w->progress, w->open->log);
+    w->progress.map = w->open->log->terminal && speaks_utf8();
+    format_quality(open, w->progress.quality, sizeof w->progress.quality);
+    if (!open->cli->display)
+        return 0;
+    int32_t code = lull_host_display_open(open->render->frame, open->cli->display,
+                                          base_file_name(open->frame->paths[PT_SCENE]), &w->display, &e);
+    return code == LULL_OK ? 0 : base_fail(err, pt_host_result(code, &e, NULL), "--display-server %s", e.message);
+}
+
+void pt_watch_end(struct pt_watch *w)
+{
+    struct pt_host_view show;
+    const struct pt_render *r = w->open->render;
+    base_log_clear(w->open->log);
+    if (w->display && !lull_host_display_close(w->display, pt_host_show(&r->film, r->blocks, &show)))
+        base_log_note(w->open->log, "--display-server: no viewer has taken the last picture");
+    w->display = NULL;
 }

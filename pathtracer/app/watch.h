@@ -7,7 +7,7 @@
 #include "render/progress.h"
 
 struct pt_watch {
-    struct base_log *log;
+    struct pt_render_hooks hooks; /* for pt_render_run; their data is the watch */
     struct pt_progress progress;
     const struct pt_open *open;         /* whose frame says which files */
     const struct pt_output_info *info;  /* what preview, stop maps and report say; NULL: none is written */
@@ -15,13 +15,11 @@ struct pt_watch {
     double checkpoint_at_s, files_at_s; /* wall times of the next ones */
 };
 
-/* All is borrowed. info: NULL, nothing is written but checkpoints. */
-void pt_watch_init(struct pt_watch *watch, const struct pt_open *open, const struct pt_output_info *info);
-/* Shows the render in a viewer, under the name of the scene, until pt_watch_end. */
-int pt_watch_display(struct pt_watch *watch, struct base_err *err);
+/* All is borrowed. info: NULL, nothing is written but checkpoints. Where the command line says so, the render is shown in a
+ * viewer, under the name of the scene: an image, which ends with pt_watch_end. BASE_EINVAL: it has no such address. */
+int pt_watch_init(struct pt_watch *watch, const struct pt_open *open, const struct pt_output_info *info,
+                  struct base_err *err);
 /* Closes the live view, with the picture as it is, and takes the progress line away. */
 void pt_watch_end(struct pt_watch *watch);
-/* The hooks of pt_render_run that do it; their data is the watch. */
-struct pt_render_hooks pt_watch_hooks(struct pt_watch *watch);
 
 #endif

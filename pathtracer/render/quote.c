@@ -118,12 +118,6 @@ void pt_quote_destroy(struct pt_quote *q)
     free(q);
 }
 
-void pt_quote_ask(struct pt_quote *q, struct pt_render *r, const uint32_t *due, uint32_t count)
-{
-    struct pt_host_view show;
-    lull_host_quote_ask(q->quote, pt_host_show(&r->film, r->blocks, &show), due, count);
-}
-
 int pt_quote_finish(struct pt_quote *q, struct pt_render *r, struct base_err *err)
 {
     struct lull_error e = {.struct_size = sizeof e};

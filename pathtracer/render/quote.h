@@ -18,7 +18,7 @@ struct pt_quote_setting {
 };
 
 struct pt_quote {
-    struct lull_host_quote *quote;                   /* owns */
+    struct lull_host_quote *quote;                   /* owns; for the hooks of the pilot */
     struct pt_quote_setting settings[PT_QUOTE_ROWS]; /* of the rows */
     const struct lull_host_quote_row *rows;          /* the answer, of pt_quote_finish; borrows */
     uint32_t row_count;
@@ -38,8 +38,6 @@ int pt_quote_create(const struct pt_render *render, const struct lull_pair *pair
                     const struct lull_criterion *noisy, struct base_log *log, struct pt_quote **out, struct base_err *err);
 void pt_quote_destroy(struct pt_quote *quote);
 
-/* The hook `judged` of the pilot. */
-void pt_quote_ask(struct pt_quote *quote, struct pt_render *render, const uint32_t *due, uint32_t count);
 /* After the pilot: asks about every block as it is and works out the answer. */
 int pt_quote_finish(struct pt_quote *quote, struct pt_render *render, struct base_err *err);
 /* Of a finished one: the row of what the options ask for, which is always there. */

@@ -329,12 +329,13 @@ static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hook
 static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
 {
     struct pt_render_work *w = &r->work;
+    struct pt_host_view show;
     const uint32_t n = lull_host_due(r->frame, w->due, w->final);
     if (n == 0)
         return;
     ask(r, n, hooks);
-    if (hooks->judged)
-        hooks->judged(hooks->data, r, w->due, n);
+    if (hooks->quote)
+        lull_host_quote_ask(hooks->quote, pt_host_show(&r->film, r->blocks, &show), w->due, n);
     lull_host_apply(r->frame, w->due, n, w->decisions);
 }
 

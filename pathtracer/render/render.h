@@ -86,9 +86,8 @@ enum pt_render_outcome {
 struct pt_render_hooks {
     /* After every slice; a negative code ends pt_render_run with it. May be NULL. */
     int (*slice)(void *data, struct pt_render *render, struct base_err *err);
-    /* After the criterion was asked about blocks list[due[0 … count)], before they are stopped or scheduled. May be
-     * NULL. */
-    void (*judged)(void *data, struct pt_render *render, const uint32_t *due, uint32_t count);
+    /* Asked about the same blocks after the criterion, before they are stopped or scheduled. May be NULL. */
+    struct lull_host_quote *quote;
     /* Not 0: end after this slice. May be NULL. */
     const volatile sig_atomic_t *interrupted;
     /* Called before the blocks still active are closed for a limit or an interrupt, or when none is left, while everything

@@ -258,11 +258,6 @@ static void recording(void **state)
     assert_int_equal(system(command), 0);
 }
 
-static void ask_quote(void *data, struct pt_render *render, const uint32_t *due, uint32_t count)
-{
-    pt_quote_ask(data, render, due, count);
-}
-
 /* The k-th allocation of opening (finishing 0) or of finishing a quote fails; *happened: there were as many. */
 static int quote(struct pt_render *render, int finishing, long k, int *happened, struct base_err *err)
 {
@@ -271,7 +266,7 @@ static int quote(struct pt_render *render, int finishing, long k, int *happened,
     fail_arm(finishing ? LONG_MAX : k);
     int rc = pt_quote_create(render, NULL, 0, NULL, NULL, &q, err);
     *happened = fail_disarm();
-    struct pt_render_hooks hooks = {.judged = ask_quote, .data = q};
+    struct pt_render_hooks hooks = {.quote = q ? q->quote : NULL};
     if (!rc && finishing) {
         assert_int_equal(pt_render_run(render, &hooks, &outcome, err), 0);
         fail_arm(k);

@@ -52,11 +52,6 @@ struct run {
     struct lull_pair pair;
 };
 
-static void judged(void *data, struct pt_render *render, const uint32_t *due, uint32_t count)
-{
-    pt_quote_ask(((struct run *)data)->quote, render, due, count);
-}
-
 /* visible NULL: uniform, without a criterion. */
 static void start(struct run *run, const char *visible, uint64_t pilot_spp)
 {
@@ -80,7 +75,7 @@ static enum pt_render_outcome go(struct run *run)
 {
     enum pt_render_outcome outcome;
     struct base_err err = {0};
-    struct pt_render_hooks hooks = {.judged = run->quote ? judged : NULL, .data = run};
+    struct pt_render_hooks hooks = {.quote = run->quote ? run->quote->quote : NULL};
     assert_int_equal(pt_render_run(run->render, &hooks, &outcome, &err), 0);
     return outcome;
 }

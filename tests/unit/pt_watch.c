@@ -31,9 +31,9 @@ static void between_two_slices(void **state)
     double before_s = base_clock_wall_s();
     capture_begin(&messages);
     messages.log.quiet = 1;
-    pt_watch_init(&w, &open, NULL);
+    assert_int_equal(pt_watch_init(&w, &open, NULL, &err), 0);
     assert_true(w.checkpoint_at_s >= before_s + 1000 && w.checkpoint_at_s <= base_clock_wall_s() + 1000);
-    const struct pt_render_hooks hooks = pt_watch_hooks(&w);
+    const struct pt_render_hooks hooks = w.hooks;
     base_interrupted = 0;
     w.checkpoint_at_s = before_s + 1e6;
     hooks.slice(hooks.data, render, &err); /* too early */
