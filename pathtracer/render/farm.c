@@ -27,19 +27,18 @@ static void pack_row(void *data, uint32_t i, void *item)
 {
     const struct sampling *s = data;
     struct row_item *to = item;
-    to->row = s->slice->rows[s->slice->order[i]];
+    to->row = s->slice->rows[i];
     pt_row_save(s->slice->film, &to->row, to->sums);
 }
 
 /* With workers, who may be lost, the sums before the slice are kept until its end. */
 static struct pt_row *begin_row(const struct sampling *s, uint32_t i)
 {
-    const uint32_t index = s->slice->order[i];
     if (s->before) {
-        pt_row_save(s->slice->film, &s->slice->rows[index], s->before + index * s->stride);
-        s->begun[index] = 1;
+        pt_row_save(s->slice->film, &s->slice->rows[i], s->before + i * s->stride);
+        s->begun[i] = 1;
     }
-    return &s->slice->rows[index];
+    return &s->slice->rows[i];
 }
 
 static int sample_here(void *data, uint32_t first, uint32_t n, int thread, struct base_err *err)
@@ -56,7 +55,7 @@ static int apply_row(void *data, uint32_t i, const void *answer)
 {
     const struct sampling *s = data;
     const struct row_item *from = answer;
-    const struct pt_row *sent = &s->slice->rows[s->slice->order[i]];
+    const struct pt_row *sent = &s->slice->rows[i];
     if (from->row.y != sent->y || from->row.x0 != sent->x0 || from->row.x1 != sent->x1)
         return BASE_EINVAL;
     struct pt_row *row = begin_row(s, i);

@@ -12,12 +12,11 @@
 #include "render/film.h"
 #include "render/rows.h"
 
-/* Rows to be sampled. */
+/* Rows to be sampled, in this order. */
 struct pt_farm_slice {
     struct pt_sampler_context context;
     struct pt_film *film;
-    struct pt_row *rows;
-    const uint32_t *order; /* [count] row to be done n-th */
+    struct pt_row *rows; /* [count] */
     size_t count;
 };
 

@@ -32,12 +32,11 @@ static int allocate_work(struct pt_render *r, struct base_err *err)
     for (uint32_t i = 0; i < n; i++)
         rows += (size_t)(r->blocks->list[i].y1 - r->blocks->list[i].y0);
     w->items = calloc(rows, sizeof *w->items);
-    w->order = calloc(rows, sizeof *w->order);
     w->candidates = calloc(n, sizeof *w->candidates);
     w->due = calloc(n, sizeof *w->due);
     w->final = calloc(n, sizeof *w->final);
     w->decisions = calloc(n, sizeof *w->decisions);
-    const int all = w->items && w->order && w->candidates && w->due && w->final && w->decisions;
+    const int all = w->items && w->candidates && w->due && w->final && w->decisions;
     return all ? 0 : base_fail_nomem(err, "work list");
 }
 
@@ -111,7 +110,6 @@ void pt_render_destroy(struct pt_render *r)
     if (!r)
         return;
     free(r->work.items);
-    free(r->work.order);
     free(r->work.candidates);
     free(r->work.due);
     free(r->work.final);
@@ -211,10 +209,10 @@ static void shuffle(struct pt_render_work *w, uint32_t state)
 {
     for (size_t i = w->count; i > 1; i--) {
         state = state * 1664525u + 1013904223u; /* Numerical Recipes' quick generator: any order will do */
-        size_t j = state % i;
-        uint32_t swap = w->order[i - 1];
-        w->order[i - 1] = w->order[j];
-        w->order[j] = swap;
+        const struct pt_row swap = w->items[i - 1];
+        struct pt_row *other = &w->items[state % i];
+        w->items[i - 1] = *other;
+        *other = swap;
     }
 }
 
@@ -225,11 +223,9 @@ static void list_block(struct pt_render *r, const struct pt_render_candidate *c,
     uint64_t end = goal(r, b), most = b->spp > LEAD_SPP ? b->spp : LEAD_SPP;
     most = step < (double)most ? (uint64_t)fmax(step, 1.0) : most;
     uint64_t to = end - b->spp > most ? b->spp + most : end;
-    for (int y = b->y0; y < b->y1; y++) {
-        w->order[w->count] = (uint32_t)w->count;
+    for (int y = b->y0; y < b->y1; y++)
         w->items[w->count++] = (struct pt_row){
             .block = c->block, .y = y, .x0 = b->x0, .x1 = b->x1, .from = (uint32_t)b->spp, .to = (uint32_t)to};
-    }
 }
 
 /* Lists rows worth span_s wall seconds. Returns how many, 0 when every block is at its check. */
@@ -291,8 +287,7 @@ static int slice(struct pt_render *r, int *more, struct base_err *err)
     *more = list_items(r, span_s) > 0;
     if (!*more)
         return 0;
-    const struct pt_farm_slice rows = {
-        {r->scene, r->kernel, &r->config.integrator}, &r->film, r->work.items, r->work.order, r->work.count};
+    const struct pt_farm_slice rows = {{r->scene, r->kernel, &r->config.integrator}, &r->film, r->work.items, r->work.count};
     uint64_t before = r->totals->samples;
     double start_s = base_clock_wall_s();
     int rc = pt_farm_sample(r->config.job, r->threads, &rows, err);

@@ -51,7 +51,6 @@ struct pt_render_candidate {
 /* Scratch of the slices; owned. */
 struct pt_render_work {
     struct pt_row *items; /* [rows of all blocks] */
-    uint32_t *order;      /* [rows of all blocks] item to be done n-th */
     size_t count;
     struct pt_render_candidate *candidates; /* [blocks] */
     uint32_t *due;                          /* [blocks] */
@@ -86,7 +85,7 @@ enum pt_render_outcome {
 struct pt_render_hooks {
     /* After every slice; a negative code ends pt_render_run with it. May be NULL. */
     int (*slice)(void *data, struct pt_render *render, struct base_err *err);
-    /* Asked about the same blocks after the criterion, before they are stopped or scheduled. May be NULL. */
+    /* Asked about the blocks of each check after the criterion, before they are stopped or scheduled. May be NULL. */
     struct lull_host_quote *quote;
     /* Not 0: end after this slice. May be NULL. */
     const volatile sig_atomic_t *interrupted;
