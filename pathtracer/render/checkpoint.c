@@ -49,7 +49,7 @@ int pt_checkpoint_save(const char *path, const struct pt_render *r, const struct
     put(&s, identity->text, identity->size);
     put_count(&s, r->film.bytes);
     struct pt_film_array arrays[PT_FILM_ARRAYS];
-    int n = pt_film_list_arrays(&r->film, arrays);
+    int n = pt_film_list_arrays(&r->film, 0, r->film.pixels, arrays);
     for (int i = 0; i < n; i++)
         put(&s, arrays[i].data, arrays[i].bytes);
     struct lull_writer writer = {.struct_size = sizeof writer, .context = &s, .write = put_state};
@@ -100,7 +100,7 @@ static int take_film(struct source *s, const struct pt_film *film, struct base_e
     if (!rc && bytes != film->bytes)
         rc = base_fail(err, BASE_EINVAL, "%s: the checkpoint has another number of bytes of pixels", s->path);
     struct pt_film_array arrays[PT_FILM_ARRAYS];
-    int n = pt_film_list_arrays(film, arrays);
+    int n = pt_film_list_arrays(film, 0, film->pixels, arrays);
     for (int i = 0; i < n && !rc; i++)
         rc = take(s, arrays[i].data, arrays[i].bytes, err);
     return rc;

@@ -63,12 +63,13 @@ void pt_film_release(struct pt_film *film)
     *film = (struct pt_film){0};
 }
 
-int pt_film_list_arrays(const struct pt_film *film, struct pt_film_array out[PT_FILM_ARRAYS])
+int pt_film_list_arrays(const struct pt_film *film, size_t first, size_t pixels, struct pt_film_array out[PT_FILM_ARRAYS])
 {
     int n = 0;
     for (int i = 0; i < ARRAYS; i++)
         if (wanted(film->planes, i))
-            out[n++] = (struct pt_film_array){get_array(film, i), film->pixels * arrays[i].bytes};
+            out[n++] = (struct pt_film_array){(unsigned char *)get_array(film, i) + first * arrays[i].bytes,
+                                              pixels * arrays[i].bytes};
     return n;
 }
 

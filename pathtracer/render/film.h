@@ -150,13 +150,14 @@ static inline int pt_film_add(struct pt_film_pixel *p, uint32_t planes, int in_h
     return 1;
 }
 
-/* The arrays that are there, in a fixed order, for saving and loading. Returns how many of out[] were filled. */
+/* The arrays that are there, in a fixed order, for saving and loading: of each the part from pixel `first` on for so many.
+ * Returns how many of out[] were filled. */
 enum { PT_FILM_ARRAYS = 9 };
 struct pt_film_array {
     void *data; /* borrows */
     size_t bytes;
 };
-int pt_film_list_arrays(const struct pt_film *film, struct pt_film_array out[PT_FILM_ARRAYS]);
+int pt_film_list_arrays(const struct pt_film *film, size_t first, size_t pixels, struct pt_film_array out[PT_FILM_ARRAYS]);
 
 /* Mean radiance of a pixel after spp samples; black when there is none. */
 void pt_film_mean(const struct pt_film *film, size_t index, uint64_t spp, double rgb[3]);

@@ -42,22 +42,10 @@ size_t pt_row_bytes(const struct pt_row *row, uint32_t planes)
     return (size_t)(row->x1 - row->x0) * pt_film_pixel_bytes(planes);
 }
 
-/* The row's part of each of the film's arrays. Returns how many there are. */
-static int list_parts(const struct pt_film *film, const struct pt_row *row, struct pt_film_array parts[PT_FILM_ARRAYS])
-{
-    const size_t first = pt_film_index(film, row->x0, row->y), width = (size_t)(row->x1 - row->x0);
-    int n = pt_film_list_arrays(film, parts);
-    for (int i = 0; i < n; i++) {
-        size_t pixel = parts[i].bytes / film->pixels;
-        parts[i] = (struct pt_film_array){(unsigned char *)parts[i].data + first * pixel, width * pixel};
-    }
-    return n;
-}
-
 void pt_row_save(const struct pt_film *film, const struct pt_row *row, unsigned char *bytes)
 {
     struct pt_film_array parts[PT_FILM_ARRAYS];
-    int n = list_parts(film, row, parts);
+    int n = pt_film_list_arrays(film, pt_film_index(film, row->x0, row->y), (size_t)(row->x1 - row->x0), parts);
     for (int i = 0; i < n; bytes += parts[i++].bytes)
         memcpy(bytes, parts[i].data, parts[i].bytes);
 }
@@ -65,7 +53,7 @@ void pt_row_save(const struct pt_film *film, const struct pt_row *row, unsigned 
 void pt_row_restore(struct pt_film *film, const struct pt_row *row, const unsigned char *bytes)
 {
     struct pt_film_array parts[PT_FILM_ARRAYS];
-    int n = list_parts(film, row, parts);
+    int n = pt_film_list_arrays(film, pt_film_index(film, row->x0, row->y), (size_t)(row->x1 - row->x0), parts);
     for (int i = 0; i < n; bytes += parts[i++].bytes)
         memcpy(parts[i].data, bytes, parts[i].bytes);
 }

@@ -232,8 +232,8 @@ void pt_fake_release(struct pt_fake_run *run)
 void pt_fake_assert_same(const struct pt_render *a, const struct pt_render *b)
 {
     struct pt_film_array x[PT_FILM_ARRAYS], y[PT_FILM_ARRAYS];
-    int n = pt_film_list_arrays(&a->film, x);
-    assert_int_equal(n, pt_film_list_arrays(&b->film, y));
+    int n = pt_film_list_arrays(&a->film, 0, a->film.pixels, x);
+    assert_int_equal(n, pt_film_list_arrays(&b->film, 0, b->film.pixels, y));
     for (int i = 0; i < n; i++)
         assert_memory_equal(x[i].data, y[i].data, x[i].bytes);
     assert_int_equal(a->blocks->count, b->blocks->count);

@@ -219,8 +219,8 @@ static void part(struct stage *stage, int lost)
 static void assert_same(const struct pt_render *a, const struct pt_render *b)
 {
     struct pt_film_array x[PT_FILM_ARRAYS], y[PT_FILM_ARRAYS];
-    int n = pt_film_list_arrays(&a->film, x);
-    assert_int_equal(n, pt_film_list_arrays(&b->film, y));
+    int n = pt_film_list_arrays(&a->film, 0, a->film.pixels, x);
+    assert_int_equal(n, pt_film_list_arrays(&b->film, 0, b->film.pixels, y));
     for (int i = 0; i < n; i++)
         assert_memory_equal(x[i].data, y[i].data, x[i].bytes);
     for (uint32_t i = 0; i < a->blocks->count; i++) {
