@@ -144,8 +144,8 @@ uint32_t pt_host_planes_of(uint32_t film_planes)
     return planes;
 }
 
-/* NULL data: no such plane. */
-static struct lull_plane plane_of(const struct pt_film *film, const void *data, uint32_t channels, size_t size, int32_t type,
+/* Rows of so many pixels. NULL data: no such plane. */
+static struct lull_plane plane_of(const void *data, int width, uint32_t channels, size_t size, int32_t type,
                                   int32_t normaliser)
 {
     int64_t pixel = (int64_t)(channels * size);
@@ -153,7 +153,7 @@ static struct lull_plane plane_of(const struct pt_film *film, const void *data, 
         return (struct lull_plane){0};
     return (struct lull_plane){.data = data,
                                .stride_x = pixel,
-                               .stride_y = pixel * (film->x1 - film->x0),
+                               .stride_y = pixel * width,
                                .stride_c = (int64_t)size,
                                .scale = 1.0,
                                .type = type,
@@ -161,20 +161,18 @@ static struct lull_plane plane_of(const struct pt_film *film, const void *data, 
                                .channels = channels};
 }
 
-static struct lull_plane counts(const struct pt_film *film, const uint32_t *data)
-{
-    return plane_of(film, data, 1, sizeof *data, LULL_TYPE_U32, LULL_NORM_ONE);
-}
-
 const struct lull_host_view *pt_host_show(const struct pt_film *film, struct lull_host_blocks *blocks,
                                           struct pt_host_view *v)
 {
+    const int width = film->x1 - film->x0;
     for (uint32_t i = 0; i < blocks->count; i++)
         blocks->list[i].half_spp = film->half ? pt_film_half_spp(blocks->list[i].spp) : 0;
-    *v = (struct pt_host_view){.dropped = counts(film, film->dropped), .dropped_half = counts(film, film->dropped_half)};
+    v->dropped = plane_of(film->dropped, width, 1, sizeof *film->dropped, LULL_TYPE_U32, LULL_NORM_ONE);
+    v->dropped_half = plane_of(film->dropped_half, width, 1, sizeof *film->dropped_half, LULL_TYPE_U32, LULL_NORM_ONE);
+    memset(v->planes, 0, sizeof v->planes);
     for (int i = 0; i < PLANES; i++) {
         const double *data = *(double *const *)((const char *)film + map[i].offset);
-        v->planes[map[i].abi] = plane_of(film, data, map[i].channels, sizeof *data, LULL_TYPE_F64, map[i].normaliser);
+        v->planes[map[i].abi] = plane_of(data, width, map[i].channels, sizeof *data, LULL_TYPE_F64, map[i].normaliser);
     }
     v->view = (struct lull_host_view){.struct_size = sizeof v->view,
                                       .plane_count = LULL_PLANE_COUNT,
@@ -217,14 +215,7 @@ int pt_mask_read(const char *path, int width, int height, struct lull_plane *out
             sum += sample(&image, channels * i + c);
         grey[i] = sum / (float)colours;
     }
-    *out = (struct lull_plane){.data = grey,
-                               .stride_x = sizeof *grey,
-                               .stride_y = (int64_t)sizeof *grey * width,
-                               .stride_c = sizeof *grey,
-                               .scale = 1.0,
-                               .type = LULL_TYPE_F32,
-                               .normaliser = LULL_NORM_ONE,
-                               .channels = 1};
+    *out = plane_of(grey, width, 1, sizeof *grey, LULL_TYPE_F32, LULL_NORM_ONE);
 out:
     pic_release(&image);
     return rc;
