@@ -15,33 +15,28 @@
 /* What the criterion of noisy pictures says of this one, [blocks], the caller's; NULL when nobody can say. */
 static double *judge_noisy(const struct pt_open *o)
 {
-    const struct pt_render *r = o->render;
-    const uint32_t n = r->blocks->count;
+    const struct pt_render_work *scratch = &o->render->work; /* the render is over */
+    const uint32_t n = o->render->blocks->count;
     struct lull_host_criterion *observer = NULL;
     const struct lull_criterion *table;
     struct pt_host_view show;
     struct base_err ignored = {0};
     double *errors = calloc(n, sizeof *errors);
-    uint32_t *all = calloc(n, sizeof *all);
-    struct lull_decision *decisions = calloc(n, sizeof *decisions);
-    int rc = !errors || !all || !decisions || !(r->film.planes & PT_FILM_HALF) ||
+    int rc = !errors || !(o->render->film.planes & PT_FILM_HALF) ||
              pt_criterion_find(PT_OPEN_NOISY_CRITERION, NULL, NULL, &table, &ignored) ||
              pt_criterion_create(table, NULL, 0, o->threads, NULL, &observer, &ignored) ||
-             lull_host_join(r->frame, observer, NULL) != LULL_OK;
+             lull_host_join(o->render->frame, observer, NULL) != LULL_OK;
+    for (uint32_t i = 0; i < n; i++)
+        scratch->due[i] = i;
+    rc = rc || lull_host_evaluate(observer, o->render->frame, pt_host_show(&o->render->film, o->render->blocks, &show),
+                                  scratch->due, NULL, n, scratch->decisions, NULL) != LULL_OK;
     for (uint32_t i = 0; !rc && i < n; i++)
-        all[i] = i;
-    rc = rc || lull_host_evaluate(observer, r->frame, pt_host_show(&r->film, r->blocks, &show), all, NULL, n, decisions,
-                                  NULL) != LULL_OK;
-    for (uint32_t i = 0; !rc && i < n; i++)
-        errors[i] = decisions[i].error;
+        errors[i] = scratch->decisions[i].error;
     lull_host_close(observer);
-    free(all);
-    free(decisions);
-    if (rc) {
-        free(errors);
-        errors = NULL;
-    }
-    return errors;
+    if (!rc)
+        return errors;
+    free(errors);
+    return NULL;
 }
 
 static void write_all(const struct pt_open *o, const struct pt_output_info *info, struct base_err *err)
@@ -73,14 +68,13 @@ static const char *processor_name(char text[128])
 static struct pt_output_info describe(const struct pt_open *o, const char *quote, const char *processor)
 {
     const struct pt_cli *cli = o->cli;
-    const struct lull_host_report of = {.scene = o->frame->paths[PT_SCENE],
-                                        .mask = cli->mask,
-                                        .kernel = o->kernel_name,
-                                        .scene_bytes = (double)o->scene->stats.bytes,
-                                        .processor = processor,
-                                        .command = (const char *const *)cli->argv,
-                                        .command_count = (uint64_t)cli->argc};
-    return (struct pt_output_info){.of = of,
+    return (struct pt_output_info){.of = {.scene = o->frame->paths[PT_SCENE],
+                                          .mask = cli->mask,
+                                          .kernel = o->kernel_name,
+                                          .scene_bytes = (double)o->scene->stats.bytes,
+                                          .processor = processor,
+                                          .command = (const char *const *)cli->argv,
+                                          .command_count = (uint64_t)cli->argc},
                                    .params = o->params.list,
                                    .param_count = o->params.count,
                                    .effects = o->scene->effects,
