@@ -19,7 +19,6 @@ struct plan {
     size_t pilot_count;
     uint32_t columns;
     int threads;
-    double samples, thread_s; /* of all frames; samples per pixel summed over blocks */
 };
 
 static int keep_answer(struct plan *p, const struct pt_open *o, const struct pt_quote *quote, size_t at,
@@ -98,31 +97,26 @@ static int fill_table(struct plan *p, const struct pt_shot *s, struct base_err *
     return 0;
 }
 
-static void add_up(struct plan *p)
+static void print_price(const struct plan *p)
 {
     const struct pt_shot_table *t = &p->table;
+    const double all = (double)t->block_count * (double)t->frame_count;
+    double samples = 0.0, thread_s = 0.0; /* samples per pixel summed over blocks */
+    uint32_t most = 0;
+    char thread[32], wall[32];
     for (size_t f = 0; f < t->frame_count; f++)
         for (size_t i = 0, k = pilot_of(p, f); i < t->block_count; i++) {
             const uint32_t spp = t->spp[f * t->block_count + i];
             const struct pilot *a = &p->pilots[k], *b = k + 1 < p->pilot_count ? a + 1 : a;
-            p->samples += spp;
-            p->thread_s += spp * 0.5 * (a->blocks[i].sample_s + b->blocks[i].sample_s);
+            samples += spp;
+            thread_s += spp * 0.5 * (a->blocks[i].sample_s + b->blocks[i].sample_s);
+            most = spp > most ? spp : most;
         }
-}
-
-static void print_price(const struct plan *p)
-{
-    const struct pt_shot_table *t = &p->table;
-    const double blocks = (double)t->block_count, frames = (double)t->frame_count;
-    char thread[32], wall[32];
-    uint32_t most = 0;
-    for (size_t i = 0; i < t->frame_count * t->block_count; i++)
-        most = t->spp[i] > most ? t->spp[i] : most;
     printf("%zu frames of %zu blocks, by %zu pilots: %.0f spp on average, %u for the most expensive block\n", t->frame_count,
-           t->block_count, p->pilot_count, p->samples / (blocks * frames), most);
+           t->block_count, p->pilot_count, samples / all, most);
     printf("%s of thread time, %s on %d threads that are free; %.1f x for the most expensive block's samples everywhere\n",
-           pt_quote_duration(p->thread_s, thread), pt_quote_duration(p->thread_s / p->threads, wall), p->threads,
-           most * blocks * frames / p->samples);
+           pt_quote_duration(thread_s, thread), pt_quote_duration(thread_s / p->threads, wall), p->threads,
+           most * all / samples);
 }
 
 int pt_shot_plan(const struct pt_shot *s, struct pt_open *o, int *status, struct base_err *err)
@@ -138,10 +132,8 @@ int pt_shot_plan(const struct pt_shot *s, struct pt_open *o, int *status, struct
         rc = fill_table(&p, s, err);
     if (!rc && *status == 0)
         rc = pt_shot_table_write(o->cli->shot.plan, &p.table, err);
-    if (!rc && *status == 0) {
-        add_up(&p);
+    if (!rc && *status == 0)
         print_price(&p);
-    }
     for (size_t i = 0; i < p.pilot_count; i++)
         free(p.pilots[i].blocks);
     free(p.pilots);
