@@ -21,60 +21,78 @@ static const struct lull_host_block *block_at(const struct lull_host_blocks *b, 
     return &b->list[(uint32_t)row * b->list_columns + (uint32_t)column];
 }
 
-enum { R, G, B, SPP, P_NOISY, ERROR, REASON, FIRST_AOV, CHANNELS_MAX = FIRST_AOV + 7 + 8 };
+/* What an EXR may hold of a pixel; of three numbers the first. */
+enum { SPP = 3, P_NOISY, ERROR, REASON, ALBEDO, NORMAL = 10, DEPTH = 13, NOISY, DENOISED = 17, WEIGHT = 20, JUDGED, ALL };
+/* What a part of it takes, beside planes of the film: a denoised picture; an error of the noisy one. */
+enum { A_DENOISER = PT_FILM_ALL + 1, A_JUDGE = 2 * A_DENOISER };
+
+static const struct {
+    uint32_t needs; /* 0: always there */
+    int count;
+    const char *names[7]; /* V: a value, as Blender wants to know */
+} parts[] = {{0, 7, {"R", "G", "B", "lull.spp.V", "lull.p_noisy.V", "lull.error.V", "lull.reason.V"}},
+             {PT_FILM_ALBEDO, 3, {"albedo.R", "albedo.G", "albedo.B"}},
+             {PT_FILM_NORMAL, 3, {"normal.X", "normal.Y", "normal.Z"}},
+             {PT_FILM_DEPTH, 1, {"depth.Z"}},
+             {A_DENOISER, 7, {"noisy.R", "noisy.G", "noisy.B", "denoised.R", "denoised.G", "denoised.B", "lull.weight.V"}},
+             {A_JUDGE, 1, {"lull.noisy_error.V"}}};
 
 struct exr_source {
     const struct pt_render *render;
     const struct pt_output_info *info;
+    const char *names[ALL];
+    int written[ALL], count; /* which of all numbers have these names */
 };
 
-/* Returns the number of channels filled so far. */
-static int aov_pixel(const struct pt_film *f, uint32_t aov, size_t i, uint64_t spp, size_t x, float *const *rows)
+static void choose_channels(struct exr_source *s)
 {
-    int c = FIRST_AOV;
-    double n = spp > 0 ? (double)spp : 1.0;
-    for (int k = 0; k < 3 && (aov & PT_FILM_ALBEDO); k++)
-        rows[c++][x] = (float)(f->albedo[3 * i + (size_t)k] / n);
-    for (int k = 0; k < 3 && (aov & PT_FILM_NORMAL); k++)
-        rows[c++][x] = (float)(f->normal[3 * i + (size_t)k] / n);
-    if (aov & PT_FILM_DEPTH)
-        rows[c++][x] = (float)f->depth[i];
-    return c;
+    const int denoised = s->info->denoised != NULL;
+    const uint32_t there =
+        s->render->config.planes | (denoised ? A_DENOISER : 0u) | (denoised && s->info->noisy_error ? A_JUDGE : 0u);
+    for (int k = 0, c = 0; c < ALL; k++)
+        for (int i = 0; i < parts[k].count; i++, c++)
+            if (!parts[k].needs || (parts[k].needs & there)) {
+                s->names[s->count] = parts[k].names[i];
+                s->written[s->count++] = c;
+            }
 }
 
-/* What is kept takes the place of the noisy picture, which goes to a layer of its own. */
-static void denoised_pixel(const struct pt_denoised *d, size_t i, size_t x, int c, float *const *rows)
+/* All that there is: 0 for what there is not. What is kept takes the place of the noisy picture. */
+static void read_pixel(const struct exr_source *s, int x, int y, float v[ALL])
 {
-    for (int k = 0; k < 3; k++) {
-        rows[c + k][x] = rows[R + k][x];
-        rows[c + 3 + k][x] = d->denoised[3 * i + (size_t)k];
-        rows[R + k][x] = d->rgb[3 * i + (size_t)k];
+    const struct pt_render *r = s->render;
+    const struct pt_film *f = &r->film;
+    const struct pt_denoised *d = s->info->denoised;
+    const struct lull_host_block *b = block_at(r->blocks, x, y);
+    const size_t i = pt_film_index(f, x, y);
+    const double n = b->spp > 0 ? (double)b->spp : 1.0;
+    double mean[3];
+    pt_film_mean(f, i, b->spp, mean);
+    for (size_t c = 0; c < 3; c++) {
+        v[c] = d ? d->rgb[3 * i + c] : (float)mean[c];
+        v[ALBEDO + c] = f->albedo ? (float)(f->albedo[3 * i + c] / n) : 0.0f;
+        v[NORMAL + c] = f->normal ? (float)(f->normal[3 * i + c] / n) : 0.0f;
+        v[NOISY + c] = (float)mean[c];
+        v[DENOISED + c] = d ? d->denoised[3 * i + c] : 0.0f;
     }
-    rows[c + 6][x] = d->weight[i];
+    v[SPP] = (float)(b->spp - f->dropped[i]);
+    v[P_NOISY] = (float)b->p_noisy;
+    v[ERROR] = (float)b->error;
+    v[REASON] = (float)b->reason;
+    v[DEPTH] = f->depth ? (float)f->depth[i] : 0.0f;
+    v[WEIGHT] = d ? d->weight[i] : 0.0f;
+    v[JUDGED] = s->info->noisy_error ? (float)s->info->noisy_error[b - r->blocks->list] : 0.0f;
 }
 
 static void exr_row(void *data, int y, float *const *rows)
 {
-    const struct exr_source *source = data;
-    const struct pt_output_info *info = source->info;
-    const struct pt_render *r = source->render;
-    int x0 = r->config.crop[0];
-    for (int x = x0; x < r->config.crop[2]; x++) {
-        const struct lull_host_block *b = block_at(r->blocks, x, y);
-        size_t i = pt_film_index(&r->film, x, y), k = (size_t)(x - x0);
-        double rgb[3];
-        pt_film_mean(&r->film, i, b->spp, rgb);
-        for (int c = 0; c < 3; c++)
-            rows[c][k] = (float)rgb[c];
-        rows[SPP][k] = (float)(b->spp - r->film.dropped[i]);
-        rows[P_NOISY][k] = (float)b->p_noisy;
-        rows[ERROR][k] = (float)b->error;
-        rows[REASON][k] = (float)b->reason;
-        int channels = aov_pixel(&r->film, r->config.planes, i, b->spp, k, rows);
-        if (info->denoised)
-            denoised_pixel(info->denoised, i, k, channels, rows);
-        if (info->denoised && info->noisy_error)
-            rows[channels + 7][k] = (float)info->noisy_error[b - r->blocks->list];
+    const struct exr_source *s = data;
+    const int *crop = s->render->config.crop;
+    for (int x = crop[0]; x < crop[2]; x++) {
+        float v[ALL];
+        read_pixel(s, x, y, v);
+        for (int c = 0; c < s->count; c++)
+            rows[c][x - crop[0]] = v[s->written[c]];
     }
 }
 
@@ -99,41 +117,9 @@ static void criterion_text(const struct pt_render *r, const struct pt_output_inf
         used += (size_t)snprintf(text + used, room - used, " %s=%s", info->params[i].key, info->params[i].value);
 }
 
-/* Names of the channels in the order of exr_row; V: a value, as Blender wants to know. Returns how many. */
-static int name_channels(uint32_t aov, const struct pt_output_info *info, const char *channels[CHANNELS_MAX])
-{
-    static const struct {
-        uint32_t aov; /* 0: always */
-        const char *name;
-    } list[] = {{0, "R"},
-                {0, "G"},
-                {0, "B"},
-                {0, "lull.spp.V"},
-                {0, "lull.p_noisy.V"},
-                {0, "lull.error.V"},
-                {0, "lull.reason.V"},
-                {PT_FILM_ALBEDO, "albedo.R"},
-                {PT_FILM_ALBEDO, "albedo.G"},
-                {PT_FILM_ALBEDO, "albedo.B"},
-                {PT_FILM_NORMAL, "normal.X"},
-                {PT_FILM_NORMAL, "normal.Y"},
-                {PT_FILM_NORMAL, "normal.Z"},
-                {PT_FILM_DEPTH, "depth.Z"}};
-    static const char *const denoised[] = {"noisy.R",    "noisy.G",    "noisy.B",       "denoised.R",
-                                           "denoised.G", "denoised.B", "lull.weight.V", "lull.noisy_error.V"};
-    int n = 0;
-    for (size_t i = 0; i < sizeof list / sizeof list[0]; i++)
-        if (!list[i].aov || (aov & list[i].aov))
-            channels[n++] = list[i].name;
-    for (int i = 0; info->denoised && i < 7 + (info->noisy_error != NULL); i++)
-        channels[n++] = denoised[i];
-    return n;
-}
-
 int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_output_info *info, struct base_err *err)
 {
-    const char *channels[CHANNELS_MAX];
-    int n = name_channels(r->config.planes, info, channels);
+    struct exr_source source = {.render = r, .info = info};
     char effects[512], criterion[2048], reasons[256];
     size_t used = 0;
     for (int i = 0; i < LULL_REASON_COUNT; i++)
@@ -153,7 +139,7 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
         {"software", "lull-render " BASE_VERSION, 0.0},
         {"lull:seconds", NULL, lull_host_elapsed_s(r->frame)}, /* last: left out of reproducible files */
     };
-    struct exr_source source = {r, info};
+    choose_channels(&source);
     const int *crop = r->config.crop;
     struct pt_exr_image image = {
         .width = r->config.width,
@@ -162,8 +148,8 @@ int pt_output_exr(const char *path, const struct pt_render *r, const struct pt_o
         .y0 = crop[1],
         .x1 = crop[2],
         .y1 = crop[3],
-        .channel_count = n,
-        .channels = channels,
+        .channel_count = source.count,
+        .channels = source.names,
         .attribute_count = (int)(sizeof attributes / sizeof attributes[0]) - (info->reproducible ? 1 : 0),
         .attributes = attributes,
         .row = exr_row,
