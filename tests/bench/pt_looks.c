@@ -17,7 +17,6 @@
 #include "base/clock.h"
 #include "pbrt/load.h"
 #include "render/checkpoint.h"
-#include "render/denoised.h"
 #include "render/host.h"
 #include "render/output.h"
 #include "support/pt_identity.h"

@@ -13,7 +13,7 @@
 
 #include <cmocka.h>
 
-#include "render/denoised.h"
+#include "render/output.h"
 #include "render/host.h"
 
 enum { W = 100, H = 90, BLOCK = 37, SPP_MAX = 8192 };
