@@ -19,7 +19,6 @@ static double *judge_noisy(const struct pt_open *o)
     const uint32_t n = o->render->blocks->count;
     struct lull_host_criterion *observer = NULL;
     const struct lull_criterion *table;
-    struct pt_host_view show;
     struct base_err ignored = {0};
     double *errors = calloc(n, sizeof *errors);
     int rc = !errors || !(o->render->film.planes & PT_FILM_HALF) ||
@@ -28,8 +27,8 @@ static double *judge_noisy(const struct pt_open *o)
              lull_host_join(o->render->frame, observer, NULL) != LULL_OK;
     for (uint32_t i = 0; i < n; i++)
         scratch->due[i] = i;
-    rc = rc || lull_host_evaluate(observer, o->render->frame, pt_host_show(&o->render->film, o->render->blocks, &show),
-                                  scratch->due, NULL, n, scratch->decisions, NULL) != LULL_OK;
+    rc = rc || lull_host_evaluate(observer, o->render->frame, &o->render->shown.view, scratch->due, NULL, n,
+                                  scratch->decisions, NULL) != LULL_OK;
     for (uint32_t i = 0; !rc && i < n; i++)
         errors[i] = scratch->decisions[i].error;
     lull_host_close(observer);

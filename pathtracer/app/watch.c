@@ -102,9 +102,8 @@ static int after_slice(void *data, struct pt_render *render, struct base_err *er
     if (w->info && (path_of(w, PT_PREVIEW) || w->open->cli->live) && !base_interrupted &&
         base_clock_wall_s() >= w->files_at_s)
         write_files(w, render);
-    struct pt_host_view show;
     if (w->display)
-        lull_host_display_update(w->display, pt_host_show(&render->film, render->blocks, &show), NULL);
+        lull_host_display_update(w->display, &render->shown.view, NULL);
     pt_progress_update(&w->progress, render);
     if (path_of(w, PT_CHECKPOINT) && !base_interrupted && base_clock_wall_s() >= w->checkpoint_at_s)
         save_now_and_then(w, render);
@@ -137,10 +136,8 @@ int pt_watch_init(struct pt_watch *w, const struct pt_open *open, const struct p
 
 void pt_watch_end(struct pt_watch *w)
 {
-    struct pt_host_view show;
-    const struct pt_render *r = w->open->render;
     base_log_clear(w->open->log);
-    if (w->display && !lull_host_display_close(w->display, pt_host_show(&r->film, r->blocks, &show)))
+    if (w->display && !lull_host_display_close(w->display, &w->open->render->shown.view))
         base_log_note(w->open->log, "--display-server: no viewer has taken the last picture");
     w->display = NULL;
 }

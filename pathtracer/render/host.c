@@ -161,12 +161,9 @@ static struct lull_plane plane_of(const void *data, int width, uint32_t channels
                                .channels = channels};
 }
 
-const struct lull_host_view *pt_host_show(const struct pt_film *film, struct lull_host_blocks *blocks,
-                                          struct pt_host_view *v)
+void pt_host_show(const struct pt_film *film, struct pt_host_view *v)
 {
     const int width = film->x1 - film->x0;
-    for (uint32_t i = 0; i < blocks->count; i++)
-        blocks->list[i].half_spp = film->half ? pt_film_half_spp(blocks->list[i].spp) : 0;
     v->dropped = plane_of(film->dropped, width, 1, sizeof *film->dropped, LULL_TYPE_U32, LULL_NORM_ONE);
     v->dropped_half = plane_of(film->dropped_half, width, 1, sizeof *film->dropped_half, LULL_TYPE_U32, LULL_NORM_ONE);
     memset(v->planes, 0, sizeof v->planes);
@@ -183,7 +180,6 @@ const struct lull_host_view *pt_host_show(const struct pt_film *film, struct lul
                                       .planes = v->planes,
                                       .dropped = &v->dropped,
                                       .dropped_half = film->dropped_half ? &v->dropped_half : NULL};
-    return &v->view;
 }
 
 static float sample(const struct pic_image *image, size_t i)

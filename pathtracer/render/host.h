@@ -41,10 +41,8 @@ struct pt_host_view {
     struct lull_plane planes[LULL_PLANE_COUNT], dropped, dropped_half;
     struct lull_host_view view;
 };
-/* Shows the film's arrays, which are borrowed, as the planes of the ABI, and sets the blocks' half_spp. Returns
- * &out->view. */
-const struct lull_host_view *pt_host_show(const struct pt_film *film, struct lull_host_blocks *blocks,
-                                          struct pt_host_view *out);
+/* Shows the film's arrays, which are borrowed, as the planes of the ABI. *out stays where it is. */
+void pt_host_show(const struct pt_film *film, struct pt_host_view *out);
 
 /* A region that the user wants better (lull_host_config.mask): any picture file of exactly this size, colours averaged, as
  * stored: a plane of numbers in [0, 1] that owns its data. BASE_EINVAL names what is wrong with the file. */

@@ -30,7 +30,6 @@ int pt_denoised_make(const struct pt_render *r, enum pt_picture picture, const c
 {
     const size_t n = r->film.pixels;
     struct lull_error e = {.struct_size = sizeof e};
-    struct pt_host_view view;
     *out = (struct pt_denoised){.rgb = malloc(7 * n * sizeof(float))};
     int rc = out->rgb ? 0 : base_fail_nomem(err, "the denoised picture");
     if (!rc) {
@@ -43,7 +42,7 @@ int pt_denoised_make(const struct pt_render *r, enum pt_picture picture, const c
                                                 .cancelled = cancelled};
         const struct lull_host_picture made = {
             .struct_size = sizeof made, .rgb = out->rgb, .denoised = out->denoised, .weight = out->weight};
-        rc = pt_host_result(lull_host_denoise(r->frame, pt_host_show(&r->film, r->blocks, &view), &how, &made, &e), &e, err);
+        rc = pt_host_result(lull_host_denoise(r->frame, &r->shown.view, &how, &made, &e), &e, err);
     }
     for (size_t i = 0; !rc && i < n; i++)
         out->weight_mean += (double)out->weight[i] / (double)n;

@@ -121,9 +121,7 @@ void pt_quote_destroy(struct pt_quote *q)
 int pt_quote_finish(struct pt_quote *q, struct pt_render *r, struct base_err *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
-    struct pt_host_view show;
-    const struct lull_host_view *view = pt_host_show(&r->film, r->blocks, &show);
-    return pt_host_result(lull_host_quote_finish(q->quote, view, &q->rows, &q->row_count, &e), &e, err);
+    return pt_host_result(lull_host_quote_finish(q->quote, &r->shown.view, &q->rows, &q->row_count, &e), &e, err);
 }
 
 const struct lull_host_quote_row *pt_quote_asked(const struct pt_quote *q)

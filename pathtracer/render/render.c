@@ -101,6 +101,7 @@ int pt_render_create(const struct pt_render_config *config, const struct pt_scen
         pt_render_destroy(r);
         return rc;
     }
+    pt_host_show(&r->film, &r->shown);
     *out = r;
     return 0;
 }
@@ -126,6 +127,12 @@ void pt_render_plan(struct pt_render *r, const uint32_t *spp)
         b->next_spp = spp[i];
         b->reason = b->spp < spp[i] ? LULL_REASON_NONE : LULL_REASON_UNIFORM;
     }
+}
+
+static void set_spp(const struct pt_render *r, struct lull_host_block *b, uint64_t spp)
+{
+    b->spp = spp;
+    b->half_spp = r->film.half ? pt_film_half_spp(spp) : 0;
 }
 
 /* Another rule is asked about every block as it is, in the place of the last answer if that was about as many samples. */
@@ -154,6 +161,8 @@ static void reschedule(const struct lull_host_blocks *blocks, struct lull_host_b
 void pt_render_go_on(struct pt_render *r, unsigned others, uint64_t first_spp)
 {
     struct lull_host_blocks *blocks = r->blocks;
+    for (uint32_t i = 0; i < blocks->count; i++)
+        set_spp(r, &blocks->list[i], blocks->list[i].spp);
     lull_host_extend(blocks);
     for (uint32_t i = 0; (others & ~(1u << PT_ROLE_END)) && i < blocks->count && !r->config.uniform; i++)
         reschedule(blocks, &blocks->list[i], others, first_spp);
@@ -264,7 +273,7 @@ static double gather(struct pt_render *r)
         thread_s += item->thread_s;
         b->dropped += item->dropped;
         if (item->y == b->y1 - 1)
-            b->spp = item->to;
+            set_spp(r, b, item->to);
         r->totals->samples += item->samples;
         r->totals->paths += item->samples;
         r->totals->rays += item->rays;
@@ -314,9 +323,7 @@ static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hook
 {
     const struct pt_render_work *w = &r->work;
     struct lull_error e = {.struct_size = sizeof e};
-    struct pt_host_view show;
-    if (lull_host_ask(r->frame, pt_host_show(&r->film, r->blocks, &show), w->due, w->final, count, w->decisions, &e) !=
-        LULL_OK)
+    if (lull_host_ask(r->frame, &r->shown.view, w->due, w->final, count, w->decisions, &e) != LULL_OK)
         warn_once(r, hooks, e.message);
 }
 
@@ -324,22 +331,20 @@ static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hook
 static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
 {
     struct pt_render_work *w = &r->work;
-    struct pt_host_view show;
     const uint32_t n = lull_host_due(r->frame, w->due, w->final);
     if (n == 0)
         return;
     ask(r, n, hooks);
     if (hooks->quote)
-        lull_host_quote_ask(hooks->quote, pt_host_show(&r->film, r->blocks, &show), w->due, n);
+        lull_host_quote_ask(hooks->quote, &r->shown.view, w->due, n);
     lull_host_apply(r->frame, w->due, n, w->decisions);
 }
 
 static int suspend(struct pt_render *r, const struct pt_render_hooks *hooks, int reason, struct base_err *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
-    struct pt_host_view show;
     int rc = hooks->suspend ? hooks->suspend(hooks->data, r, err) : 0;
-    if (lull_host_stop(r->frame, reason, pt_host_show(&r->film, r->blocks, &show), &e) != LULL_OK)
+    if (lull_host_stop(r->frame, reason, &r->shown.view, &e) != LULL_OK)
         warn_once(r, hooks, e.message);
     return rc;
 }

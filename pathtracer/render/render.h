@@ -65,6 +65,7 @@ struct pt_render {
     struct base_threads *threads;          /* borrows */
     struct lull_host_criterion *criterion; /* borrows; NULL only with config.uniform */
     struct pt_film film;
+    struct pt_host_view shown;       /* the film as criteria see it */
     struct lull_host_frame *frame;   /* owns; decides: blocks, limits, who is asked */
     struct lull_host_blocks *blocks; /* of the frame, as the totals */
     struct lull_host_totals *totals;

@@ -75,13 +75,11 @@ static void ask(struct pt_render *r, const char *name, struct lull_decision *d)
     static uint32_t all[BLOCKS_MAX];
     struct lull_host_criterion *c = open_criterion(name);
     struct lull_error e = {.struct_size = sizeof e};
-    struct pt_host_view show;
     struct base_err err = {0};
     for (uint32_t i = 0; i < r->blocks->count; i++)
         all[i] = i;
     if (lull_host_join(r->frame, c, &e) != LULL_OK ||
-        lull_host_evaluate(c, r->frame, pt_host_show(&r->film, r->blocks, &show), all, NULL, r->blocks->count, d, &e) !=
-            LULL_OK) {
+        lull_host_evaluate(c, r->frame, &r->shown.view, all, NULL, r->blocks->count, d, &e) != LULL_OK) {
         base_fail(&err, BASE_EINVAL, "%s", e.message);
         die(&err);
     }

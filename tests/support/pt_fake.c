@@ -240,6 +240,7 @@ void pt_fake_assert_same(const struct pt_render *a, const struct pt_render *b)
     for (uint32_t i = 0; i < a->blocks->count; i++) {
         const struct lull_host_block *p = &a->blocks->list[i], *q = &b->blocks->list[i];
         assert_int_equal(p->spp, q->spp);
+        assert_int_equal(p->half_spp, q->half_spp);
         assert_int_equal(p->reason, q->reason);
         assert_int_equal(p->checks, q->checks);
         assert_memory_equal(&p->error, &q->error, sizeof p->error);

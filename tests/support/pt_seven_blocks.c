@@ -60,6 +60,7 @@ void pt_seven_blocks_init(struct pt_seven_blocks *s)
         .frame = frame,
         .blocks = lull_host_blocks_of(frame),
         .totals = lull_host_totals_of(frame)};
+    pt_host_show(&s->render.film, &s->render.shown);
     assert_non_null(s->render.threads);
     s->render.totals->samples = 4321;
     s->render.totals->render_s = 50.5;

@@ -124,11 +124,13 @@ static void a_criterion_reads_the_mean(void **state)
             pt_film_mean(&film, i, spp, want[i]);
             pt_film_half_mean(&film, i, half_spp, want_half[i]);
         }
-        struct lull_host_block list = {.x1 = PIXELS, .y1 = 1, .spp = spp, .dropped = (uint64_t)dropped};
+        struct lull_host_block list = {
+            .x1 = PIXELS, .y1 = 1, .spp = spp, .half_spp = half_spp, .dropped = (uint64_t)dropped};
         struct lull_host_blocks blocks = {.count = 1, .list = &list, .x1 = PIXELS, .y1 = 1};
         struct pt_host_view film_view;
         struct lull_host_shown shown;
-        assert_int_equal(lull_host_show(&blocks, pt_host_show(&film, &blocks, &film_view), 0, &shown, NULL), LULL_OK);
+        pt_host_show(&film, &film_view);
+        assert_int_equal(lull_host_show(&blocks, &film_view.view, 0, &shown, NULL), LULL_OK);
         assert_int_equal(shown.planes[LULL_PLANE_COLOR].normaliser, dropped ? LULL_NORM_WEIGHT : LULL_NORM_SPP);
         const struct lull_view view = {.struct_size = sizeof view,
                                        .x1 = PIXELS,

@@ -33,6 +33,8 @@ static void same_bytes_for_any_threads_and_order(void **state)
     struct pt_render_config config = pt_fake_config();
     config.planes = PT_FILM_ALL;
     struct pt_fake_run one = pt_fake_render(&config, pt_fake_noise, 1, "32");
+    for (uint32_t i = 0; i < one.render->blocks->count; i++)
+        assert_int_equal(one.render->blocks->list[i].half_spp, pt_film_half_spp(one.render->blocks->list[i].spp));
     const int threads[] = {2, 3, 8, 3};
     for (int i = 0; i < 4; i++) {
         config.order_seed = i < 3 ? 0 : 99;
@@ -56,7 +58,7 @@ static void uniform_without_criterion(void **state)
     assert_int_equal(r.render->totals->samples, 27 * 11 * 50);
     assert_int_equal(r.render->totals->rays, 3 * 27 * 11 * 50);
     for (uint32_t i = 0; i < r.render->blocks->count; i++)
-        assert_int_equal(r.render->blocks->list[i].reason, LULL_REASON_UNIFORM);
+        assert_true(r.render->blocks->list[i].reason == LULL_REASON_UNIFORM && r.render->blocks->list[i].half_spp == 0);
     pt_fake_release(&r);
 }
 
