@@ -2,7 +2,6 @@
 
 #include <stdio.h>
 
-#include "quote_output.h"
 #include "render/checkpoint.h"
 #include "watch.h"
 

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "actions.h"
-#include "quote_output.h"
 
 /* The responses of a pilot about one frame. */
 struct pilot {

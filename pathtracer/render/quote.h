@@ -7,6 +7,8 @@
 #ifndef PT_RENDER_QUOTE_H
 #define PT_RENDER_QUOTE_H
 
+#include <stdio.h>
+
 #include "render/render.h"
 
 enum { PT_QUOTE_ROWS = 6 };
@@ -42,5 +44,26 @@ void pt_quote_destroy(struct pt_quote *quote);
 int pt_quote_finish(struct pt_quote *quote, struct pt_render *render, struct base_err *err);
 /* Of a finished one: the row of what the options ask for, which is always there. */
 const struct lull_host_quote_row *pt_quote_asked(const struct pt_quote *quote);
+
+/* What the answer is told with, as text, as JSON and as a picture (quote_output.c). */
+struct pt_quote_info {
+    const char *scene;   /* path of the scene file */
+    int64_t scene_bytes; /* memory of the scene */
+    double load_s;       /* wall seconds until the first sample */
+    int interrupted;     /* the pilot was */
+};
+
+/* The table for people and what stands out. The quote is finished; paths of the most expensive blocks are replayed. */
+void pt_quote_text(FILE *out, const struct pt_quote *quote, const struct pt_render *render,
+                   const struct pt_quote_info *info);
+/* The same and every block. */
+int pt_quote_json(FILE *out, const struct pt_quote *quote, const struct pt_render *render, const struct pt_quote_info *info,
+                  struct base_err *err);
+/* Predicted time of each block of the row as asked: thread seconds, or minutes when they are long. */
+int pt_quote_map(const char *path, const struct pt_quote *quote, const struct pt_render *render, struct base_err *err);
+
+/* "9.9 s", "1.7 min", "12 h"; "12,345", and "12,345+" where there may be more. Both return text. */
+const char *pt_quote_duration(double s, char text[32]);
+const char *pt_quote_thousands(double value, int more, char text[32]);
 
 #endif

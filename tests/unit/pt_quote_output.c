@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "app/quote_output.h"
+#include "render/quote.h"
 #include "picture/read.h"
 #include "support/approve.h"
 #include "support/pt_seven_blocks.h"

@@ -1,4 +1,4 @@
-#include "quote_output.h"
+#include "render/quote.h"
 
 #include <math.h>
 #include <stdlib.h>
