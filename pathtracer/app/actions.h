@@ -33,4 +33,10 @@ void pt_action_explain(const struct pt_scene *scene, const struct pt_render_conf
 int pt_action_debug_path(const struct pt_scene *scene, const struct pt_render_config *config, const int at[3],
                          struct base_err *err);
 
+/* Every frame whose image is not there yet, one after the other; of several processes each takes every n-th. Or, with
+ * --plan-shot, its table. */
+int pt_shot_run(const struct pt_cli *cli, struct job *job, struct base_log *log, int *status, struct base_err *err);
+/* --plan-shot: pilots of every n-th frame, the table from them, its price on stdout. */
+int pt_shot_plan(const struct pt_shot *shot, struct pt_open *open, int *status, struct base_err *err);
+
 #endif

@@ -36,7 +36,7 @@ enum pt_path {
     PT_PATHS = PT_STOP_MAPS + PT_CLI_MAX_STOP_MAPS
 };
 
-/* Frames that belong together (shot.h). */
+/* Frames that belong together (frame.h). */
 struct pt_shot_plan {
     const char *frames, *camera_path; /* list; file; one of them: a shot */
     const char *plan, *table;         /* --plan-shot, --shot-table */

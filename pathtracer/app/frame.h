@@ -67,4 +67,20 @@ int pt_frame_has_number(const char *pattern);
  * noise. */
 uint32_t pt_frame_seed(uint32_t seed, int number);
 
+/* --- a shot: frames that belong together, from one scene file per frame or one scene and a path of the camera -------- */
+
+struct pt_shot {
+    int *frames;           /* owns; [count], rising */
+    struct pt_view *views; /* owns; [count], or NULL: the scene's camera */
+    size_t count;
+};
+
+void pt_shot_release(struct pt_shot *shot);
+
+/* A list of frames like 1-24, 1,5,9 or 1-24:2; rising. */
+int pt_shot_parse_frames(const char *text, struct pt_shot *shot, struct base_err *err);
+/* Lines "frame;eye;at;up;fov" below one that says so; the first four as for --look-at, fov as for --fov or nothing. name: of
+ * the file. */
+int pt_shot_parse_path(const char *name, const char *text, size_t size, struct pt_shot *shot, struct base_err *err);
+
 #endif

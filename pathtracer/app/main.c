@@ -4,7 +4,6 @@
 
 #include "actions.h"
 #include "base/interrupt.h"
-#include "shot.h"
 
 static int list_criteria(struct base_log *log, struct base_err *err)
 {

@@ -1,4 +1,4 @@
-#include "shot.h"
+#include "actions.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -7,7 +7,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "actions.h"
 #include "base/files.h"
 #include "base/list.h"
 #include "base/options.h"

@@ -1,10 +1,8 @@
-#include "shot.h"
+#include "actions.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "actions.h"
 
 /* The responses of a pilot about one frame. */
 struct pilot {

@@ -2,7 +2,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-#include "app/shot.h"
+#include "app/frame.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

@@ -10,7 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "app/shot.h"
+#include "app/frame.h"
 #include "base/files.h"
 #include "sample/sampler.h"
 
