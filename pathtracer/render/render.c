@@ -161,7 +161,7 @@ static void reschedule(const struct lull_host_blocks *blocks, struct lull_host_b
 void pt_render_go_on(struct pt_render *r, unsigned others, uint64_t first_spp)
 {
     struct lull_host_blocks *blocks = r->blocks;
-    for (uint32_t i = 0; i < blocks->count; i++)
+    for (uint32_t i = 0; i < blocks->count; i++) /* no state holds half_spp */
         set_spp(r, &blocks->list[i], blocks->list[i].spp);
     lull_host_extend(blocks);
     for (uint32_t i = 0; (others & ~(1u << PT_ROLE_END)) && i < blocks->count && !r->config.uniform; i++)
@@ -251,6 +251,7 @@ static size_t list_items(struct pt_render *r, double span_s)
         per_spp_s += c->per_spp_s;
         known &= c->per_spp_s > 0.0;
     }
+    /* All of them get what fits into the span; of blocks whose time is not known one sample tells it. */
     double busy = r->busy_threads > 0.0 ? r->busy_threads : threads;
     w->count = 0;
     for (uint32_t k = 0; k < chosen; k++)
