@@ -68,54 +68,40 @@ static inline int pt_film_in_half(uint32_t sample) { return !(sample & 1); }
 /* How many of the samples [0, spp) are in half A. */
 static inline uint64_t pt_film_half_spp(uint64_t spp) { return spp / 2 + spp % 2; }
 
-/* A pixel out of the film and back. Fields of planes that the film does not have are not set by the one and not read by the
- * other (the auxiliary ones are zero, because pt_film_add sums all of them as soon as one is wanted). */
-static inline void pt_film_load(const struct pt_film *f, size_t i, struct pt_film_pixel *p)
+static inline void pt_film_exchange_bytes(void *film, void *pixel, size_t size, int store)
 {
-    memcpy(p->color, f->color + 3 * i, sizeof p->color);
-    p->dropped = f->dropped[i];
-    p->dropped_half = 0;
+    memcpy(store ? film : pixel, store ? pixel : film, size);
+}
+
+/* A pixel between the film and *p. store: a constant, so that each way is compiled by itself. */
+static inline void pt_film_exchange(const struct pt_film *f, size_t i, struct pt_film_pixel *p, int store)
+{
+    pt_film_exchange_bytes(f->color + 3 * i, p->color, sizeof p->color, store);
+    pt_film_exchange_bytes(f->dropped + i, &p->dropped, sizeof p->dropped, store);
     if (f->planes & PT_FILM_HALF) {
-        memcpy(p->half, f->half + 3 * i, sizeof p->half);
-        p->dropped_half = f->dropped_half[i];
+        pt_film_exchange_bytes(f->half + 3 * i, p->half, sizeof p->half, store);
+        pt_film_exchange_bytes(f->dropped_half + i, &p->dropped_half, sizeof p->dropped_half, store);
     }
     if (f->planes & PT_FILM_MOMENT2)
-        p->moment2 = f->moment2[i];
-    if (!(f->planes & PT_FILM_AUX))
-        return;
-    memset(p->albedo, 0, sizeof p->albedo);
-    memset(p->normal, 0, sizeof p->normal);
-    p->depth = 0.0;
-    p->depth_hits = 0;
+        pt_film_exchange_bytes(f->moment2 + i, &p->moment2, sizeof p->moment2, store);
     if (f->planes & PT_FILM_ALBEDO)
-        memcpy(p->albedo, f->albedo + 3 * i, sizeof p->albedo);
+        pt_film_exchange_bytes(f->albedo + 3 * i, p->albedo, sizeof p->albedo, store);
     if (f->planes & PT_FILM_NORMAL)
-        memcpy(p->normal, f->normal + 3 * i, sizeof p->normal);
+        pt_film_exchange_bytes(f->normal + 3 * i, p->normal, sizeof p->normal, store);
     if (f->planes & PT_FILM_DEPTH) {
-        p->depth = f->depth[i];
-        p->depth_hits = f->depth_hits[i];
+        pt_film_exchange_bytes(f->depth + i, &p->depth, sizeof p->depth, store);
+        pt_film_exchange_bytes(f->depth_hits + i, &p->depth_hits, sizeof p->depth_hits, store);
     }
 }
 
-static inline void pt_film_store(struct pt_film *f, size_t i, const struct pt_film_pixel *p)
+/* A pixel out of the film and back; sums of planes that it does not have begin with 0. */
+static inline void pt_film_load(const struct pt_film *f, size_t i, struct pt_film_pixel *p)
 {
-    memcpy(f->color + 3 * i, p->color, sizeof p->color);
-    f->dropped[i] = p->dropped;
-    if (f->planes & PT_FILM_HALF) {
-        memcpy(f->half + 3 * i, p->half, sizeof p->half);
-        f->dropped_half[i] = p->dropped_half;
-    }
-    if (f->planes & PT_FILM_MOMENT2)
-        f->moment2[i] = p->moment2;
-    if (f->planes & PT_FILM_ALBEDO)
-        memcpy(f->albedo + 3 * i, p->albedo, sizeof p->albedo);
-    if (f->planes & PT_FILM_NORMAL)
-        memcpy(f->normal + 3 * i, p->normal, sizeof p->normal);
-    if (f->planes & PT_FILM_DEPTH) {
-        f->depth[i] = p->depth;
-        f->depth_hits[i] = p->depth_hits;
-    }
+    *p = (struct pt_film_pixel){0};
+    pt_film_exchange(f, i, p, 0);
 }
+
+static inline void pt_film_store(struct pt_film *f, size_t i, struct pt_film_pixel *p) { pt_film_exchange(f, i, p, 1); }
 
 static inline void pt_film_sum(double sums[3], pt_vec3 v)
 {
