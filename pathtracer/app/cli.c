@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/files.h"
 #include "job/job.h"
 #include "pbrt/xform.h"
 #include "render/checkpoint.h"
@@ -261,6 +260,11 @@ static const char *const exr[] = {"exr", NULL}, *const png[] = {"png", NULL}, *c
                          *const html[] = {"html", "htm", NULL}, *const png_or_csv[] = {"png", "csv", NULL};
 
 #define TO(member) BASE_TO(struct pt_cli, member)
+#define TO_STOP_MAPS \
+    { \
+        BASE_STORE_TEXTS, offsetof(struct pt_cli, paths[PT_STOP_MAPS]), offsetof(struct pt_cli, stop_maps), \
+            PT_CLI_MAX_STOP_MAPS, "stop maps" \
+    }
 
 const struct base_option pt_cli_options[] = {
     {.help = "When to stop:"},
@@ -330,13 +334,7 @@ const struct base_option pt_cli_options[] = {
      .help = "Multi-layer EXR (default: the scene's name in the current folder, if nothing else is asked for)"},
     {"preview", 0, "FILE.png", TO(paths[PT_PREVIEW]), .output = BASE_FILE, .words = png,
      .help = "The image as sRGB, also while rendering"},
-    {"stop-map",
-     0,
-     "FILE.png|FILE.csv",
-     {BASE_STORE_TEXTS, offsetof(struct pt_cli, paths[PT_STOP_MAPS]), offsetof(struct pt_cli, stop_maps),
-      PT_CLI_MAX_STOP_MAPS, "stop maps"},
-     .output = BASE_FILE,
-     .words = png_or_csv,
+    {"stop-map", 0, "FILE.png|FILE.csv", TO_STOP_MAPS, .output = BASE_FILE, .words = png_or_csv,
      .help = "Samples per block as a picture or a table; may be repeated"},
     {"report", 0, "FILE.json", TO(paths[PT_REPORT]), .output = BASE_FILE, .words = json, .help = "Everything about the run"},
     {"live", 0, NULL, TO(live),
