@@ -18,14 +18,6 @@
 
 enum { FRAMES_MAX = 1000000, PATH_BYTES_MAX = 1 << 26, NAME_ROOM = 4096, LINE_ROOM = 512 };
 
-static int add_frame(struct pt_shot *s, long frame, size_t *room, struct base_err *err)
-{
-    if (!pt_grow((void **)&s->frames, room, s->count, sizeof *s->frames))
-        return base_fail_nomem(err, "frames");
-    s->frames[s->count++] = (int)frame;
-    return 0;
-}
-
 int pt_shot_parse_frames(const char *text, struct pt_shot *s, struct base_err *err)
 {
     size_t room = 0;
@@ -38,9 +30,11 @@ int pt_shot_parse_frames(const char *text, struct pt_shot *s, struct base_err *e
             return base_fail(err, BASE_EINVAL, "--frames %s: expected a rising list like 1-24, 1,5,9 or 1-24:2", text);
         if ((last - first) / step >= FRAMES_MAX - s->count)
             return base_fail(err, BASE_EINVAL, "--frames %s: more than %d frames", text, FRAMES_MAX);
-        for (unsigned long frame = first; frame <= last; frame += step)
-            if (add_frame(s, (long)frame, &room, err) != 0)
-                return BASE_ENOMEM;
+        for (unsigned long frame = first; frame <= last; frame += step) {
+            if (!pt_grow((void **)&s->frames, &room, s->count, sizeof *s->frames))
+                return base_fail_nomem(err, "frames");
+            s->frames[s->count++] = (int)frame;
+        }
     } while (*at != '\0');
     return 0;
 }
@@ -68,8 +62,7 @@ static int parse_view(char *line, int *frame, struct pt_view *view, struct base_
     return pt_cli_look_at(field[1], view, err);
 }
 
-static int parse_line(const char *name, const char *begin, size_t length, size_t at, struct pt_shot *s, size_t *room,
-                      struct base_err *err)
+static int parse_line(const char *name, const char *begin, size_t length, size_t at, struct pt_shot *s, struct base_err *err)
 {
     char line[LINE_ROOM];
     struct base_err why = {0};
@@ -87,24 +80,24 @@ static int parse_line(const char *name, const char *begin, size_t length, size_t
         rc = base_fail(&why, BASE_EINVAL, "expected rising frames");
     if (rc)
         return base_fail(err, rc, "%s:%zu: %s", name, at, why.text);
-    rc = add_frame(s, frame, room, err);
-    if (!rc)
-        s->views[s->count - 1] = view;
-    return rc;
+    s->frames[s->count] = frame;
+    s->views[s->count++] = view;
+    return 0;
 }
 
 int pt_shot_parse_path(const char *name, const char *text, size_t size, struct pt_shot *s, struct base_err *err)
 {
     const char *end = text + size, *at = text + base_utf8_mark(text, size);
-    size_t lines = 1, room = 0;
+    size_t lines = 1;
     for (const char *p = text; p < end; p++)
         lines += *p == '\n';
+    s->frames = calloc(lines, sizeof *s->frames);
     s->views = calloc(lines, sizeof *s->views);
-    if (!s->views)
+    if (!s->frames || !s->views)
         return base_fail_nomem(err, "camera path");
     for (size_t line = 1; at < end; line++) {
         const char *newline = memchr(at, '\n', (size_t)(end - at)), *stop = newline ? newline : end;
-        int rc = parse_line(name, at, (size_t)(stop - at), line, s, &room, err);
+        int rc = parse_line(name, at, (size_t)(stop - at), line, s, err);
         if (rc)
             return rc;
         at = newline ? newline + 1 : end;
