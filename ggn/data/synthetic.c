@@ -18,8 +18,8 @@ static const double CLEAN_END = 0.4;     /* a threshold below this share of the 
 struct source {
     float *base, *d, *last; /* [3][P] linear: the converged image, the half-buffer difference, the last recorded level */
     float *noise;           /* [3][P] of the level that is made; `base` owns all four */
-    /* n_reference infinite: `base` is the mean of the full level and stands for the converged image */
-    double n_full, n_reference;
+    double n_full;          /* 0: the block is no source */
+    double n_reference;     /* infinite: `base` is the mean of the full level and stands for the converged image */
 };
 
 /* Up to `highest` beyond `from`, each rounded to whole samples before it is multiplied. */
@@ -68,30 +68,28 @@ static void fill_level(const struct ggn_series_set *set, struct ggn_level_series
         c->has_noise_map[k] = 0;
 }
 
-/* The texture of all levels to be measured is that of the recorded halves, as in the labels (observer/curve.h): `base` has
- * noise of its own that the levels share. k: a level that is to be made yet. */
-static void see_texture(const struct ggn_series_set *set, struct ggn_level_series *c, int k, const struct source *s)
-{
-    if (set->meter.memory)
-        ggn_series_measure(set, c, k, s->base, s->d, 1, 0);
-}
-
-/* Gives the series these levels in the place of those that it has. */
-static int make_levels(const struct ggn_series_set *set, struct ggn_level_series *c, const struct source *s,
+/* Gives the series these levels, in the place of all that it has beyond the first `kept`. X_n = (n₀·X + m·Y_m)/n with
+ * m = n − n₀: the last level X that is kept, of n₀ samples, continued with m others, whose running mean Y_m is the walk. */
+static int make_levels(const struct ggn_series_set *set, struct ggn_level_series *c, int kept, const struct source *s,
                        const double *spp, int n, uint32_t seed, struct base_err *err)
 {
     const size_t values = ggn_series_set_values(set);
-    int rc = ggn_series_grow(set, c, n ? n : 1, err);
+    const double n0 = kept ? c->spp[kept - 1] : 0;
+    int rc = ggn_series_grow(set, c, kept + n > 0 ? kept + n : 1, err);
 
     if (rc)
         return rc;
-    c->n_levels = n;
-    memcpy(c->spp, spp, (size_t)n * sizeof *spp);
-    see_texture(set, c, 0, s);
+    c->n_levels = kept + n;
+    memcpy(c->spp + kept, spp, (size_t)n * sizeof *spp);
+    /* The texture of all levels to be measured is that of the recorded halves, as in the labels (observer/curve.h): `base`
+     * has noise of its own that the levels share. */
+    if (set->meter.memory && n)
+        ggn_series_measure(set, c, kept, s->base, s->d, 1, 0);
     memset(s->noise, 0, values * sizeof *s->noise);
     for (int k = n - 1; k >= 0; k--) {
-        step_down(s, values / 3, spp[k], k + 1 < n ? spp[k + 1] : s->n_reference, ggn_hash((uint32_t)k, seed));
-        fill_level(set, c, k, s, 1, 0);
+        const double m = spp[k] - n0, above = k + 1 < n ? spp[k + 1] - n0 : s->n_reference;
+        step_down(s, values / 3, m, above, ggn_hash((uint32_t)k, seed));
+        fill_level(set, c, kept + k, s, kept ? m : 1, n0);
     }
     return 0;
 }
@@ -113,24 +111,28 @@ static struct ggn_level_series *append_copy(struct ggn_series_set *set, int of, 
     return c;
 }
 
-/* with_reference 0: as if none had been recorded. */
+/* with_reference 0: as if none had been recorded. The caller frees s->base, also after a failure. */
 static int read_source(const struct ggn_series_set *set, const struct ggn_level_series *c, int with_reference,
-                       struct source *s, int *usable, struct base_err *err)
+                       struct source *s, struct base_err *err)
 {
     const struct ggn_dataset_view *v = &set->data.views[c->view];
-    struct seq_block b = {0};
+    const size_t values = ggn_series_set_values(set);
     const uint32_t index = seq_manifest_find(&v->manifest, c->block);
-    int rc = 0;
+    struct seq_block b;
 
-    *usable = 0;
+    s->n_full = 0;
     if (index == v->manifest.n_blocks || !v->manifest.reference_independent)
         return 0;
-    rc = seq_manifest_read_block(v->dir, &v->manifest, index, &b, err);
+    if (!s->base && !(s->base = malloc(4 * values * sizeof *s->base)))
+        return base_fail_nomem(err, "synthetic images");
+    s->d = s->base + values;
+    s->last = s->d + values;
+    s->noise = s->last + values;
+    int rc = seq_manifest_read_block(v->dir, &v->manifest, index, &b, err);
     if (rc)
         return rc;
-    const struct seq_record *full = seq_full_level(&b);
+    const struct seq_record *full = seq_full_level(&b), *reference = with_reference ? b.reference : NULL;
     if (full) {
-        const struct seq_record *reference = with_reference ? b.reference : NULL;
         s->n_full = full->spp;
         s->n_reference = reference ? reference->spp : (double)INFINITY;
         rc = seq_mean(&b, reference ? reference : full, s->base, err);
@@ -138,21 +140,9 @@ static int read_source(const struct ggn_series_set *set, const struct ggn_level_
             rc = seq_half(&b, full, s->d, err);
         if (!rc)
             rc = seq_mean(&b, &b.levels[b.n_levels - 1], s->last, err);
-        *usable = !rc;
     }
     seq_block_release(&b);
     return rc;
-}
-
-static int source_init(struct source *s, const struct ggn_series_set *set, struct base_err *err)
-{
-    size_t values = ggn_series_set_values(set);
-    float *memory = malloc(4 * values * sizeof *memory);
-
-    if (!memory)
-        return base_fail_nomem(err, "synthetic images");
-    *s = (struct source){.base = memory, .d = memory + values, .last = memory + 2 * values, .noise = memory + 3 * values};
-    return 0;
 }
 
 int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uint32_t seed, struct base_err *err)
@@ -160,48 +150,21 @@ int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uin
     const double ratio = set->ratio > 1.01 ? set->ratio : 1.15;
     struct source s = {0};
     double spp[MAX_LEVELS];
-    int rc = source_init(&s, set, err), recorded = set->n;
+    int rc = 0;
 
-    for (int i = 0; !rc && i < recorded; i++) {
-        int usable = 0;
+    for (int i = 0, recorded = set->n; !rc && i < recorded; i++) {
         if (set->series[i].split != GGN_SPLIT_TRAIN)
             continue;
-        rc = read_source(set, &set->series[i], 1, &s, &usable, err);
-        for (int k = 0; !rc && usable && isfinite(s.n_reference) && k < per_series; k++) {
+        rc = read_source(set, &set->series[i], 1, &s, err);
+        for (int k = 0; !rc && s.n_full > 0 && isfinite(s.n_reference) && k < per_series; k++) {
             const uint32_t own_seed = ggn_hash((uint32_t)(i * 64 + k), seed);
             const int n = choose_levels(spp, 0, set->first_spp, ratio, HIGHEST_SHARE * s.n_reference, 1, own_seed);
             struct ggn_level_series *c = append_copy(set, i, err);
-            rc = c ? make_levels(set, c, &s, spp, n, own_seed, err) : BASE_ENOMEM;
+            rc = c ? make_levels(set, c, 0, &s, spp, n, own_seed, err) : BASE_ENOMEM;
         }
     }
     free(s.base);
     return rc;
-}
-
-/* X_n = (n₀·X + m·Y_m)/n with m = n − n₀: the last recorded level X, continued with the first m samples of the reference,
- * whose running mean Y_m is the same walk as above. */
-static int extend_series(const struct ggn_series_set *set, struct ggn_level_series *c, const struct source *s, uint32_t seed,
-                         struct base_err *err)
-{
-    size_t values = ggn_series_set_values(set);
-    const int first = c->n_levels;
-    const double n0 = c->spp[first - 1], ratio = set->ratio > 1.01 ? set->ratio : 1.15;
-    double spp[MAX_LEVELS];
-    int n = choose_levels(spp, n0, n0 * ratio, ratio, HIGHEST_SHARE * s->n_reference, 0, seed);
-    int rc = ggn_series_grow(set, c, first + n, err);
-    if (rc)
-        return rc;
-    if (n)
-        see_texture(set, c, first + n - 1, s);
-    memset(s->noise, 0, values * sizeof *s->noise);
-    for (int k = n - 1; k >= 0; k--) {
-        double m = spp[k] - n0;
-        step_down(s, values / 3, m, k + 1 < n ? spp[k + 1] - n0 : s->n_reference, ggn_hash((uint32_t)k, seed));
-        c->spp[first + k] = spp[k];
-        fill_level(set, c, first + k, s, m, n0);
-    }
-    c->n_levels += n;
-    return 0;
 }
 
 /* Without a reference: levels up to SEQ_SIMULATED_CAP in place of the recorded ones. */
@@ -213,36 +176,38 @@ static int simulate_series(const struct ggn_series_set *set, struct ggn_level_se
         choose_levels(spp, 0, set->first_spp < 16 ? set->first_spp : 16, ratio, SEQ_SIMULATED_CAP / ratio, jittered, seed);
 
     spp[n++] = SEQ_SIMULATED_CAP;
-    int rc = make_levels(set, c, s, spp, n, seed, err);
+    int rc = make_levels(set, c, 0, s, spp, n, seed, err);
     c->simulated |= !rc;
     return rc;
 }
 
 int ggn_series_set_extend(struct ggn_series_set *set, int all, uint32_t seed, struct base_err *err)
 {
-    const double ratio = set->ratio > 1.01 && set->ratio < 2 ? set->ratio : 1.2565; /* a third of an octave */
+    const double ratio = set->ratio > 1.01 ? set->ratio : 1.15;
+    const double anew = set->ratio > 1.01 && set->ratio < 2 ? set->ratio : 1.2565; /* a third of an octave */
     struct source s = {0};
-    int rc = source_init(&s, set, err);
+    double spp[MAX_LEVELS];
+    int rc = 0;
 
     for (int i = 0, recorded = set->n; !rc && i < recorded; i++) {
         struct ggn_level_series *c = &set->series[i];
-        int usable = 0;
-        double last = c->n_levels ? c->spp[c->n_levels - 1] : 0;
+        const double last = c->n_levels ? c->spp[c->n_levels - 1] : 0;
         /* a clean end is recorded already, or nothing is known beyond it */
         const int done = c->label.threshold < CLEAN_END * last || (c->label.censored && c->label.threshold <= last);
         if (c->synthetic || !c->has_label || (done && !all))
             continue;
-        rc = read_source(set, c, 1, &s, &usable, err);
-        if (rc || !usable)
+        rc = read_source(set, c, 1, &s, err);
+        if (rc || !(s.n_full > 0))
             continue;
         const uint32_t own_seed = ggn_hash((uint32_t)i, seed + 1);
         if (isfinite(s.n_reference)) {
-            rc = extend_series(set, c, &s, own_seed, err);
+            const int n = choose_levels(spp, last, last * ratio, ratio, HIGHEST_SHARE * s.n_reference, 0, own_seed);
+            rc = make_levels(set, c, c->n_levels, &s, spp, n, own_seed, err);
             continue;
         }
         if (set->keep_recorded)
             c = append_copy(set, i, err);
-        rc = c ? simulate_series(set, c, &s, ratio, 1, own_seed, err) : BASE_ENOMEM;
+        rc = c ? simulate_series(set, c, &s, anew, 1, own_seed, err) : BASE_ENOMEM;
     }
     free(s.base);
     return rc;
@@ -251,15 +216,15 @@ int ggn_series_set_extend(struct ggn_series_set *set, int all, uint32_t seed, st
 int ggn_series_set_simulate(struct ggn_series_set *set, double ratio, uint32_t seed, struct base_err *err)
 {
     struct source s = {0};
-    int rc = source_init(&s, set, err);
+    int rc = 0;
 
     for (int i = 0; !rc && i < set->n; i++) {
-        int usable = 0;
-        if (set->series[i].synthetic || !set->series[i].has_label)
+        struct ggn_level_series *c = &set->series[i];
+        if (c->synthetic || !c->has_label)
             continue;
-        rc = read_source(set, &set->series[i], 0, &s, &usable, err);
-        if (!rc && usable)
-            rc = simulate_series(set, &set->series[i], &s, ratio, 0, ggn_hash((uint32_t)i, seed + 1), err);
+        rc = read_source(set, c, 0, &s, err);
+        if (!rc && s.n_full > 0)
+            rc = simulate_series(set, c, &s, ratio, 0, ggn_hash((uint32_t)i, seed + 1), err);
     }
     set->ratio = ratio;
     set->step_spp = 0;
