@@ -9,7 +9,7 @@
 #include "data/series.h"
 #include "sequence/simulate.h"
 
-enum { MAX_LEVELS = 192 };
+enum { MAX_LEVELS = 512 };               /* 1.02 apart up to SEQ_SIMULATED_CAP they are fewer than 400 */
 static const double HIGHEST_SHARE = 0.7; /* of the reference's samples: nearer than that nothing but the reference is left */
 static const double JITTER = 0.04;       /* of the ratio between levels */
 static const double CLEAN_END = 0.4;     /* a threshold below this share of the last level needs no further levels */
@@ -171,7 +171,7 @@ int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uin
 static int simulate_series(const struct ggn_series_set *set, struct ggn_level_series *c, const struct source *s,
                            double ratio, int jittered, uint32_t seed, struct base_err *err)
 {
-    double spp[MAX_LEVELS];
+    double spp[MAX_LEVELS + 1];
     int n =
         choose_levels(spp, 0, set->first_spp < 16 ? set->first_spp : 16, ratio, SEQ_SIMULATED_CAP / ratio, jittered, seed);
 
