@@ -15,7 +15,6 @@
 #include "job/farm.h"
 #include "observer/calibrate.h"
 #include "observer/views.h"
-#include "observer/trials.h"
 
 enum { MAX_INPUTS = 256 };
 

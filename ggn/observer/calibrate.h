@@ -48,4 +48,9 @@ void ggn_calibration_release(struct ggn_calibration *c);
 /* The observer's parameters as JSON, with the table; ggn_observer_read reads it. */
 int ggn_calibration_write(const char *path, const struct ggn_calibration *c, struct base_err *err);
 
+/* Slope of the psychometric curve from raw yes/no trials `block;level;seen` (level times 20 is spp): P(seen) =
+ * Phi(log2(T_b/n)/s) with a threshold T_b per block and one s for the file, by maximum likelihood. *spread gets s in
+ * octaves. Lines that are no trial are left out; *skipped counts them. */
+int ggn_trials_spread(const char *path, double *spread, int *blocks, int *trials, int *skipped, struct base_err *err);
+
 #endif

@@ -18,7 +18,6 @@
 #include "base/files.h"
 #include "observer/calibrate.h"
 #include "observer/views.h"
-#include "observer/trials.h"
 #include "model/visibility.h"
 
 /* --- calibration --- */
@@ -328,7 +327,7 @@ static void trials_by_hand(void **state)
     (void)state;
     static const char text[] =
         "\xef\xbb\xbf" /* no number, but no part of the first one */
-        "0.0;1.0;1\n0.0;2.0;1\n0.0;3.0;0\n255.0;4.0;1\n255.0;6.0;0\r\n0;2;0 \t\n256;1;1\n-1;1;1\n1;0;1\n1;1e6;1\n"
+        "0.0;1.0;1\n\n0.0;2.0;1\n0.0;3.0;0\n255.0;4.0;1\n255.0;6.0;0\r\n0;2;0 \t\n256;1;1\n-1;1;1\n1;0;1\n1;1e6;1\n"
         "1;5;2\n1;5;0.5\n1;5\n1,5,1\n1;5;1;\n3;999999;0";
     static const struct {
         int block;
