@@ -1,3 +1,4 @@
+#define _GNU_SOURCE /* memmem */
 #include "data/import.h"
 
 #include <ctype.h>
@@ -10,14 +11,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/bytes.h"
 #include "base/colour.h"
 #include "base/files.h"
+#include "base/half.h"
 #include "data/labels.h"
 #include "picture/read.h"
 #include "sequence/builder.h"
 #include "sequence/manifest.h"
 #include "sequence/statistics.h"
-#include "data/rawls.h"
 
 struct level {
     uint32_t spp;
@@ -27,7 +29,7 @@ struct level {
 struct view {
     char dir[4096], prefix[GGN_VIEW_NAME];
     const char *ending;   /* of all files, static */
-    int n, has_layers;    /* has_layers: the files hold the halves themselves */
+    int n, has_halves;    /* has_halves: in files of their own, or as a layer of each level's */
     struct level *levels; /* owns; rising */
 };
 
@@ -177,6 +179,53 @@ void ggn_import_scene(const char *view, char *scene, size_t room)
     snprintf(scene, room, "%.*s", cut ? (int)(cut - view) : (int)strlen(view), view);
 }
 
+int ggn_rawls_parse(const char *path, const char *data, size_t size, struct pic_image *image, struct base_err *err)
+{
+    static const char head[] = "IHDR\n12\n", comments[] = "\nCOMMENTS\n", mark[] = "\nDATA\n";
+    const size_t fixed = sizeof head - 1 + 12 + sizeof comments - 1;
+    if (size < fixed || memcmp(data, head, sizeof head - 1) != 0 || memcmp(data + 20, comments, sizeof comments - 1) != 0)
+        return base_fail(err, BASE_EINVAL, "%s: not a rawls image", path);
+    const uint8_t *start = (const uint8_t *)data;
+    uint32_t width = base_get_u32(start + 8), height = base_get_u32(start + 12), channels = base_get_u32(start + 16);
+    if (width < 1 || height < 1 || width > PIC_MAX_SIDE || height > PIC_MAX_SIDE ||
+        (size_t)width * height > PIC_MAX_PIXELS || (channels != 1 && channels != 3))
+        return base_fail(err, BASE_EINVAL, "%s: %ux%u with %u channels cannot be used", path, width, height, channels);
+    const char *end = data + size, *p = memmem(data + fixed - 1, size - fixed + 1, mark, sizeof mark - 1);
+    /* the line with the size says nothing new */
+    p = p ? memchr(p + sizeof mark - 1, '\n', (size_t)(end - p) - (sizeof mark - 1)) : NULL;
+    size_t row = (size_t)width * channels * 4 + 1;
+    if (!p || (size_t)(end - (p + 1)) < row * height - 1)
+        return base_fail(err, BASE_EINVAL, "%s: truncated", path);
+    float *out = malloc((size_t)width * height * 3 * sizeof *out);
+    if (!out)
+        return base_fail_nomem(err, path);
+    float *to = out;
+    p++;
+    for (uint32_t y = 0; y < height; y++, p++)
+        for (uint32_t x = 0; x < width; x++, p += 4 * channels)
+            for (uint32_t c = 0; c < 3; c++) {
+                *to = base_f32_of_bits(base_get_u32((const uint8_t *)(p + 4 * (channels == 3 ? c : 0))));
+                if (!isfinite(*to++)) {
+                    free(out);
+                    return base_fail(err, BASE_EINVAL, "%s: pixel %u,%u is not finite", path, x, y);
+                }
+            }
+    *image = (struct pic_image){.width = (int)width, .height = (int)height, .channels = 3, .is_float_file = 1, .f32 = out};
+    return 0;
+}
+
+static int read_rawls(const char *path, struct pic_image *image, struct base_err *err)
+{
+    char *data;
+    size_t size;
+    int rc = base_file_read(path, (size_t)1 << 31, &data, &size, err);
+    if (rc)
+        return rc;
+    rc = ggn_rawls_parse(path, data, size, image, err);
+    free(data);
+    return rc;
+}
+
 static int check_finite(const char *path, const struct pic_image *p, struct base_err *err)
 {
     const size_t n = p->f32 ? 3 * (size_t)p->width * (size_t)p->height : 0;
@@ -194,7 +243,7 @@ static int read_picture(const struct view *v, const char *file, const char *laye
     char path[4400];
     snprintf(path, sizeof path, "%s/%s", v->dir, file);
     int rc = layer                              ? pic_read_layer(path, layer, p, err)
-             : strcmp(v->ending, ".rawls") == 0 ? ggn_rawls_read(path, p, err)
+             : strcmp(v->ending, ".rawls") == 0 ? read_rawls(path, p, err)
                                                 : pic_read_light(path, p, err);
     if (rc)
         return rc;
@@ -206,10 +255,9 @@ static int read_picture(const struct view *v, const char *file, const char *laye
     return rc;
 }
 
-/* The level's image and the half of its samples, if there is one. */
+/* The level's image and, with v->has_halves, the half of its samples. */
 struct pair {
     struct pic_image all, half;
-    int has_half;
 };
 
 static void pair_release(struct pair *p)
@@ -218,17 +266,14 @@ static void pair_release(struct pair *p)
     pic_release(&p->half);
 }
 
+/* p: zeroed. */
 static int read_pair(const struct view *v, const struct level *level, struct pair *p, struct base_err *err)
 {
+    const int own_file = level->half[0] != '\0';
     int rc = read_picture(v, level->file, NULL, &p->all, err);
-    if (rc)
-        return rc;
-    p->has_half = level->half[0] || v->has_layers;
-    if (level->half[0])
-        rc = read_picture(v, level->half, NULL, &p->half, err);
-    else if (v->has_layers)
-        rc = read_picture(v, level->file, HALF, &p->half, err);
-    if (!rc && p->has_half && (p->half.width != p->all.width || p->half.height != p->all.height))
+    if (!rc && v->has_halves)
+        rc = read_picture(v, own_file ? level->half : level->file, own_file ? NULL : HALF, &p->half, err);
+    if (!rc && v->has_halves && (p->half.width != p->all.width || p->half.height != p->all.height))
         rc = base_fail(err, BASE_EINVAL, "%s/%s: %dx%d, its half has %dx%d", v->dir, level->file, p->all.width,
                        p->all.height, p->half.width, p->half.height);
     if (rc)
@@ -236,17 +281,18 @@ static int read_pair(const struct view *v, const struct level *level, struct pai
     return rc;
 }
 
-static int has_layers(const struct view *v)
+static int has_halves(const struct view *v)
 {
     struct pic_image half = {0};
-    int has = !strcmp(v->ending, ".exr") && !v->levels[0].half[0] && !read_picture(v, v->levels[0].file, HALF, &half, NULL);
+    const struct level *first = &v->levels[0];
+    int has = first->half[0] || (!strcmp(v->ending, ".exr") && !read_picture(v, first->file, HALF, &half, NULL));
     pic_release(&half);
     return has;
 }
 
 /* Work on one row of blocks: all its builders fill level by level, so that each image is read once per row. */
 struct row {
-    int columns, block, y0;
+    int columns, block, y0, has_halves;
     struct seq_builder *builders; /* [columns] */
     uint8_t *display;             /* [3][block^2] */
     double *mean, *first, *half;  /* the same, linear: of all samples, of the first half, half their difference */
@@ -270,9 +316,9 @@ static void cut_block(const struct row *row, const struct pair *p, int x0, uint3
                 size_t from = ((size_t)(row->y0 + y) * (size_t)p->all.width + (size_t)(x0 + x)) * 3 + c;
                 size_t to = c * pixels + (size_t)y * (size_t)row->block + (size_t)x;
                 row->display[to] = p->all.u8[from];
-                if (p->all.f32 || p->has_half)
+                if (p->all.f32 || row->has_halves)
                     row->mean[to] = value_of(&p->all, from);
-                if (!p->has_half)
+                if (!row->has_halves)
                     continue;
                 row->first[to] = value_of(&p->half, from);
                 row->half[to] = difference(row->mean[to], row->first[to], spp, spp / 2);
@@ -289,8 +335,8 @@ static int add_picture(struct row *row, const struct pair *p, uint32_t spp, int 
     for (int c = 0; c < row->columns && !rc; c++) {
         cut_block(row, p, c * row->block, spp);
         struct seq_frame f = {.spp = spp, .is_reference = is_reference, .display = row->display};
-        f.mean = p->all.f32 || p->has_half ? row->mean : NULL;
-        if (p->has_half) {
+        f.mean = p->all.f32 || row->has_halves ? row->mean : NULL;
+        if (row->has_halves) {
             f.half = row->half;
             f.half_spp = spp / 2;
             f.full = full;
@@ -339,6 +385,7 @@ static int import_row(const struct view *v, const char *out, struct seq_manifest
     struct row row = {.columns = (int)columns,
                       .block = (int)block,
                       .y0 = index * (int)block,
+                      .has_halves = v->has_halves,
                       .builders = calloc(columns, sizeof *row.builders),
                       .display = malloc(3 * pixels),
                       .mean = calloc(11 * pixels, sizeof *row.mean)};
@@ -377,7 +424,6 @@ static int import_row(const struct view *v, const char *out, struct seq_manifest
 static int init_manifest(const struct view *v, const struct ggn_import_options *o, struct seq_manifest *m,
                          struct base_err *err)
 {
-    const int has_halves = v->has_layers || v->levels[0].half[0];
     struct pic_image first;
     int rc = read_picture(v, v->levels[0].file, NULL, &first, err);
     if (rc)
@@ -385,8 +431,8 @@ static int init_manifest(const struct view *v, const struct ggn_import_options *
     *m = (struct seq_manifest){.width = (uint32_t)first.width,
                                .height = (uint32_t)first.height,
                                .block = (uint32_t)o->block,
-                               .reference_spp = has_halves ? 0 : v->levels[v->n - 1].spp,
-                               .reference_independent = has_halves,
+                               .reference_spp = v->has_halves ? 0 : v->levels[v->n - 1].spp,
+                               .reference_independent = v->has_halves,
                                .n_levels = (uint32_t)v->n};
     pic_release(&first);
     ggn_import_scene(v->prefix, m->scene, sizeof m->scene);
@@ -434,11 +480,10 @@ static int attach_thresholds(const struct view *v, const char *out, const struct
 {
     char with_part[GGN_VIEW_NAME + 8];
     snprintf(with_part, sizeof with_part, "%s_part6", v->prefix);
-    const struct ggn_view *row = !t ? NULL : ggn_thresholds_find(t, with_part);
-    if (t && !row)
-        row = ggn_thresholds_find(t, v->prefix);
-    if (t && !row)
-        row = ggn_thresholds_find(t, base_file_name(v->dir));
+    const char *const names[] = {with_part, v->prefix, base_file_name(v->dir)};
+    const struct ggn_view *row = NULL;
+    for (int i = 0; i < 3 && t && !row; i++)
+        row = ggn_thresholds_find(t, names[i]);
     *labelled = row != NULL;
     if (!row)
         return 0;
@@ -463,7 +508,7 @@ int ggn_import_view(const char *dir, const char *out, const struct ggn_import_op
     if (!rc)
         rc = check_levels(&v, o->allow_gaps, err);
     if (!rc) {
-        v.has_layers = has_layers(&v);
+        v.has_halves = has_halves(&v);
         rc = init_manifest(&v, o, &m, err);
     }
     int made = 0;

@@ -12,6 +12,7 @@
 #include <stddef.h>
 
 #include "data/thresholds.h"
+#include "picture/image.h"
 
 struct ggn_import_options {
     int block;                               /* pixels */
@@ -28,5 +29,10 @@ int ggn_import_view(const char *dir, const char *out, const struct ggn_import_op
 int ggn_import_is_view(const char *dir);
 /* The group for the split: "p3d_kitchen-view1_part6" -> "p3d_kitchen". */
 void ggn_import_scene(const char *view, char *scene, size_t room);
+
+/* A .rawls image. Little endian: "IHDR\n12\n" u32 width u32 height u32 channels "\nCOMMENTS\n" lines "DATA\n" size "\n",
+ * then rows of width*channels float32, a newline after each. One or three channels; grey is repeated. Values must be
+ * finite. */
+int ggn_rawls_parse(const char *path, const char *data, size_t size, struct pic_image *image, struct base_err *err);
 
 #endif

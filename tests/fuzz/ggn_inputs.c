@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "data/labels.h"
-#include "data/rawls.h"
+#include "data/import.h"
 #include "data/thresholds.h"
 #include "picture/read.h"
 

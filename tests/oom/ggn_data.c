@@ -12,7 +12,7 @@
 
 #include "data/labels.h"
 #include "sequence/manifest.h"
-#include "data/rawls.h"
+#include "data/import.h"
 #include "picture/read.h"
 #include "data/thresholds.h"
 #include "figures/stats.h"

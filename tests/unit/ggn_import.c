@@ -16,7 +16,6 @@
 
 #include "data/dataset.h"
 #include "picture/read.h"
-#include "data/rawls.h"
 #include "data/import.h"
 #include "support/ggn_transcript.h"
 #include "picture/png.h"
