@@ -8,8 +8,11 @@
 
 #include "base/files.h"
 #include "base/list.h"
+#include "data/each.h"
 #include "data/shown_parts.h"
+#include "data/stimuli.h"
 #include "picture/png.h"
+#include "sequence/manifest.h"
 
 const char *const ggn_shown_kind_names[GGN_SHOWN_KINDS + 1] = {"", "noisy", "denoised", "blend", NULL};
 
@@ -103,8 +106,8 @@ int ggn_shown_enough_levels(const char *dir, const struct ggn_shown_block *b, st
                      b->id, b->n_levels);
 }
 
-int ggn_shown_write(const struct ggn_shown_request *q, int view, const struct ggn_shown_block *b, const char *what,
-                    int width, int height, const uint8_t *rgb, struct base_err *err)
+static int write_picture(const struct ggn_shown_request *q, int view, const struct ggn_shown_block *b, const char *what,
+                         int width, int height, const uint8_t *rgb, struct base_err *err)
 {
     char path[4096], block[16] = "";
     if (b)
@@ -126,19 +129,112 @@ static void make_heavy(const uint8_t *rgb, size_t n, uint8_t *out)
     }
 }
 
-int ggn_shown_write_reference(const struct ggn_shown_request *q, int view, const struct ggn_shown_block *b, int width,
-                              int height, const uint8_t *rgb, struct base_err *err)
+int ggn_shown_write(const struct ggn_shown_request *q, int view, const struct ggn_shown_block *b, const char *what,
+                    int width, int height, const uint8_t *rgb, struct base_err *err)
 {
     const size_t n = 3 * (size_t)width * (size_t)height;
-    int rc = ggn_shown_write(q, view, b, "reference", width, height, rgb, err);
-    if (rc)
+    int rc = write_picture(q, view, b, what ? what : "reference", width, height, rgb, err);
+    if (rc || what)
         return rc;
     uint8_t *noisy = malloc(n);
     if (!noisy)
         return base_fail_nomem(err, "picture of a catch trial");
     make_heavy(rgb, n, noisy);
-    rc = ggn_shown_write(q, view, b, "heavy", width, height, noisy, err);
+    rc = write_picture(q, view, b, "heavy", width, height, noisy, err);
     free(noisy);
+    return rc;
+}
+
+/* A view from a recorded sequence. */
+struct work {
+    const struct ggn_shown_request *request;
+    const char *folder;
+    const struct seq_manifest *manifest;
+    uint32_t *chosen; /* [n_blocks]; indices in the manifest */
+    int view;
+    struct ggn_shown_block *blocks; /* [n_blocks] */
+};
+
+static int make_levels(const struct work *w, struct ggn_shown_block *b, struct ggn_stimuli *s, uint8_t *rgb,
+                       struct base_err *err)
+{
+    const int width = (int)(b->x1 - b->x0), height = (int)(b->y1 - b->y0);
+    char what[32];
+    int rc = ggn_shown_write(w->request, w->view, b, NULL, width, height, s->converged, err);
+    b->levels = malloc((size_t)s->n * sizeof *b->levels);
+    if (!b->levels)
+        return base_fail_nomem(err, w->folder);
+    for (int i = 0; i < s->n && !rc; i++) {
+        double spp = round(s->spp[i]);
+        if (!ggn_shown_takes_level(w->request, b, spp))
+            continue;
+        rc = ggn_stimuli_make(s, i, rgb, err);
+        snprintf(what, sizeof what, "%.0f", spp);
+        if (!rc)
+            rc = ggn_shown_write(w->request, w->view, b, what, width, height, rgb, err);
+        b->levels[b->n_levels++] = (uint32_t)spp;
+    }
+    return !rc ? ggn_shown_enough_levels(w->folder, b, err) : rc;
+}
+
+static int work_block(void *data, long i, int worker, struct base_err *err)
+{
+    const struct work *w = data;
+    struct seq_block block;
+    struct ggn_stimuli stimuli;
+    (void)worker;
+    int rc = seq_manifest_read_block(w->folder, w->manifest, w->chosen[i], &block, err);
+    if (rc)
+        return rc;
+    uint8_t *rgb = malloc(3 * (size_t)block.width * block.height);
+    rc = rgb ? ggn_stimuli_init(&stimuli, &block, w->manifest->reference_independent, err) : base_fail_nomem(err, w->folder);
+    if (!rc) {
+        rc = make_levels(w, &w->blocks[i], &stimuli, rgb, err);
+        ggn_stimuli_release(&stimuli);
+    }
+    free(rgb);
+    seq_block_release(&block);
+    return rc;
+}
+
+static int by_id(const void *a, const void *b)
+{
+    uint32_t x = ((const struct ggn_shown_block *)a)->id, y = ((const struct ggn_shown_block *)b)->id;
+    return (x > y) - (x < y);
+}
+
+static int make_sequence(const struct ggn_shown_request *q, const struct ggn_shown_source *source, int index,
+                         struct ggn_shown_view *view, struct base_threads *threads, struct base_err *err)
+{
+    struct seq_manifest m = {0};
+    struct work w = {q, source->folder, &m, NULL, index, NULL};
+    int rc = seq_manifest_read(source->folder, &m, err);
+    if (!rc && (m.n_blocks < 1 || m.n_blocks > GGN_SHOWN_MAX_BLOCKS))
+        rc = base_fail(err, BASE_EINVAL, "%s: %u finished blocks, wanted 1 … %d", source->folder, m.n_blocks,
+                       GGN_SHOWN_MAX_BLOCKS);
+    else if (!rc) {
+        view->width = m.width;
+        view->height = m.height;
+        w.blocks = view->blocks = calloc(m.n_blocks, sizeof *view->blocks);
+        w.chosen = malloc(m.n_blocks * sizeof *w.chosen);
+        rc = w.blocks && w.chosen ? 0 : base_fail_nomem(err, w.folder);
+    }
+    for (uint32_t i = 0; i < m.n_blocks && !rc; i++) {
+        const struct seq_manifest_block *b = &m.blocks[i];
+        if (!ggn_shown_source_has(source, b->id))
+            continue;
+        w.chosen[view->n_blocks] = i;
+        view->blocks[view->n_blocks++] =
+            (struct ggn_shown_block){.id = b->id, .x0 = b->x0, .y0 = b->y0, .x1 = b->x1, .y1 = b->y1};
+    }
+    if (!rc)
+        rc = ggn_shown_source_check(source, view, err);
+    if (!rc)
+        rc = ggn_each(threads, view->n_blocks, work_block, &w, w.folder, err);
+    if (!rc)
+        qsort(view->blocks, (size_t)view->n_blocks, sizeof *view->blocks, by_id);
+    free(w.chosen);
+    seq_manifest_release(&m);
     return rc;
 }
 
@@ -191,7 +287,7 @@ static int make_view(const struct ggn_shown_request *q, const char *text, int in
                          "%s: a sequence has no denoised pictures; --kinds takes folders of renders with "
                          "--denoise",
                          source.folder);
-    return ggn_shown_sequence(q, &source, index, &s->views[index], threads, err);
+    return make_sequence(q, &source, index, &s->views[index], threads, err);
 }
 
 int ggn_shown_make(const struct ggn_shown_request *q, struct ggn_shown *s, struct base_threads *threads,

@@ -1,4 +1,4 @@
-/* What makes the views of data/shown.h, of sequences and of folders of pictures, and what both use. */
+/* What makes the views of data/shown.h that are folders of pictures, and what it shares with that of sequences. */
 #ifndef GGN_DATA_SHOWN_PARTS_H
 #define GGN_DATA_SHOWN_PARTS_H
 
@@ -9,10 +9,8 @@ struct ggn_shown_source { /* where a view comes from */
     const char *blocks; /* borrows from the text; NULL: all */
 };
 
-/* These make the view that is the index-th of those that are shown, from the source: its blocks, levels and files. */
-int ggn_shown_sequence(const struct ggn_shown_request *q, const struct ggn_shown_source *source, int index,
-                       struct ggn_shown_view *view, struct base_threads *threads, struct base_err *err);
-/* Of a validation the first view also says which conditions there are. */
+/* Makes the view that is the index-th of those that are shown, from the source: its blocks, levels and files. Of a
+ * validation the first view also says which conditions there are. */
 int ggn_shown_pictures(const struct ggn_shown_request *q, const struct ggn_shown_source *source, int index,
                        struct ggn_shown *shown, struct base_err *err);
 
@@ -29,11 +27,9 @@ int ggn_shown_takes_level(const struct ggn_shown_request *q, const struct ggn_sh
 int ggn_shown_enough_levels(const char *folder, const struct ggn_shown_block *b, struct base_err *err);
 
 /* Writes a picture of view number `view`: rgb [height][width][3], those of a clip's frames below each other. b: the block
- * that it shows, NULL: the whole view. Thread-safe for different pictures. */
+ * that it shows, NULL: the whole view. what NULL: it is what others are compared with, "reference", and beside it comes what
+ * catch trials show, "heavy". Thread-safe for different pictures. */
 int ggn_shown_write(const struct ggn_shown_request *q, int view, const struct ggn_shown_block *b, const char *what,
                     int width, int height, const uint8_t *rgb, struct base_err *err);
-/* The same of what others are compared with, "reference", and of what catch trials show, "heavy". */
-int ggn_shown_write_reference(const struct ggn_shown_request *q, int view, const struct ggn_shown_block *b, int width,
-                              int height, const uint8_t *rgb, struct base_err *err);
 
 #endif

@@ -188,11 +188,12 @@ static int read_reference(const char *folder, const struct picture *list, int n,
     return base_fail(err, BASE_EINVAL, "%s: neither manifest.json nor a picture called reference in it", folder);
 }
 
-/* The pictures cut into blocks, frames below each other; what NULL: it is the reference. */
+/* The pictures cut into blocks, if the view has any, frames below each other; what NULL: it is the reference. */
 static int write_crops(const struct ggn_shown_request *q, int index, const struct ggn_shown_view *view, const char *what,
                        const struct strip *strip, struct base_err *err)
 {
-    int rc = 0;
+    const int width = (int)view->width, height = (int)view->height;
+    int rc = view->blocks ? 0 : ggn_shown_write(q, index, NULL, what, width, height, strip->frames[0].u8, err);
     for (int i = 0; i < view->n_blocks && !rc; i++) {
         const struct ggn_shown_block *b = &view->blocks[i];
         size_t w = b->x1 - b->x0, h = b->y1 - b->y0, frames = (size_t)strip->n;
@@ -201,8 +202,7 @@ static int write_crops(const struct ggn_shown_request *q, int index, const struc
             return base_fail_nomem(err, view->name);
         for (size_t y = 0; y < h * frames; y++)
             memcpy(rgb + 3 * w * y, strip->frames[y / h].u8 + 3 * ((b->y0 + y % h) * view->width + b->x0), 3 * w);
-        rc = what ? ggn_shown_write(q, index, b, what, (int)w, (int)(h * frames), rgb, err)
-                  : ggn_shown_write_reference(q, index, b, (int)w, (int)(h * frames), rgb, err);
+        rc = ggn_shown_write(q, index, b, what, (int)w, (int)(h * frames), rgb, err);
         free(rgb);
     }
     return rc;
@@ -240,31 +240,6 @@ static int cut_blocks(const struct ggn_shown_request *q, const struct ggn_shown_
     return ggn_shown_source_check(source, view, err);
 }
 
-static int prepare_levels(const struct ggn_shown_request *q, const struct ggn_shown_source *source, int index,
-                          const struct picture *list, int n, const struct strip *reference, struct ggn_shown_view *view,
-                          struct base_err *err)
-{
-    char what[32];
-    int rc = cut_blocks(q, source, view, n, err);
-    if (!rc)
-        rc = write_crops(q, index, view, NULL, reference, err);
-    for (int i = 0; i < n && !rc; i++) {
-        struct strip strip = {0};
-        if (list[i].number < 1.0 || list[i].is_clip != (view->frames > 1) ||
-            !ggn_shown_takes_level(q, &view->blocks[0], list[i].number))
-            continue;
-        rc = read_strip(source->folder, &list[i], view->kind, reference, view, &strip, err);
-        if (rc)
-            break;
-        snprintf(what, sizeof what, "%.0f", list[i].number);
-        rc = write_crops(q, index, view, what, &strip, err);
-        release_strip(&strip);
-        for (int b = 0; b < view->n_blocks; b++)
-            view->blocks[b].levels[view->blocks[b].n_levels++] = (uint32_t)list[i].number;
-    }
-    return !rc ? ggn_shown_enough_levels(source->folder, &view->blocks[0], err) : rc;
-}
-
 /* The first view says which conditions there are, the others must have the same. */
 static int know_condition(struct ggn_shown *s, int index, const char *name, const char *folder, struct base_err *err)
 {
@@ -284,28 +259,51 @@ static int know_condition(struct ggn_shown *s, int index, const char *name, cons
     return 0;
 }
 
-static int prepare_conditions(const struct ggn_shown_request *q, const char *folder, int index, const struct picture *list,
-                              int n, const struct pic_image *reference, struct ggn_shown *s, struct base_err *err)
+static int is_condition(const struct picture *p)
 {
-    int found = 0;
-    int rc = ggn_shown_write_reference(q, index, NULL, reference->width, reference->height, reference->u8, err);
+    return strcmp(p->stem, "reference") != 0 && strcmp(p->stem, "heavy") != 0 && !p->is_clip;
+}
+
+/* Whether the level comes after those that the view's blocks have. */
+static int is_level(const struct picture *p, const struct ggn_shown_request *q, const struct ggn_shown_view *view)
+{
+    return p->number >= 1.0 && p->is_clip == (view->frames > 1) && ggn_shown_takes_level(q, &view->blocks[0], p->number);
+}
+
+/* A validation shows whole pictures, of each condition; else blocks are shown, of each level. */
+static int prepare(const struct ggn_shown_request *q, const struct ggn_shown_source *source, int index,
+                   const struct picture *list, int n, const struct strip *reference, struct ggn_shown *s,
+                   struct base_err *err)
+{
+    const int whole = q->task == GGN_SHOWN_VALIDATION;
+    struct ggn_shown_view *view = &s->views[index];
+    int found = 0, rc = whole ? 0 : cut_blocks(q, source, view, n, err);
+    if (!rc)
+        rc = write_crops(q, index, view, NULL, reference, err);
     for (int i = 0; i < n && !rc; i++) {
-        struct pic_image image;
-        if (strcmp(list[i].stem, "reference") == 0 || strcmp(list[i].stem, "heavy") == 0 || list[i].is_clip)
+        const struct picture *p = &list[i];
+        struct strip strip = {0};
+        char level[32];
+        if (!(whole ? is_condition(p) : is_level(p, q, view)))
             continue;
-        rc = know_condition(s, index, list[i].stem, folder, err);
+        rc = whole ? know_condition(s, index, p->stem, source->folder, err) : 0;
         if (!rc)
-            rc = read_picture(folder, list[i].name, GGN_SHOWN_AS_IS, &s->views[index], &image, err);
+            rc = read_strip(source->folder, p, view->kind, reference, view, &strip, err);
         if (rc)
             break;
-        rc = ggn_shown_write(q, index, NULL, list[i].stem, image.width, image.height, image.u8, err);
-        pic_release(&image);
+        snprintf(level, sizeof level, "%.0f", p->number);
+        rc = write_crops(q, index, view, whole ? p->stem : level, &strip, err);
+        release_strip(&strip);
+        for (int b = 0; b < view->n_blocks; b++)
+            view->blocks[b].levels[view->blocks[b].n_levels++] = (uint32_t)p->number;
         found++;
     }
-    if (!rc && (found == 0 || found != s->n_conditions))
-        rc = base_fail(err, BASE_EINVAL, "%s: %d pictures beside the reference, wanted the same in every view", folder,
-                       found);
-    return rc;
+    if (rc || !whole)
+        return rc ? rc : ggn_shown_enough_levels(source->folder, &view->blocks[0], err);
+    return found > 0 && found == s->n_conditions
+               ? 0
+               : base_fail(err, BASE_EINVAL, "%s: %d pictures beside the reference, wanted the same in every view",
+                           source->folder, found);
 }
 
 int ggn_shown_pictures(const struct ggn_shown_request *q, const struct ggn_shown_source *source, int index,
@@ -321,10 +319,8 @@ int ggn_shown_pictures(const struct ggn_shown_request *q, const struct ggn_shown
     if (!rc && view->frames > 1 && q->task != GGN_SHOWN_TWO_INTERVAL)
         rc = base_fail(err, BASE_EINVAL, "%s: clips are shown in two intervals: --task thresholds --method 2ifc",
                        source->folder);
-    else if (!rc && q->task == GGN_SHOWN_VALIDATION)
-        rc = prepare_conditions(q, source->folder, index, list, n, &reference.frames[0], s, err);
     else if (!rc)
-        rc = prepare_levels(q, source, index, list, n, &reference, view, err);
+        rc = prepare(q, source, index, list, n, &reference, s, err);
     release_strip(&reference);
     free(list);
     return rc;
