@@ -138,48 +138,41 @@ static void gain_table(float gain, float table[256])
         table[i] = gain == 1 ? (float)i / 255 : (float)base_srgb_oetf(fmin((double)gain * base_srgb_linear[i], 1));
 }
 
-/* Where the pixel of row y of the result comes from: src[start + x · step], in rows that lie `row` apart. */
-struct row_map {
-    ptrdiff_t start, step;
+/* Where pixel (x, y) of the result comes from: src[start + x · right + y · down], in rows that lie `row` apart. */
+struct walk {
+    ptrdiff_t start, right, down;
 };
 
-static struct row_map map_row(const struct ggn_augment *a, int width, int height, int row, int y)
+static struct walk walk_of(const struct ggn_augment *a, int width, int height, int row)
 {
-    struct row_map m;
+    const ptrdiff_t right = a->flip_x ? -1 : 1, down = a->flip_y ? -row : row;
+    const ptrdiff_t start = (a->flip_x ? width - 1 : 0) + (a->flip_y ? (ptrdiff_t)(height - 1) * row : 0);
 
-    if (a->transpose) {
-        int column = a->flip_x ? width - 1 - y : y;
-        m.step = a->flip_y ? -row : row;
-        m.start = column + (a->flip_y ? (ptrdiff_t)(height - 1) * row : 0);
-    } else {
-        m.step = a->flip_x ? -1 : 1;
-        m.start = (ptrdiff_t)(a->flip_y ? height - 1 - y : y) * row + (a->flip_x ? width - 1 : 0);
-    }
-    return m;
+    return a->transpose ? (struct walk){start, down, right} : (struct walk){start, right, down};
 }
 
 static void plane_u8(const uint8_t *src, int width, int height, int row, const struct ggn_augment *a, const float table[256],
                      float *out)
 {
-    for (int y = 0; y < height; y++) {
-        struct row_map m = map_row(a, width, height, row, y);
+    const struct walk w = walk_of(a, width, height, row);
+
+    for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++)
-            out[(ptrdiff_t)y * width + x] = table[src[m.start + x * m.step]];
-    }
+            *out++ = table[src[w.start + x * w.right + y * w.down]];
 }
 
 /* A denoised value between two codes is interpolated between what the gain makes of them. */
 static void plane_u16(const uint16_t *src, int width, int height, const struct ggn_augment *a, const float table[256],
                       float *out)
 {
-    for (int y = 0; y < height; y++) {
-        struct row_map m = map_row(a, width, height, width, y);
+    const struct walk w = walk_of(a, width, height, width);
+
+    for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++) {
-            float v = (float)src[m.start + x * m.step] * (1 / 257.0F);
+            float v = (float)src[w.start + x * w.right + y * w.down] * (1 / 257.0F);
             int code = v < 254 ? (int)v : 254;
-            out[(ptrdiff_t)y * width + x] = table[code] + (v - (float)code) * (table[code + 1] - table[code]);
+            *out++ = table[code] + (v - (float)code) * (table[code + 1] - table[code]);
         }
-    }
 }
 
 void ggn_window_planes(const struct ggn_level_series *series, int last, int length, int width, int height, int denoised,
