@@ -11,7 +11,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "data/split.h"
+#include "data/dataset.h"
 #include "model/measure.h"
 #include "model/policy.h"
 
