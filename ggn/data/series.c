@@ -116,14 +116,11 @@ void ggn_series_measure(const struct ggn_series_set *set, struct ggn_level_serie
     c->has_noise_map[k] = set->noise_maps != 0;
 }
 
-/* Scratch: the mean and D of a recorded level, [3][P] each. */
-struct halves {
-    float *mean, *d;
-};
-
+/* mean: with set->meter scratch, [2][3][P]: mean and D of a level. */
 static int fill_levels(const struct ggn_series_set *set, struct ggn_level_series *c, const struct seq_block *b, double ratio,
-                       const struct halves *h, struct base_err *err)
+                       float *mean, struct base_err *err)
 {
+    const size_t values = ggn_series_set_values(set);
     double wanted = 0;
     int rc = 0;
 
@@ -135,15 +132,15 @@ static int fill_levels(const struct ggn_series_set *set, struct ggn_level_series
         const int k = c->n_levels++;
         c->spp[k] = r->spp;
         c->has_noise_map[k] = 0;
-        rc = seq_display_planar(b, r, c->noisy + (size_t)k * ggn_series_set_values(set), err);
+        rc = seq_display_planar(b, r, c->noisy + (size_t)k * values, err);
         if (rc || !set->meter.memory)
             continue;
         c->measure[k] = (struct ggn_measure){.visible = (double)NAN};
         if (!seq_has_halves(r))
             continue;
-        rc = seq_halves(b, r, h->mean, h->d, err); /* its own: what the criterion sees there */
+        rc = seq_halves(b, r, mean, mean + values, err); /* its own: what the criterion sees there */
         if (!rc)
-            ggn_series_measure(set, c, k, h->mean, h->d, seq_half_scale(r->spp, r->half_spp), 0);
+            ggn_series_measure(set, c, k, mean, mean + values, seq_half_scale(r->spp, r->half_spp), 0);
     }
     return rc;
 }
@@ -154,13 +151,12 @@ static int fill_series(const struct ggn_series_set *set, struct ggn_level_series
     const size_t values = ggn_series_set_values(set);
     const struct seq_record *reference = b->reference ? b->reference : seq_full_level(b);
     const int wanted = set->meter.memory != NULL;
-    float *memory = wanted ? malloc(2 * values * sizeof *memory) : NULL;
-    const struct halves h = {memory, memory ? memory + values : NULL};
-    int rc = wanted && !memory ? base_fail_nomem(err, "noise pictures") : ggn_series_grow(set, c, (int)b->n_levels, err);
+    float *mean = wanted ? malloc(2 * values * sizeof *mean) : NULL;
+    int rc = wanted && !mean ? base_fail_nomem(err, "noise pictures") : ggn_series_grow(set, c, (int)b->n_levels, err);
 
     if (!rc)
-        rc = fill_levels(set, c, b, o->ratio, &h, err);
-    free(memory);
+        rc = fill_levels(set, c, b, o->ratio, mean, err);
+    free(mean);
     c->has_reference = b->reference != NULL;
     if (rc || !reference)
         return rc;
