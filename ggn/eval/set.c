@@ -202,10 +202,10 @@ static int see_levels(const struct seq_block *p, double *halves, double *ratio, 
         halves[k] = ratio[k] = (double)NAN;
         if (!seq_has_halves(r))
             continue;
-        rc = ggn_curve_level(p, r, &halves[k], err);
+        rc = ggn_curve_level(p, NULL, r, &halves[k], err);
         if (rc || !earlier)
             continue;
-        rc = ggn_curve_means(p, earlier, r, &means, err);
+        rc = ggn_curve_level(p, earlier, r, &means, err);
         if (!rc)
             ratio[k] = halves[k] > 0.0 ? means / halves[k] : 1.0;
     }

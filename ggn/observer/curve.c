@@ -144,28 +144,16 @@ int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, 
     return rc;
 }
 
-int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible_out, struct base_err *err)
-{
-    struct eye e;
-    int rc = eye_init(&e, block, err);
-    if (!rc)
-        rc = seq_halves(block, level, e.mean, e.difference, err);
-    if (!rc)
-        *visible_out = see_halves(&e, 1.0, 0);
-    eye_release(&e);
-    return rc;
-}
-
-int ggn_curve_means(const struct seq_block *block, const struct seq_record *earlier, const struct seq_record *level,
+int ggn_curve_level(const struct seq_block *block, const struct seq_record *earlier, const struct seq_record *level,
                     double *visible_out, struct base_err *err)
 {
     struct eye e;
     int rc = eye_init(&e, block, err);
-    if (!rc)
-        rc = seq_mean(block, earlier, e.difference, err);
-    if (!rc)
+    if (!rc && !earlier)
+        rc = seq_halves(block, level, e.mean, e.difference, err);
+    else if (!rc && !(rc = seq_mean(block, earlier, e.difference, err)))
         rc = seq_mean(block, level, e.mean, err);
-    for (size_t i = 0; i < 3 * (size_t)block->width * block->height && !rc; i++)
+    for (size_t i = 0; earlier && i < 3 * (size_t)block->width * block->height && !rc; i++)
         e.difference[i] = (float)seq_means_scale(earlier->spp, level->spp) * (e.mean[i] - e.difference[i]);
     if (!rc)
         *visible_out = see_halves(&e, 1.0, 0);

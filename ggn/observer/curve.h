@@ -28,12 +28,10 @@ int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, 
 void ggn_curve_release(struct ggn_curve *curve);
 
 /* Visible noise of one recorded level as the criterion `observer` sees it in the renderer: from the level's own two halves
- * (where only the luminance of their difference was recorded, that, as grey). BASE_EINVAL: not recorded. */
-int ggn_curve_level(const struct seq_block *block, const struct seq_record *level, double *visible, struct base_err *err);
-
-/* The same of a host without halves: from the level and an earlier one of fewer samples, both running means of the same
- * samples (plugin/means.h says how). */
-int ggn_curve_means(const struct seq_block *block, const struct seq_record *earlier, const struct seq_record *level,
+ * (where only the luminance of their difference was recorded, that, as grey), or, with `earlier`, as in a host without
+ * halves: from the level and one of fewer samples, both running means of the same samples (plugin/means.h says how).
+ * BASE_EINVAL: not recorded. */
+int ggn_curve_level(const struct seq_block *block, const struct seq_record *earlier, const struct seq_record *level,
                     double *visible, struct base_err *err);
 
 /* Smallest spp from which the noise stays at or below `limit`, interpolated between levels in log-log. censored: still above

@@ -188,7 +188,7 @@ static void levels_of_curves(void **state)
     for (int i = 0; i <= BELOW; i++) { /* levels up to the full one by their own halves: nothing is simulated there */
         double seen;
         assert_near(c.spp[i], levels[i], 0);
-        assert_int_equal(ggn_curve_level(&b, &b.levels[i], &seen, &err), 0);
+        assert_int_equal(ggn_curve_level(&b, NULL, &b.levels[i], &seen, &err), 0);
         assert_near(log2(seen / c.visible[i]), 0, i == BELOW ? 1e-9 : 0.2); /* its own texture or the full level's */
     }
     for (int i = BELOW + 1; i <= LAST; i++)
@@ -215,7 +215,7 @@ static void levels_of_curves(void **state)
     }
     double grey[2];
     for (int k = 0; k < 2; k++) /* luminance alone is kept of other levels: as visible as their samples say */
-        assert_int_equal(ggn_curve_level(&b, full_of(&b) - 2 * k, &grey[k], &err), 0);
+        assert_int_equal(ggn_curve_level(&b, NULL, full_of(&b) - 2 * k, &grey[k], &err), 0);
     assert_near(log2(grey[1] / grey[0]), 0.5 * log2(342.0 / 152), 0.1);
     seq_block_release(&b);
 }
