@@ -11,7 +11,6 @@
 #include "base/options.h"
 #include "baselines/learned.h"
 #include "cli/commands.h"
-#include "eval/trained.h"
 #include "model/setting.h"
 #include "observer/observer.h"
 

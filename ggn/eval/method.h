@@ -9,6 +9,9 @@
 #define GGN_EVAL_METHOD_H
 
 #include "eval/set.h"
+#include "model/inference.h"
+#include "model/policy.h"
+#include "observer/observer.h"
 
 enum { GGN_METHOD_NAME = 48 };
 
@@ -29,6 +32,13 @@ void ggn_method_release(struct ggn_method *m);
  * stopped below 0.8 of their threshold; if none does, the smallest early rate. BASE_EINVAL: no score there. */
 int ggn_method_tune(struct ggn_method *m, const struct ggn_eval_set *s, enum ggn_split split, double early_rate,
                     struct base_err *err);
+
+/* A trained model as a method: every block's levels go through it as they would in the renderer. Scores are p_noisy of every
+ * window that the policy's cadence makes (data/replay.h); cut and passes are the policy's. A residual model asks between
+ * levels too, where the law is known; it needs set->images.meter. observers: of its law, that of each view. */
+int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const struct ggn_model *model,
+                     const struct ggn_policy *policy, const char *name, enum ggn_precision precision,
+                     const struct ggn_observer *observers, struct base_threads *threads, struct base_err *err);
 
 struct ggn_method_figures {
     int blocks, scenes;

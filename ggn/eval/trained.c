@@ -1,4 +1,4 @@
-#include "eval/trained.h"
+#include "eval/method.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -13,7 +13,7 @@
 #include "support/ggn_near.h"
 #include "support/ggn_noise.h"
 
-#include "eval/trained.h"
+#include "eval/method.h"
 #include "model/policy.h"
 
 static const uint32_t levels[] = {20, 40, 80, 160, 320, 640, 1280};
