@@ -112,19 +112,6 @@ static int train_lstm(struct ggn_baseline *b, const struct cases *c, int epochs,
     return b->lstm ? 0 : base_fail_nomem(err, "LSTM");
 }
 
-static int train_svm(struct ggn_baseline *b, const struct cases *c, size_t size, struct base_err *err)
-{
-    double *x = malloc(c->n * size * sizeof *x);
-    if (!x)
-        return base_fail_nomem(err, "SVM");
-    for (size_t i = 0; i < c->n; i++)
-        memcpy(x + i * size, c->window[i], size * sizeof *x);
-    /* C and gamma as the library's users start from; a grid search on a few scenes fits their quirks. */
-    int rc = ggn_svm_train(&b->svm, x, c->label, c->n, b->features, 1.0, 1.0, err);
-    free(x);
-    return rc;
-}
-
 static int calibrate(const struct work *w, enum ggn_split split, struct base_err *err)
 {
     struct cases c;
@@ -164,8 +151,10 @@ static int train(const struct work *w, enum ggn_split split, int epochs, struct 
     if (positive == 0 || positive == c.n)
         rc = base_fail(err, BASE_EINVAL, "%s: the split '%s' lacks one of the classes", ggn_baseline_titles[b->kind],
                        ggn_split_names[split]);
-    if (!rc)
-        rc = b->kind == GGN_SVD_ENTROPY ? train_lstm(b, &c, epochs, err) : train_svm(b, &c, w->size, err);
+    else if (b->kind == GGN_SVD_ENTROPY)
+        rc = train_lstm(b, &c, epochs, err);
+    else /* C and gamma as the library's users start from; a grid search on a few scenes fits their quirks */
+        rc = ggn_svm_train(&b->svm, c.window, c.label, c.n, b->features, 1.0, 1.0, err);
     cases_release(&c);
     ggn_series_set_pace(&w->set->images, &b->policy);
     for (int k = b->window; k < w->set->window; k++) /* an SVM answers from where the LSTM's first window ends */

@@ -38,15 +38,15 @@ int ggn_svm_init(struct ggn_svm *svm, int features, int n_support, struct base_e
 static void be_quiet(const char *text) { (void)text; }
 
 /* Mean and 1/deviation of each feature: [features] each. */
-static void fit_scale(double *mean, double *scale, const double *x, size_t n, size_t features)
+static void fit_scale(double *mean, double *scale, const double *const *x, size_t n, size_t features)
 {
     for (size_t k = 0; k < features; k++) {
         double sum = 0.0, square = 0.0;
         for (size_t i = 0; i < n; i++)
-            sum += x[i * features + k];
+            sum += x[i][k];
         mean[k] = sum / (double)n;
         for (size_t i = 0; i < n; i++) {
-            double d = x[i * features + k] - mean[k];
+            double d = x[i][k] - mean[k];
             square += d * d;
         }
         double deviation = sqrt(square / (double)n);
@@ -77,7 +77,7 @@ static int take_over(struct ggn_svm *svm, const struct svm_model *model, const d
     return 0;
 }
 
-int ggn_svm_train(struct ggn_svm *svm, const double *x, const unsigned char *label, size_t n, int features, double c,
+int ggn_svm_train(struct ggn_svm *svm, const double *const *x, const unsigned char *label, size_t n, int features, double c,
                   double gamma, struct base_err *err)
 {
     size_t d = (size_t)features, positive = 0;
@@ -95,7 +95,7 @@ int ggn_svm_train(struct ggn_svm *svm, const double *x, const unsigned char *lab
         y[i] = label[i] != 0;
         positive += label[i] != 0;
         for (size_t k = 0; k < d; k++)
-            rows[i][k] = (struct svm_node){(int)k + 1, (x[i * d + k] - mean[k]) * mean[d + k]};
+            rows[i][k] = (struct svm_node){(int)k + 1, (x[i][k] - mean[k]) * mean[d + k]};
         rows[i][d].index = -1;
     }
     if (positive == 0 || positive == n) {

@@ -19,8 +19,9 @@ struct ggn_svm {
     float *support;      /* [n_support][features], standardised */
 };
 
-/* x: [n][features], label 0 or 1, both present. c, gamma > 0 (gamma in units of 1/features). On failure *svm is empty. */
-int ggn_svm_train(struct ggn_svm *svm, const double *x, const unsigned char *label, size_t n, int features, double c,
+/* x: [n] rows of [features]; label 0 or 1, both present. c, gamma > 0 (gamma in units of 1/features). On failure *svm is
+ * empty. */
+int ggn_svm_train(struct ggn_svm *svm, const double *const *x, const unsigned char *label, size_t n, int features, double c,
                   double gamma, struct base_err *err);
 /* Room for one of this size. BASE_EINVAL, BASE_ENOMEM; then *svm is empty. */
 int ggn_svm_init(struct ggn_svm *svm, int features, int n_support, struct base_err *err);

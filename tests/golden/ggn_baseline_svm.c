@@ -17,6 +17,7 @@ static void svm(void **state)
     (void)state;
     enum { N = 200, D = 3 };
     static double x[N * D], fresh[D];
+    const double *rows[N];
     unsigned char label[N];
     struct ggn_svm s;
     struct base_err err = {0};
@@ -25,9 +26,10 @@ static void svm(void **state)
         x[i * D] = 1000.0 * ggn_noise_gauss(i, 1);
         x[i * D + 1] = 0.01 * ggn_noise_gauss(i, 2);
         x[i * D + 2] = 5.0;
+        rows[i] = x + i * D;
         label[i] = hypot(x[i * D] / 1000.0, x[i * D + 1] / 0.01) > 1.5;
     }
-    assert_int_equal(ggn_svm_train(&s, x, label, N, D, 1.0, 1.0, &err), 0);
+    assert_int_equal(ggn_svm_train(&s, rows, label, N, D, 1.0, 1.0, &err), 0);
     for (uint32_t i = 0; i < N; i++) {
         fresh[0] = 1000.0 * ggn_noise_gauss(i, 3);
         fresh[1] = 0.01 * ggn_noise_gauss(i, 4);
@@ -37,7 +39,7 @@ static void svm(void **state)
     assert_true(right > 0.9 * N);
     ggn_svm_release(&s);
     memset(label, 1, sizeof label);
-    assert_int_equal(ggn_svm_train(&s, x, label, N, D, 1.0, 1.0, &err), BASE_EINVAL);
+    assert_int_equal(ggn_svm_train(&s, rows, label, N, D, 1.0, 1.0, &err), BASE_EINVAL);
     assert_non_null(strstr(err.text, "are the same"));
 }
 
@@ -47,6 +49,7 @@ static void scores(void **state)
     (void)state;
     enum { N = 60, D = 3 };
     double x[N * D], sum[D] = {0}, square[D] = {0};
+    const double *rows[N];
     unsigned char label[N];
     struct ggn_svm s;
     struct base_err err = {0};
@@ -54,13 +57,14 @@ static void scores(void **state)
         x[i * D] = 100 + 20 * ggn_noise_gauss(i, 1);
         x[i * D + 1] = 0.01 * ggn_noise_gauss(i, 2);
         x[i * D + 2] = 5;
+        rows[i] = x + i * D;
         label[i] = x[i * D] > 112; /* few of them: classes weigh the same */
         for (int k = 0; k < D; k++)
             sum[k] += x[i * D + (uint32_t)k] / N;
     }
     for (int i = 0; i < N * D; i++)
         square[i % D] += (x[i] - sum[i % D]) * (x[i] - sum[i % D]) / N;
-    assert_int_equal(ggn_svm_train(&s, x, label, N, D, 1, 1.5, &err), 0);
+    assert_int_equal(ggn_svm_train(&s, rows, label, N, D, 1, 1.5, &err), 0);
     assert_true(s.features == D && s.n_support > 3 && s.n_support < N && s.gamma == 0.5);
     double total = 0;
     for (int k = 0; k < D; k++) {
@@ -98,7 +102,7 @@ static void scores(void **state)
     assert_int_equal(ggn_svm_values(&s), 2 * D + s.n_support * (1 + D));
     ggn_svm_release(&s);
     memset(label, 0, sizeof label);
-    assert_int_equal(ggn_svm_train(&s, x, label, N, D, 1, 1, &err), BASE_EINVAL);
+    assert_int_equal(ggn_svm_train(&s, rows, label, N, D, 1, 1, &err), BASE_EINVAL);
     assert_string_equal(err.text, "SVM: all 60 labels are the same");
     assert_int_equal(ggn_svm_init(&s, 256, 0, &err), 0);
     ggn_svm_release(&s);
