@@ -15,14 +15,14 @@ struct work {
     struct ggn_baseline *baseline;
     struct ggn_method *method; /* gets the scores */
     size_t size;               /* numbers per level */
-    size_t *first;             /* owns; [blocks]: row of the block's level 0 */
-    double *x;                 /* owns; [rows][size] */
+    double *x;                 /* owns; [rows][size]; a row for every level of every block, one block after the other */
 };
 
-static void work_release(struct work *w)
+/* The row of a block's level 0; beyond the last block, how many rows there are. A block's first levels make no case. */
+static size_t first_row(const struct ggn_eval_set *s, int block)
 {
-    free(w->first);
-    free(w->x);
+    const size_t cases = block < s->n_blocks ? s->blocks[block].first : s->n;
+    return cases + (size_t)block * (size_t)(s->window - 1);
 }
 
 static int extract_block(void *data, long index, int worker, struct base_err *err)
@@ -36,25 +36,18 @@ static int extract_block(void *data, long index, int worker, struct base_err *er
         return err->code;
     for (size_t i = 0; i < (size_t)c->n_levels; i++)
         ggn_baseline_extract(r, c->noisy + ggn_series_set_values(images) * i, images->width, images->height,
-                             w->x + (w->first[index] + i) * w->size);
+                             w->x + (first_row(w->set, (int)index) + i) * w->size);
     ggn_baseline_reader_destroy(r);
     return 0;
 }
 
-/* Fills in the features of w->baseline; the caller releases them, also after a failure. */
+/* Fills in the features of w->baseline; the caller frees them, also after a failure. */
 static int extract(struct work *w, struct base_threads *threads, struct base_err *err)
 {
     const struct ggn_eval_set *s = w->set;
-    size_t rows = 0;
     w->size = ggn_baseline_feature_count(w->baseline, s->images.width, s->images.height);
-    w->first = malloc((size_t)s->n_blocks * sizeof *w->first);
-    for (int k = 0; k < s->n_blocks && w->first; k++) {
-        w->first[k] = rows;
-        rows += (size_t)s->images.series[s->blocks[k].series].n_levels;
-    }
-    w->x = malloc(rows * w->size * sizeof *w->x);
-    return !w->first || !w->x ? base_fail_nomem(err, "baseline")
-                              : ggn_each(threads, s->n_blocks, extract_block, w, "evaluation", err);
+    w->x = malloc(first_row(s, s->n_blocks) * w->size * sizeof *w->x);
+    return w->x ? ggn_each(threads, s->n_blocks, extract_block, w, "evaluation", err) : base_fail_nomem(err, "baseline");
 }
 
 /* Of a window whose levels, or (NULL) rows one after the other, begin at x. */
@@ -91,7 +84,7 @@ static int list_cases(struct cases *c, const struct work *w, enum ggn_split spli
     for (int k = 0; k < s->n_blocks; k++)
         for (size_t i = s->blocks[k].first; i < s->blocks[k].end; i++)
             if (s->blocks[k].split == split && s->noisy[i] >= 0) {
-                c->window[c->n] = w->x + (w->first[k] + (i - s->blocks[k].first) + skipped) * w->size;
+                c->window[c->n] = w->x + (first_row(s, k) + (i - s->blocks[k].first) + skipped) * w->size;
                 c->label[c->n++] = s->noisy[i] == 1;
             }
     return 0;
@@ -180,7 +173,7 @@ static int judge_block(void *data, long index, int worker, struct base_err *err)
     const struct ggn_eval_block *b = &w->set->blocks[index];
     const struct ggn_level_series *c = &w->set->images.series[b->series];
     const struct ggn_stop_rule rule = {.policy = w->baseline->policy, .window = w->baseline->window};
-    struct one_block one = {w, ggn_baseline_reader_create(w->baseline, err), w->x + w->first[index] * w->size};
+    struct one_block one = {w, ggn_baseline_reader_create(w->baseline, err), w->x + first_row(w->set, (int)index) * w->size};
     struct ggn_seen *seen = malloc((size_t)c->n_levels * sizeof *seen);
     int rc = !one.reader ? err->code : !seen ? base_fail_nomem(err, w->method->name) : 0;
     (void)worker;
@@ -214,7 +207,7 @@ int ggn_method_baseline(struct ggn_method *m, const struct ggn_eval_set *s, stru
     int rc = extract(&w, threads, err);
     if (!rc)
         rc = judge(&w, threads, err);
-    work_release(&w);
+    free(w.x);
     return rc;
 }
 
@@ -236,7 +229,7 @@ int ggn_method_learned(struct ggn_method *m, struct ggn_baseline *b, const struc
         rc = ggn_method_tune(m, s, split, early, err);
     if (!rc)
         b->policy.threshold = fmin(m->cut, 1);
-    work_release(&w);
+    free(w.x);
     if (rc) {
         ggn_method_release(m);
         ggn_baseline_release(b);
