@@ -150,7 +150,6 @@ struct work {
     const struct ggn_shown_request *request;
     const char *folder;
     const struct seq_manifest *manifest;
-    uint32_t *chosen; /* [n_blocks]; indices in the manifest */
     int view;
     struct ggn_shown_block *blocks; /* [n_blocks] */
 };
@@ -183,7 +182,7 @@ static int work_block(void *data, long i, int worker, struct base_err *err)
     struct seq_block block;
     struct ggn_stimuli stimuli;
     (void)worker;
-    int rc = seq_manifest_read_block(w->folder, w->manifest, w->chosen[i], &block, err);
+    int rc = seq_manifest_read_block(w->folder, w->manifest, seq_manifest_find(w->manifest, w->blocks[i].id), &block, err);
     if (rc)
         return rc;
     uint8_t *rgb = malloc(3 * (size_t)block.width * block.height);
@@ -207,7 +206,7 @@ static int make_sequence(const struct ggn_shown_request *q, const struct ggn_sho
                          struct ggn_shown_view *view, struct base_threads *threads, struct base_err *err)
 {
     struct seq_manifest m = {0};
-    struct work w = {q, source->folder, &m, NULL, index, NULL};
+    struct work w = {q, source->folder, &m, index, NULL};
     int rc = seq_manifest_read(source->folder, &m, err);
     if (!rc && (m.n_blocks < 1 || m.n_blocks > GGN_SHOWN_MAX_BLOCKS))
         rc = base_fail(err, BASE_EINVAL, "%s: %u finished blocks, wanted 1 … %d", source->folder, m.n_blocks,
@@ -216,16 +215,13 @@ static int make_sequence(const struct ggn_shown_request *q, const struct ggn_sho
         view->width = m.width;
         view->height = m.height;
         w.blocks = view->blocks = calloc(m.n_blocks, sizeof *view->blocks);
-        w.chosen = malloc(m.n_blocks * sizeof *w.chosen);
-        rc = w.blocks && w.chosen ? 0 : base_fail_nomem(err, w.folder);
+        rc = w.blocks ? 0 : base_fail_nomem(err, w.folder);
     }
     for (uint32_t i = 0; i < m.n_blocks && !rc; i++) {
         const struct seq_manifest_block *b = &m.blocks[i];
-        if (!ggn_shown_source_has(source, b->id))
-            continue;
-        w.chosen[view->n_blocks] = i;
-        view->blocks[view->n_blocks++] =
-            (struct ggn_shown_block){.id = b->id, .x0 = b->x0, .y0 = b->y0, .x1 = b->x1, .y1 = b->y1};
+        if (ggn_shown_source_has(source, b->id))
+            view->blocks[view->n_blocks++] =
+                (struct ggn_shown_block){.id = b->id, .x0 = b->x0, .y0 = b->y0, .x1 = b->x1, .y1 = b->y1};
     }
     if (!rc)
         rc = ggn_shown_source_check(source, view, err);
@@ -233,7 +229,6 @@ static int make_sequence(const struct ggn_shown_request *q, const struct ggn_sho
         rc = ggn_each(threads, view->n_blocks, work_block, &w, w.folder, err);
     if (!rc)
         qsort(view->blocks, (size_t)view->n_blocks, sizeof *view->blocks, by_id);
-    free(w.chosen);
     seq_manifest_release(&m);
     return rc;
 }
