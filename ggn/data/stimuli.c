@@ -22,31 +22,19 @@ static void encode(const float *linear, size_t pixels, uint8_t *rgb)
             rgb[3 * i + c] = ggn_preprocess((double)linear[c * pixels + i], NULL, NULL);
 }
 
-/* Sample counts above `beyond` that halves stand for; returns their number. */
-static int simulated_levels(double beyond, double spp[MAX_SIMULATED])
-{
-    uint32_t all[MAX_SIMULATED];
-    int n = 0;
-    for (int i = 0, count = seq_levels(20, SEQ_STUDY_CAP, 1.15, 1, all, MAX_SIMULATED); i < count; i++)
-        if (all[i] > beyond)
-            spp[n++] = all[i];
-    return n;
-}
-
 int ggn_stimuli_init(struct ggn_stimuli *out, const struct seq_block *block, int reference_independent, struct base_err *err)
 {
     const struct seq_record *full = seq_full_level(block), *reference = block->reference;
     const size_t pixels = (size_t)block->width * block->height;
     struct ggn_stimuli s = {.block = block, .recorded = reference ? (int)block->n_levels : 0};
-    double beyond = s.recorded > 0 ? 1.07 * block->levels[s.recorded - 1].spp : 0.0, simulated[MAX_SIMULATED];
+    const double beyond = s.recorded > 0 ? 1.07 * block->levels[s.recorded - 1].spp : 0.0;
     s.scale = reference && reference_independent && seq_has(reference, SEQ_PLANE_MEAN_F16);
     /* Halves stand for levels beyond the last recorded one; up to a tenth of an octave is not worth simulating. */
     const int extend = s.scale && full && beyond < SEQ_STUDY_CAP;
     if (!reference && !full)
         return base_fail(err, BASE_EINVAL, "block %u has neither a reference nor a full level with a half-buffer difference",
                          block->id);
-    s.n = s.recorded + (extend || s.recorded == 0 ? simulated_levels(beyond, simulated) : 0);
-    s.spp = malloc((size_t)s.n * sizeof *s.spp);
+    s.spp = malloc(((size_t)s.recorded + MAX_SIMULATED) * sizeof *s.spp);
     s.base = malloc(9 * pixels * sizeof *s.base);
     s.converged = malloc(3 * pixels);
     int rc = s.spp && s.base && s.converged ? 0 : base_fail_nomem(err, "observer");
@@ -68,8 +56,13 @@ int ggn_stimuli_init(struct ggn_stimuli *out, const struct seq_block *block, int
         ggn_stimuli_release(&s);
         return rc;
     }
-    for (int i = 0; i < s.n; i++)
-        s.spp[i] = i < s.recorded ? block->levels[i].spp : simulated[i - s.recorded];
+    for (; s.n < s.recorded; s.n++)
+        s.spp[s.n] = block->levels[s.n].spp;
+    uint32_t all[MAX_SIMULATED];
+    const int count = extend || s.recorded == 0 ? seq_levels(20, SEQ_STUDY_CAP, 1.15, 1, all, MAX_SIMULATED) : 0;
+    for (int i = 0; i < count; i++)
+        if (all[i] > beyond)
+            s.spp[s.n++] = all[i];
     *out = s;
     return 0;
 }
