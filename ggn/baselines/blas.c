@@ -92,11 +92,12 @@ static void enter(void)
         continue;
 }
 
-void ggn_blas_sgemm(enum CBLAS_TRANSPOSE ta, enum CBLAS_TRANSPOSE tb, int m, int n, int k, float alpha, const float *a,
-                    int lda, const float *b, int ldb, float beta, float *c, int ldc)
+void ggn_blas_sgemm(enum CBLAS_TRANSPOSE ta, enum CBLAS_TRANSPOSE tb, int m, int n, int k, const float *a, const float *b,
+                    float beta, float *c)
 {
     enter();
-    blas.sgemm(CblasRowMajor, ta, tb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc);
+    blas.sgemm(CblasRowMajor, ta, tb, m, n, k, 1.0f, a, ta == CblasNoTrans ? k : m, b, tb == CblasNoTrans ? n : k, beta, c,
+               n);
     sem_post(&calls);
 }
 

@@ -15,9 +15,10 @@
  * BASE_ENOMEM when there are no addresses for one call, BASE_EIO when it is not there. Thread-safe. */
 int ggn_blas_open(struct base_err *err);
 
-/* After ggn_blas_open has returned 0; thread-safe. cblas_sgemm of row-major matrices: C = alpha·op(A)·op(B) + beta·C. */
-void ggn_blas_sgemm(enum CBLAS_TRANSPOSE ta, enum CBLAS_TRANSPOSE tb, int m, int n, int k, float alpha, const float *a,
-                    int lda, const float *b, int ldb, float beta, float *c, int ldc);
+/* After ggn_blas_open has returned 0; thread-safe. C = op(A)·op(B) + beta·C of gap-free row-major matrices; op(A) is [m, k],
+ * op(B) [k, n]. */
+void ggn_blas_sgemm(enum CBLAS_TRANSPOSE ta, enum CBLAS_TRANSPOSE tb, int m, int n, int k, const float *a, const float *b,
+                    float beta, float *c);
 /* The singular values s[n] of a [n, n], which is overwritten; work has 64·n numbers. Not 0: they do not converge. */
 int ggn_blas_singular_values(int n, double *a, double *s, double *work);
 /* Of one sgemm; 1 until it is called. Not while others call. */

@@ -35,8 +35,6 @@ struct ggn_lstm {
     struct layer layers[LAYERS];
 };
 
-static float uniform(uint32_t k, uint32_t s) { return (float)ggn_hash(k, s) / 4294967296.0f; }
-
 static float sigmoid(float x) { return 1.0f / (1.0f + expf(-x)); }
 
 static float hard_sigmoid(float x)
@@ -50,7 +48,7 @@ static void draw_weights(float *p, size_t n, int inputs, int outputs, uint32_t s
 {
     const float limit = sqrtf(6.0f / (float)(inputs + outputs));
     for (size_t i = 0; i < n; i++)
-        p[i] = limit * (2.0f * uniform((uint32_t)i, seed) - 1.0f);
+        p[i] = limit * (2.0f * (float)ggn_hash_unit((uint32_t)i, seed) - 1.0f);
 }
 
 void ggn_lstm_destroy(struct ggn_lstm *l)
@@ -114,19 +112,17 @@ static struct ggn_lstm *create(int inputs, int steps, int batch, const float *we
     if (ggn_blas_open(err) != 0)
         return NULL;
     struct ggn_lstm *l = calloc(1, sizeof *l);
-    if (!l) {
-        base_fail_nomem(err, "LSTM");
-        return NULL;
+    if (l) {
+        lay_out(l, inputs);
+        l->steps = steps;
+        l->batch = batch;
+        size_t floats = 2 * (size_t)batch * (size_t)widths[0];
+        for (int k = 0; k < LAYERS; k++)
+            floats += (size_t)steps * (size_t)batch * (size_t)(8 * l->layers[k].out + 2 * l->layers[k].in);
+        l->owned = weights ? NULL : calloc(4 * l->n, sizeof *l->owned);
+        l->activations = calloc(floats, sizeof *l->activations);
     }
-    lay_out(l, inputs);
-    l->steps = steps;
-    l->batch = batch;
-    size_t floats = 2 * (size_t)batch * (size_t)widths[0];
-    for (int k = 0; k < LAYERS; k++)
-        floats += (size_t)steps * (size_t)batch * (size_t)(8 * l->layers[k].out + 2 * l->layers[k].in);
-    l->owned = weights ? NULL : malloc(4 * l->n * sizeof *l->owned);
-    l->activations = calloc(floats, sizeof *l->activations);
-    if ((!weights && !l->owned) || !l->activations) {
+    if (!l || (!weights && !l->owned) || !l->activations) {
         base_fail_nomem(err, "LSTM");
         ggn_lstm_destroy(l);
         return NULL;
@@ -148,7 +144,6 @@ struct ggn_lstm *ggn_lstm_create(int inputs, int steps, uint32_t seed, struct ba
         return NULL;
     float *p = l->owned;
     l->seed = seed;
-    memset(p, 0, 4 * l->n * sizeof *p);
     for (int k = 0; k < LAYERS; k++) {
         const struct layer *y = &l->layers[k];
         draw_weights(p + y->w, y->u - y->w, y->in, 4 * y->out, seed + 10 * (uint32_t)k);
@@ -170,20 +165,20 @@ float *ggn_lstm_weights(struct ggn_lstm *l) { return l->owned; }
 /* Z = X·Wᵀ + H₋·Uᵀ + b; i, f, o = hard sigmoid, g = sigmoid; c = f∘c₋ + i∘g; h = o∘sigmoid(c). */
 static void forward_step(const struct ggn_lstm *l, const struct layer *y, int t, int batch)
 {
-    int out = y->out;
-    float *z = y->z + (size_t)t * (size_t)l->batch * 4 * (size_t)out;
+    const int out = y->out;
+    const size_t step = (size_t)l->batch * (size_t)out, first = (size_t)t * step;
+    float *z = y->z + 4 * first;
     const float *x = y->x + (size_t)t * (size_t)l->batch * (size_t)y->in;
     for (int r = 0; r < batch; r++)
         memcpy(z + (size_t)r * 4 * (size_t)out, l->p + y->b, 4 * (size_t)out * sizeof *z);
-    ggn_blas_sgemm(CblasNoTrans, CblasTrans, batch, 4 * out, y->in, 1.0f, x, y->in, l->p + y->w, y->in, 1.0f, z, 4 * out);
+    ggn_blas_sgemm(CblasNoTrans, CblasTrans, batch, 4 * out, y->in, x, l->p + y->w, 1.0f, z);
     if (t > 0)
-        ggn_blas_sgemm(CblasNoTrans, CblasTrans, batch, 4 * out, out, 1.0f,
-                       y->h + (size_t)(t - 1) * (size_t)l->batch * (size_t)out, out, l->p + y->u, out, 1.0f, z, 4 * out);
+        ggn_blas_sgemm(CblasNoTrans, CblasTrans, batch, 4 * out, out, y->h + first - step, l->p + y->u, 1.0f, z);
     for (int r = 0; r < batch; r++)
         for (int k = 0; k < out; k++) {
             float *g = z + (size_t)r * 4 * (size_t)out + (size_t)k;
-            size_t at = ((size_t)t * (size_t)l->batch + (size_t)r) * (size_t)out + (size_t)k;
-            float before = t > 0 ? y->c[at - (size_t)l->batch * (size_t)out] : 0.0f;
+            size_t at = first + (size_t)r * (size_t)out + (size_t)k;
+            float before = t > 0 ? y->c[at - step] : 0.0f;
             g[0] = hard_sigmoid(g[0]);
             g[out] = hard_sigmoid(g[out]);
             g[2 * out] = sigmoid(g[2 * out]);
@@ -204,9 +199,9 @@ static void forward(struct ggn_lstm *l, int batch, int training, float *logit)
             forward_step(l, y, t, batch);
         l->calls += training != 0;
         for (size_t i = 0; i < n; i++)
-            y->mask[i] = !training                                                   ? 1.0f
-                         : uniform((uint32_t)i, l->seed + 1000 + l->calls) < dropout ? 0.0f
-                                                                                     : 1.0f / (1.0f - dropout);
+            y->mask[i] = !training                                                                ? 1.0f
+                         : (float)ggn_hash_unit((uint32_t)i, l->seed + 1000 + l->calls) < dropout ? 0.0f
+                                                                                                  : 1.0f / (1.0f - dropout);
         for (size_t i = 0; i < n && k + 1 < LAYERS; i++)
             l->layers[k + 1].x[i] = y->h[i] * y->mask[i];
     }
@@ -226,13 +221,14 @@ static float hard_slope(float y) { return y > 0.0f && y < 1.0f ? 0.2f : 0.0f; }
  * */
 static void backward_step(struct ggn_lstm *l, struct layer *y, int t, int batch)
 {
-    int out = y->out;
-    float *z = y->z + (size_t)t * (size_t)l->batch * 4 * (size_t)out;
+    const int out = y->out;
+    const size_t step = (size_t)l->batch * (size_t)out, first = (size_t)t * step;
+    float *z = y->z + 4 * first;
     for (int r = 0; r < batch; r++)
         for (int k = 0; k < out; k++) {
             float *g = z + (size_t)r * 4 * (size_t)out + (size_t)k;
-            size_t rk = (size_t)r * (size_t)out + (size_t)k, at = (size_t)t * (size_t)l->batch * (size_t)out + rk;
-            float before = t > 0 ? y->c[at - (size_t)l->batch * (size_t)out] : 0.0f;
+            size_t rk = (size_t)r * (size_t)out + (size_t)k, at = first + rk;
+            float before = t > 0 ? y->c[at - step] : 0.0f;
             float i = g[0], f = g[out], c = g[2 * out], o = g[3 * out], s = y->s[at];
             float dh = l->dh[rk], dc = l->dc[rk] + dh * o * s * (1.0f - s);
             g[0] = dc * c * hard_slope(i);
@@ -241,19 +237,17 @@ static void backward_step(struct ggn_lstm *l, struct layer *y, int t, int batch)
             g[3 * out] = dh * s * hard_slope(o);
             l->dc[rk] = dc * f;
         }
-    const float *x = y->x + (size_t)t * (size_t)l->batch * (size_t)y->in;
+    const size_t inputs = (size_t)t * (size_t)l->batch * (size_t)y->in; /* of the steps before */
     /* dW += dZᵀ·X, dU += dZᵀ·H₋, dX = dZ·W, dH₋ = dZ·U */
-    ggn_blas_sgemm(CblasTrans, CblasNoTrans, 4 * out, y->in, batch, 1.0f, z, 4 * out, x, y->in, 1.0f, l->grad + y->w, y->in);
-    ggn_blas_sgemm(CblasNoTrans, CblasNoTrans, batch, y->in, 4 * out, 1.0f, z, 4 * out, l->p + y->w, y->in, 0.0f,
-                   y->dx + (size_t)t * (size_t)l->batch * (size_t)y->in, y->in);
+    ggn_blas_sgemm(CblasTrans, CblasNoTrans, 4 * out, y->in, batch, z, y->x + inputs, 1.0f, l->grad + y->w);
+    ggn_blas_sgemm(CblasNoTrans, CblasNoTrans, batch, y->in, 4 * out, z, l->p + y->w, 0.0f, y->dx + inputs);
     for (int r = 0; r < batch; r++)
         for (int k = 0; k < 4 * out; k++)
             l->grad[y->b + (size_t)k] += z[(size_t)r * 4 * (size_t)out + (size_t)k];
     if (t == 0)
         return;
-    ggn_blas_sgemm(CblasTrans, CblasNoTrans, 4 * out, out, batch, 1.0f, z, 4 * out,
-                   y->h + (size_t)(t - 1) * (size_t)l->batch * (size_t)out, out, 1.0f, l->grad + y->u, out);
-    ggn_blas_sgemm(CblasNoTrans, CblasNoTrans, batch, out, 4 * out, 1.0f, z, 4 * out, l->p + y->u, out, 0.0f, l->dh, out);
+    ggn_blas_sgemm(CblasTrans, CblasNoTrans, 4 * out, out, batch, z, y->h + first - step, 1.0f, l->grad + y->u);
+    ggn_blas_sgemm(CblasNoTrans, CblasNoTrans, batch, out, 4 * out, z, l->p + y->u, 0.0f, l->dh);
 }
 
 /* Gradients of the sum over the batch of d[r]·logit[r]. */

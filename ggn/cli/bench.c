@@ -207,7 +207,7 @@ static double sgemm_gflops(const struct bench *b, float *memory)
 
     ggn_blas_threads(b->o.threads);
     double start = now_s(b);
-    ggn_blas_sgemm(CblasNoTrans, CblasNoTrans, SGEMM_N, SGEMM_N, SGEMM_N, 1, x, SGEMM_N, y, SGEMM_N, 0, z, SGEMM_N);
+    ggn_blas_sgemm(CblasNoTrans, CblasNoTrans, SGEMM_N, SGEMM_N, SGEMM_N, x, y, 0, z);
     double elapsed = now_s(b) - start;
     ggn_blas_threads(1);
     return 2e-9 * SGEMM_N * SGEMM_N * SGEMM_N / elapsed;
