@@ -264,11 +264,13 @@ static void extract_tile(struct ggn_baseline_reader *r, const uint8_t *rgb, doub
     double *l = r->lightness;
 
     ggn_lightness(rgb, pixels, l);
-    int rc = b->kind == GGN_SVD_ENTROPY ? ggn_svd_entropy(l, b->width, b->height, b->first, GGN_SUB_BLOCK, features, NULL)
-             : b->kind == GGN_ATTRIBUTES_SVM ? ggn_attributes(l, b->width, b->height, l + pixels, features, NULL)
-                                             : ggn_noise_mask(l, b->width, b->height, l + pixels, features, NULL);
-    for (int i = 0; i < b->features && rc; i++)
-        features[i] = (double)NAN;
+    if (b->kind == GGN_ATTRIBUTES_SVM)
+        ggn_attributes(l, b->width, b->height, l + pixels, features);
+    else if (b->kind == GGN_MASK_SVM)
+        ggn_noise_mask(l, b->width, b->height, l + pixels, features);
+    else if (ggn_svd_entropy(l, b->width, b->height, b->first, GGN_SUB_BLOCK, features) != 0)
+        for (int i = 0; i < b->features; i++)
+            features[i] = (double)NAN;
 }
 
 void ggn_baseline_extract(struct ggn_baseline_reader *r, const uint8_t *rgb, int width, int height, double *features)

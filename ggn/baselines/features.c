@@ -35,24 +35,18 @@ static double entropy(const double *s, int first, int last)
     return h / log(last - first);
 }
 
-int ggn_svd_entropy(const double *l, int w, int h, int first, int last, double *out, struct base_err *err)
+int ggn_svd_entropy(const double *l, int w, int h, int first, int last, double *out)
 {
     enum { N = GGN_SUB_BLOCK };
     double a[N * N], s[N], work[64 * N];
-    if (first < 0 || last > N || last - first < 2 || w < N || h < N)
-        return base_fail(err, BASE_EINVAL, "SVD-entropy of singular values %d to %d of a %dx%d block", first, last, w, h);
-    int rc = ggn_blas_open(err);
-    if (rc)
-        return rc;
     for (int by = 0; by < h / N; by++)
         for (int bx = 0; bx < w / N; bx++) {
-            double largest = 0.0;
             for (int y = 0; y < N; y++)
                 for (int x = 0; x < N; x++)
                     a[x * N + y] = floor(l[(size_t)(by * N + y) * (size_t)w + (size_t)(bx * N + x)]);
             if (ggn_blas_singular_values(N, a, s, work) != 0)
-                return base_fail(err, BASE_EINVAL, "SVD-entropy: the singular values do not converge");
-            largest = s[0];
+                return -1;
+            const double largest = s[0];
             for (int i = 0; i < N; i++) /* rounding errors of a rank-deficient sub-block are no noise */
                 s[i] = s[i] > 1e-12 * largest ? s[i] : 0.0;
             *out++ = entropy(s, first, last);
@@ -218,11 +212,9 @@ static void residual(const double *l, const double *filtered, size_t n, double *
     out[1] = sqrt(fmax(square / (double)n - out[0] * out[0], 0.0));
 }
 
-int ggn_attributes(const double *l, int w, int h, double *tmp, double out[GGN_ATTRIBUTES], struct base_err *err)
+void ggn_attributes(const double *l, int w, int h, double *tmp, double out[GGN_ATTRIBUTES])
 {
     static const double sigmas[3] = {0.5, 1.0, 1.5};
-    if (w < 3 || h < 3)
-        return base_fail(err, BASE_EINVAL, "attributes of a %dx%d block", w, h);
     size_t n = (size_t)w * (size_t)h;
     double *f = tmp + n, *scratch = tmp + 2 * n;
     for (int r = 1; r <= 2; r++) {
@@ -239,7 +231,6 @@ int ggn_attributes(const double *l, int w, int h, double *tmp, double out[GGN_AT
     }
     haar(l, f, tmp, w, h);
     residual(l, f, n, out + 24);
-    return 0;
 }
 
 /* Means over an 8x8 grid of |image - Gaussian(image)|. */
@@ -259,13 +250,10 @@ static void reduce_mask(const double *image, double *tmp, double *smooth, int w,
         }
 }
 
-int ggn_noise_mask(const double *l, int w, int h, double *tmp, double out[GGN_MASK_FEATURES], struct base_err *err)
+void ggn_noise_mask(const double *l, int w, int h, double *tmp, double out[GGN_MASK_FEATURES])
 {
-    if (w < GGN_MASK_GRID || h < GGN_MASK_GRID)
-        return base_fail(err, BASE_EINVAL, "noise mask of a %dx%d block", w, h);
     size_t n = (size_t)w * (size_t)h;
     reduce_mask(l, tmp, tmp + n, w, h, out);
     wiener(l, tmp, tmp + n, tmp + 2 * n, w, h, 2);
     reduce_mask(tmp + n, tmp, tmp + 2 * n, w, h, out + GGN_MASK_FEATURES / 2);
-    return 0;
 }

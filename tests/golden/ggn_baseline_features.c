@@ -11,6 +11,7 @@
 
 #include "support/ggn_near.h"
 
+#include "baselines/blas.h"
 #include "baselines/features.h"
 #include "model/golden.h"
 #include "nn/hash.h"
@@ -22,6 +23,7 @@ static double l[P], scratch[GGN_FEATURE_SCRATCH * P];
 static int setup(void **state)
 {
     (void)state;
+    assert_int_equal(ggn_blas_open(NULL), 0);
     for (int c = 0; c < 3; c++)
         for (int i = 0; i < P; i++)
             rgb[c * P + i] = (uint8_t)floor(255.0 * ggn_golden_pixel(0, 0, c, i / W, i % W) + 0.5);
@@ -34,14 +36,14 @@ static void svd_entropy(void **state)
     (void)state;
     double h[100], sum = 0.0;
     assert_int_equal(ggn_svd_entropy_count(W, W), 100);
-    assert_int_equal(ggn_svd_entropy(l, W, W, 0, 20, h, NULL), 0);
+    assert_int_equal(ggn_svd_entropy(l, W, W, 0, 20, h), 0);
     assert_near(h[0], 0.033944384, 1e-8);
     assert_near(h[1], 0.032175379, 1e-8);
     assert_near(h[99], 0.177310094, 1e-8);
     for (int i = 0; i < 100; i++)
         sum += h[i];
     assert_near(sum / 100, 0.112037071, 1e-8);
-    assert_int_equal(ggn_svd_entropy(l, W, W, 5, 20, h, NULL), 0);
+    assert_int_equal(ggn_svd_entropy(l, W, W, 5, 20, h), 0);
     sum = 0.0;
     for (int i = 0; i < 100; i++)
         sum += h[i];
@@ -61,7 +63,7 @@ static void attributes(void **state)
                   {3, 7.920462968, 5.261391390},
                   {9, 9.200309384, 6.720253924},
                   {10, 7.952331544, 5.181926634}};
-    assert_int_equal(ggn_attributes(l, W, W, scratch, a, NULL), 0);
+    ggn_attributes(l, W, W, scratch, a);
     for (size_t i = 0; i < 4; i++) { /* box 3; Gaussian 3 with sigma 1; median 5; Wiener 3 */
         assert_near(a[2 * golden[i].index], golden[i].mean, 1e-6);
         assert_near(a[2 * golden[i].index + 1], golden[i].deviation, 1e-6);
@@ -79,26 +81,23 @@ static void degenerate(void **state)
     for (int kind = 0; kind < 3; kind++) {
         for (int i = 0; i < P; i++)
             flat[i] = kind == 0 ? 0.0 : kind == 1 ? 50.0 : (double)(i % W) / 4.0; /* black, grey, rank one */
-        assert_int_equal(ggn_svd_entropy(flat, W, W, 0, 20, h, NULL), 0);
+        assert_int_equal(ggn_svd_entropy(flat, W, W, 0, 20, h), 0);
         for (int i = 0; i < 100; i++)
             assert_near(h[i], 0.0, 1e-12);
-        ggn_svd_entropy(flat, W, W, 5, 20, h, NULL);
+        ggn_svd_entropy(flat, W, W, 5, 20, h);
         double most = 0.0;
         for (int i = 0; i < 100; i++)
             most = fmax(most, h[i]);
         printf("# figure rank: entropy up to %.2g\n", most);
         for (int i = 0; i < 100; i++)
             assert_near(h[i], 0.0, 0.0);
-        assert_int_equal(ggn_attributes(flat, W, W, scratch, a, NULL), 0);
-        assert_int_equal(ggn_noise_mask(flat, W, W, scratch, mask, NULL), 0);
+        ggn_attributes(flat, W, W, scratch, a);
+        ggn_noise_mask(flat, W, W, scratch, mask);
         for (int i = 0; i < GGN_ATTRIBUTES; i++)
             assert_true(isfinite(a[i]));
         for (int i = 0; i < GGN_MASK_FEATURES; i++)
             assert_true(isfinite(mask[i]));
     }
-    assert_int_equal(ggn_svd_entropy(flat, 19, W, 0, 20, h, NULL), BASE_EINVAL);
-    assert_int_equal(ggn_attributes(flat, 2, 2, scratch, a, NULL), BASE_EINVAL);
-    assert_int_equal(ggn_noise_mask(flat, 7, 9, scratch, mask, NULL), BASE_EINVAL);
 }
 
 /* More noise, larger features. */
@@ -109,12 +108,12 @@ static void monotone(void **state)
     double a[GGN_ATTRIBUTES], b[GGN_ATTRIBUTES], ma[GGN_MASK_FEATURES], mb[GGN_MASK_FEATURES];
     for (int i = 0; i < P; i++)
         soft[i] = 50.0 + 0.25 * (l[i] - 50.0);
-    ggn_attributes(l, W, W, scratch, a, NULL);
-    ggn_attributes(soft, W, W, scratch, b, NULL);
+    ggn_attributes(l, W, W, scratch, a);
+    ggn_attributes(soft, W, W, scratch, b);
     for (int i = 0; i < GGN_ATTRIBUTES; i++)
         assert_true(b[i] < a[i]);
-    ggn_noise_mask(l, W, W, scratch, ma, NULL);
-    ggn_noise_mask(soft, W, W, scratch, mb, NULL);
+    ggn_noise_mask(l, W, W, scratch, ma);
+    ggn_noise_mask(soft, W, W, scratch, mb);
     for (int i = 0; i < GGN_MASK_FEATURES / 2; i++)
         assert_near(mb[i], 0.25 * ma[i], 1e-9);
 }
@@ -245,7 +244,7 @@ static void filters_by_definition(void **state)
     for (int i = 0; i < OP; i++)
         p[i] = 40 + 8 * sin(0.4 * (i % OW)) * cos(0.3 * (i / OW)) +
                12 * (ggn_hash_unit((uint32_t)i, 1) - 0.5) * (i / OW > 6) + (i % 53 == 0 ? 40 : 0) + (i % OW > 12 ? 15 : 0);
-    assert_int_equal(ggn_attributes(p, OW, OH, scratch, a, NULL), 0);
+    ggn_attributes(p, OW, OH, scratch, a);
     for (int r = 1; r <= 2; r++) {
         filtered(p, BOX, r, 0, 1, f);
         left_over(p, f, a + 2 * (r - 1), "box");
@@ -260,7 +259,7 @@ static void filters_by_definition(void **state)
     }
     haar_again(p, f);
     left_over(p, f, a + 24, "wavelet");
-    assert_int_equal(ggn_noise_mask(p, OW, OH, scratch, mask, NULL), 0);
+    ggn_noise_mask(p, OW, OH, scratch, mask);
     cells(p, mask);
     wiener_again(p, 2, f);
     cells(f, mask + 64);
@@ -273,7 +272,6 @@ static void lightness_and_order(void **state)
     enum { BW = 65, BH = 45 };
     static double big[BW * BH], one[400];
     double h[6], alone;
-    struct base_err err = {0};
     uint8_t codes[3 * 256];
     double got[256];
     for (int i = 0; i < 256; i++) {
@@ -297,35 +295,25 @@ static void lightness_and_order(void **state)
     for (int i = 0; i < BW * BH; i++)
         big[i] = 100 * ggn_hash_unit((uint32_t)i, 3);
     assert_int_equal(ggn_svd_entropy_count(BW, BH), 6);
-    assert_int_equal(ggn_svd_entropy(big, BW, BH, 2, 18, h, NULL), 0);
+    assert_int_equal(ggn_svd_entropy(big, BW, BH, 2, 18, h), 0);
     for (int k = 0; k < 6; k++) {
         for (int i = 0; i < 400; i++)
             one[i] = big[(k / 3 * 20 + i / 20) * BW + k % 3 * 20 + i % 20];
-        assert_int_equal(ggn_svd_entropy(one, 20, 20, 2, 18, &alone, NULL), 0);
+        assert_int_equal(ggn_svd_entropy(one, 20, 20, 2, 18, &alone), 0);
         assert_true(alone == h[k] && alone > 0 && alone < 1);
     }
     /* a matrix with singular values 20, 10, 10: entropy of 4/6, 1/6, 1/6, over that of twenty equal ones */
     memset(one, 0, sizeof one);
     one[0] = 20;
     one[21] = one[42] = 10;
-    assert_int_equal(ggn_svd_entropy(one, 20, 20, 0, 20, h, NULL), 0);
+    assert_int_equal(ggn_svd_entropy(one, 20, 20, 0, 20, h), 0);
     assert_near(h[0], (log(1.5) * 2 / 3 + log(6) / 3) / log(20), 1e-12);
-    assert_int_equal(ggn_svd_entropy(one, 20, 20, 1, 3, h, NULL), 0);
+    assert_int_equal(ggn_svd_entropy(one, 20, 20, 1, 3, h), 0);
     assert_near(h[0], 1, 1e-12);
-    assert_int_equal(ggn_svd_entropy(one, 20, 20, 18, 20, h, NULL), 0);
+    assert_int_equal(ggn_svd_entropy(one, 20, 20, 18, 20, h), 0);
     assert_near(h[0], 0, 0);
-    assert_int_equal(ggn_svd_entropy(one, 20, 20, 19, 20, h, &err), BASE_EINVAL);
-    assert_string_equal(err.text, "SVD-entropy of singular values 19 to 20 of a 20x20 block");
-    assert_true(ggn_svd_entropy(one, 20, 20, -1, 5, h, NULL) && ggn_svd_entropy(one, 20, 20, 0, 21, h, NULL) &&
-                ggn_svd_entropy(one, 20, 19, 0, 20, h, NULL));
-    assert_int_equal(ggn_attributes(one, 3, 2, scratch, got, &err), BASE_EINVAL);
-    assert_string_equal(err.text, "attributes of a 3x2 block");
-    assert_int_equal(ggn_attributes(one, 2, 3, scratch, got, &err), BASE_EINVAL);
-    assert_int_equal(ggn_attributes(one, 3, 3, scratch, got, &err), 0);
-    assert_int_equal(ggn_noise_mask(one, 8, 7, scratch, got, &err), BASE_EINVAL);
-    assert_string_equal(err.text, "noise mask of a 8x7 block");
-    assert_int_equal(ggn_noise_mask(one, 7, 8, scratch, got, &err), BASE_EINVAL);
-    assert_int_equal(ggn_noise_mask(one, 8, 8, scratch, got, &err), 0);
+    ggn_attributes(one, 3, 3, scratch, got);
+    ggn_noise_mask(one, 8, 8, scratch, got);
 }
 
 int main(void)
