@@ -197,53 +197,39 @@ const char *ggn_dataset_label_source(const struct ggn_dataset *data)
     return source ? source : "none";
 }
 
+static int is_name(const char *name, const char *at, size_t length)
+{
+    return strlen(name) == length && memcmp(name, at, length) == 0;
+}
+
+/* list: comma-separated, or NULL. */
 static int is_item(const char *list, const char *scene)
 {
-    const size_t length = strlen(scene);
-
-    for (size_t n; *list; list += n + (list[n] == ',')) {
+    for (size_t n; list && *list; list += n + (list[n] == ',')) {
         n = strcspn(list, ",");
-        if (n == length && !memcmp(list, scene, n))
+        if (is_name(scene, list, n))
             return 1;
     }
     return 0;
 }
 
-/* What somebody who wrote a folder's name should have written. */
-static int no_scene(const struct ggn_dataset *data, const char *option, const char *name, int length, struct base_err *err)
+/* Every scene that the option lists must be there. Who wrote a folder's name is told what it should have been. */
+static int check_option(const struct ggn_dataset *data, const char *option, const char *list, struct base_err *err)
 {
-    for (int i = 0; i < data->n; i++)
-        if (strlen(data->views[i].name) == (size_t)length && !memcmp(data->views[i].name, name, (size_t)length))
-            return base_fail(err, BASE_EINVAL, "%s: no scene '%.*s' in the data: this folder's scene is '%s'", option,
-                             length, name, data->views[i].manifest.scene);
-    return base_fail(err, BASE_EINVAL, "%s: no scene '%.*s' in the data", option, length < 200 ? length : 200, name);
-}
-
-static int apply_option(struct ggn_dataset *data, const char *option, const char *list, enum ggn_split split,
-                        struct base_err *err)
-{
-    for (size_t n; *list; list += n + (list[n] == ',')) {
-        int found = 0;
+    for (size_t n; list && *list; list += n + (list[n] == ',')) {
+        int scene = 0, folder = 0;
         n = strcspn(list, ",");
-        for (int i = 0; i < data->n; i++) {
-            const char *scene = data->views[i].manifest.scene;
-            if (strlen(scene) != n || memcmp(scene, list, n) != 0)
-                continue;
-            data->views[i].split = split;
-            found = 1;
-        }
-        if (!found)
-            return no_scene(data, option, list, (int)(n < 4096 ? n : 4096), err);
+        while (scene < data->n && !is_name(data->views[scene].manifest.scene, list, n))
+            scene++;
+        if (scene < data->n)
+            continue;
+        while (folder < data->n && !is_name(data->views[folder].name, list, n))
+            folder++;
+        if (folder < data->n)
+            return base_fail(err, BASE_EINVAL, "%s: no scene '%.*s' in the data: this folder's scene is '%s'", option,
+                             (int)n, list, data->views[folder].manifest.scene);
+        return base_fail(err, BASE_EINVAL, "%s: no scene '%.*s' in the data", option, n < 200 ? (int)n : 200, list);
     }
-    return 0;
-}
-
-static int check_lists(const struct ggn_dataset *data, const struct ggn_split_options *o, struct base_err *err)
-{
-    for (int i = 0; i < data->n && o->validation && o->test; i++)
-        if (is_item(o->validation, data->views[i].manifest.scene) && is_item(o->test, data->views[i].manifest.scene))
-            return base_fail(err, BASE_EINVAL, "--validation and --test: both list the scene '%s'",
-                             data->views[i].manifest.scene);
     return 0;
 }
 
@@ -285,19 +271,21 @@ int ggn_split_choose(struct ggn_dataset *data, const struct ggn_split_options *o
                      struct base_err *err)
 {
     const int fifth = data->n_scenes < 3 ? 1 : 2;
-    int rc = check_lists(data, o, err);
 
-    if (rc)
-        return rc;
     *source = source_of(data, o);
-    for (int i = 0; i < data->n && *source != GGN_SPLIT_BY_DATA; i++) {
+    for (int i = 0; i < data->n; i++) {
         struct ggn_dataset_view *v = &data->views[i];
-        if (*source == GGN_SPLIT_BY_MODELS)
-            v->split = by_models(o, v->manifest.scene);
-        else
+        const char *scene = v->manifest.scene;
+        const int validation = is_item(o->validation, scene), test = is_item(o->test, scene);
+        if (validation && test)
+            return base_fail(err, BASE_EINVAL, "--validation and --test: both list the scene '%s'", scene);
+        if (validation || test)
+            v->split = test ? GGN_SPLIT_TEST : GGN_SPLIT_VALIDATION;
+        else if (*source == GGN_SPLIT_BY_MODELS)
+            v->split = by_models(o, scene);
+        else if (*source == GGN_SPLIT_BY_FIFTHS)
             v->split = v->scene % 5 == fifth && !o->validation ? GGN_SPLIT_VALIDATION : GGN_SPLIT_TRAIN;
     }
-    if (o->validation)
-        rc = apply_option(data, "--validation", o->validation, GGN_SPLIT_VALIDATION, err);
-    return !rc && o->test ? apply_option(data, "--test", o->test, GGN_SPLIT_TEST, err) : rc;
+    int rc = check_option(data, "--validation", o->validation, err);
+    return rc ? rc : check_option(data, "--test", o->test, err);
 }
