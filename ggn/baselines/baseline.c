@@ -138,40 +138,35 @@ static int make_room(struct ggn_baseline *b, const cJSON *root, const struct ggn
     return 0;
 }
 
+/* b: zeroed; the caller releases it after a failure. */
 static int parse(struct ggn_baseline *b, const cJSON *root, const struct ggn_container *c, enum ggn_baseline_kind kind,
                  struct base_err *err)
 {
     const cJSON *type = cJSON_GetObjectItemCaseSensitive(root, "kind");
     const cJSON *method = cJSON_GetObjectItemCaseSensitive(root, "method");
-    struct ggn_baseline b_read = {0};
     struct part parts[4];
     const char *name = cJSON_IsString(method) ? method->valuestring : "";
     const int found = base_word_index(ggn_baseline_names, name, strlen(name));
-    int w = 0, h = 0, window = 0, n;
+    int w = 0, h = 0, window = 0;
 
     if (!cJSON_IsString(type) || strcmp(type->valuestring, "baseline") != 0 || found < 0 ||
         (kind != GGN_BASELINES && kind != (enum ggn_baseline_kind)found))
         return base_fail(err, BASE_EINVAL, "not a baseline%s%s", kind != GGN_BASELINES ? " for " : "",
                          kind != GGN_BASELINES ? ggn_baseline_names[kind] : "");
-    kind = (enum ggn_baseline_kind)found;
     int rc = base_json_need_int(root, "width", 1, SIDE_MAX, &w, err);
     if (!rc)
         rc = base_json_need_int(root, "height", 1, SIDE_MAX, &h, err);
     if (!rc)
         rc = base_json_need_int(root, "window", 1, GGN_WINDOW_MAX, &window, err);
     if (!rc)
-        rc = ggn_baseline_init(&b_read, kind, w, h, window, err);
+        rc = ggn_baseline_init(b, (enum ggn_baseline_kind)found, w, h, window, err);
     if (!rc)
-        rc = base_json_need_int(root, "first", 0, GGN_SUB_BLOCK - 2, &b_read.first, err);
+        rc = base_json_need_int(root, "first", 0, GGN_SUB_BLOCK - 2, &b->first, err);
     if (!rc)
-        rc = ggn_policy_parse(cJSON_GetObjectItemCaseSensitive(root, "policy"), &b_read.policy, err);
+        rc = ggn_policy_parse(cJSON_GetObjectItemCaseSensitive(root, "policy"), &b->policy, err);
     if (!rc)
-        rc = make_room(&b_read, root, c, err);
-    *b = b_read;
-    if (rc)
-        return rc;
-    n = parts_of(b, parts);
-    for (int i = 0; i < n && !rc; i++)
+        rc = make_room(b, root, c, err);
+    for (int i = 0, n = rc ? 0 : parts_of(b, parts); i < n && !rc; i++)
         rc = ggn_container_get(c, parts[i].name, parts[i].rank, parts[i].dim, parts[i].values, err);
     return rc;
 }
