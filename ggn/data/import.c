@@ -516,6 +516,7 @@ int ggn_import_view(const char *dir, const char *out, const struct ggn_import_op
         rc = base_make_folder(out, &made, err);
     if (!rc)
         rc = take_over(out, &m, err);
+    /* the manifest after each row: what it lists the next run need not make */
     for (uint32_t row = !rc ? m.n_blocks / (m.width / m.block) : 0; !rc && row < m.height / m.block; row++) {
         rc = import_row(&v, out, &m, (int)row, o, err);
         if (!rc)
