@@ -43,17 +43,9 @@ static double pearson(const double *x, const double *y, size_t n)
 }
 
 struct keyed {
-    double key;
+    double key; /* first: compare_doubles looks at it */
     size_t index;
 };
-
-static int compare_keyed(const void *a, const void *b)
-{
-    const struct keyed *x = a, *y = b;
-    if (x->key != y->key)
-        return x->key > y->key ? 1 : -1;
-    return (x->index > y->index) - (x->index < y->index);
-}
 
 /* rank[i] in 1..n; equal values share the mean of their ranks. */
 static int ranks(const double *x, size_t n, double *rank, struct base_err *err)
@@ -63,7 +55,7 @@ static int ranks(const double *x, size_t n, double *rank, struct base_err *err)
         return base_fail_nomem(err, "ranks");
     for (size_t i = 0; i < n; i++)
         k[i] = (struct keyed){x[i], i};
-    qsort(k, n, sizeof *k, compare_keyed);
+    qsort(k, n, sizeof *k, compare_doubles);
     for (size_t i = 0, j; i < n; i = j) {
         for (j = i + 1; j < n && k[j].key == k[i].key;)
             j++;
