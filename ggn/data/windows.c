@@ -55,13 +55,6 @@ static double draw(uint32_t what, uint64_t step, int i, uint32_t seed)
     return ggn_hash_unit(what, ggn_hash((uint32_t)i, ggn_hash((uint32_t)(step >> 32), ggn_hash((uint32_t)step, seed))));
 }
 
-static int below(double unit, int n)
-{
-    int k = (int)(unit * n);
-
-    return k < n ? k : n - 1;
-}
-
 /* The k-th of the scenes (or, within `scene`, of the series) that have windows; their number when k < 0. */
 static int nth_scene(const struct ggn_windows *w, int k)
 {
@@ -92,8 +85,8 @@ static const double NEAR = 1.5;
 
 int ggn_windows_draw(const struct ggn_windows *w, uint64_t step, int i, uint32_t seed)
 {
-    int scene = nth_scene(w, below(draw(1, step, i, seed), nth_scene(w, -1)));
-    int series = nth_series(w, scene, below(draw(2, step, i, seed), nth_series(w, scene, -1)));
+    int scene = nth_scene(w, (int)(draw(1, step, i, seed) * nth_scene(w, -1)));
+    int series = nth_series(w, scene, (int)(draw(2, step, i, seed) * nth_series(w, scene, -1)));
     const struct ggn_window *list = w->list + w->first[series];
     int n = w->first[series + 1] - w->first[series], any[2] = {0, 0};
 
