@@ -104,44 +104,6 @@ static void gaussian(const double *in, double *tmp, double *out, int w, int h, i
     separable(in, tmp, out, w, h, taps, r, BORDER_MIRROR);
 }
 
-/* Zeros beyond the border, as the published figures have it. */
-static void median(const double *in, double *out, int w, int h, int r)
-{
-    for (int y = 0; y < h; y++)
-        for (int x = 0; x < w; x++) {
-            double v[25];
-            int n = 0;
-            for (int yy = y - r; yy <= y + r; yy++)
-                for (int xx = x - r; xx <= x + r; xx++) {
-                    int inside = yy >= 0 && yy < h && xx >= 0 && xx < w;
-                    double value = inside ? in[(size_t)yy * (size_t)w + (size_t)xx] : 0.0;
-                    int i = n++;
-                    for (; i > 0 && v[i - 1] > value; i--)
-                        v[i] = v[i - 1];
-                    v[i] = value;
-                }
-            out[(size_t)y * (size_t)w + (size_t)x] = v[n / 2];
-        }
-}
-
-/* Local Wiener filter (Lim 1990), noise power = mean of the local variances; zeros beyond the border. scratch: 2 planes. */
-static void wiener(const double *in, double *tmp, double *out, double *scratch, int w, int h, int r)
-{
-    size_t n = (size_t)w * (size_t)h;
-    double *mean = scratch, *variance = scratch + n, noise = 0.0;
-    for (size_t i = 0; i < n; i++)
-        out[i] = in[i] * in[i];
-    box(in, tmp, mean, w, h, r, BORDER_ZERO);
-    box(out, tmp, variance, w, h, r, BORDER_ZERO);
-    for (size_t i = 0; i < n; i++) {
-        variance[i] -= mean[i] * mean[i];
-        noise += variance[i];
-    }
-    noise /= (double)n;
-    for (size_t i = 0; i < n; i++)
-        out[i] = !(variance[i] > noise) ? mean[i] : mean[i] + (in[i] - mean[i]) * (1.0 - noise / variance[i]);
-}
-
 /* Element k of v in rising order; v is reordered (Hoare 1961). Not qsort, which allocates. */
 static double ranked(double *v, size_t n, size_t k)
 {
@@ -167,6 +129,40 @@ static double ranked(double *v, size_t n, size_t k)
             first = j + 1;
     }
     return v[k];
+}
+
+/* Zeros beyond the border, as the published figures have it. */
+static void median(const double *in, double *out, int w, int h, int r)
+{
+    for (int y = 0; y < h; y++)
+        for (int x = 0; x < w; x++) {
+            double v[25];
+            size_t n = 0;
+            for (int yy = y - r; yy <= y + r; yy++)
+                for (int xx = x - r; xx <= x + r; xx++) {
+                    int inside = yy >= 0 && yy < h && xx >= 0 && xx < w;
+                    v[n++] = inside ? in[(size_t)yy * (size_t)w + (size_t)xx] : 0.0;
+                }
+            out[(size_t)y * (size_t)w + (size_t)x] = ranked(v, n, n / 2);
+        }
+}
+
+/* Local Wiener filter (Lim 1990), noise power = mean of the local variances; zeros beyond the border. scratch: 2 planes. */
+static void wiener(const double *in, double *tmp, double *out, double *scratch, int w, int h, int r)
+{
+    size_t n = (size_t)w * (size_t)h;
+    double *mean = scratch, *variance = scratch + n, noise = 0.0;
+    for (size_t i = 0; i < n; i++)
+        out[i] = in[i] * in[i];
+    box(in, tmp, mean, w, h, r, BORDER_ZERO);
+    box(out, tmp, variance, w, h, r, BORDER_ZERO);
+    for (size_t i = 0; i < n; i++) {
+        variance[i] -= mean[i] * mean[i];
+        noise += variance[i];
+    }
+    noise /= (double)n;
+    for (size_t i = 0; i < n; i++)
+        out[i] = !(variance[i] > noise) ? mean[i] : mean[i] + (in[i] - mean[i]) * (1.0 - noise / variance[i]);
 }
 
 static double shrink(double v, double threshold)
