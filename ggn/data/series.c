@@ -40,23 +40,18 @@ int ggn_series_set_count(const struct ggn_series_set *set, enum ggn_split split,
     return n;
 }
 
-struct ggn_level_series *ggn_series_set_append(struct ggn_series_set *set, struct base_err *err)
+int ggn_series_set_append(struct ggn_series_set *set, struct base_err *err)
 {
-    if (set->n == MAX_CHAINS) {
-        base_fail(err, BASE_EINVAL, "more than %d blocks", MAX_CHAINS);
-        return NULL;
-    }
+    if (set->n == MAX_CHAINS)
+        return base_fail(err, BASE_EINVAL, "more than %d blocks", MAX_CHAINS);
     if ((set->n & (set->n - 1)) == 0) {
         struct ggn_level_series *more = realloc(set->series, (set->n ? 2 * (size_t)set->n : 1) * sizeof *more);
-        if (!more) {
-            base_fail_nomem(err, "blocks");
-            return NULL;
-        }
+        if (!more)
+            return base_fail_nomem(err, "blocks");
         set->series = more;
     }
-    struct ggn_level_series *c = &set->series[set->n++];
-    *c = (struct ggn_level_series){0};
-    return c;
+    set->series[set->n++] = (struct ggn_level_series){0};
+    return 0;
 }
 
 uint32_t ggn_series_set_crc(const struct ggn_series_set *set)
@@ -183,10 +178,10 @@ static int load_block(struct ggn_series_set *set, int view, uint32_t index, cons
     if (!rc && ((int)b.width != set->width || (int)b.height != set->height))
         rc = base_fail(err, BASE_EINVAL, "%s/%s: a block of %ux%u pixels among blocks of %dx%d", v->dir,
                        v->manifest.blocks[index].file, b.width, b.height, set->width, set->height);
-    struct ggn_level_series *c = rc ? NULL : ggn_series_set_append(set, err);
-    if (!rc && !c)
-        rc = BASE_ENOMEM;
+    if (!rc)
+        rc = ggn_series_set_append(set, err);
     if (!rc) {
+        struct ggn_level_series *c = &set->series[set->n - 1];
         const struct ggn_label *label = v->has_labels ? ggn_labels_find(&v->labels, b.id) : NULL;
         c->view = view;
         c->scene = v->scene;

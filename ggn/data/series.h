@@ -99,7 +99,7 @@ int ggn_series_grow(const struct ggn_series_set *set, struct ggn_level_series *s
 void ggn_series_measure(const struct ggn_series_set *set, struct ggn_level_series *series, int k, const float *mean,
                         const float *d, double scale, int keep_texture);
 
-/* Appends an empty series; NULL: out of memory. Pointers to series are invalid afterwards. */
-struct ggn_level_series *ggn_series_set_append(struct ggn_series_set *set, struct base_err *err);
+/* Appends an empty series, which is the last then. Pointers to series are invalid afterwards. */
+int ggn_series_set_append(struct ggn_series_set *set, struct base_err *err);
 
 #endif

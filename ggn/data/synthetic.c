@@ -94,13 +94,14 @@ static int make_levels(const struct ggn_series_set *set, struct ggn_level_series
     return 0;
 }
 
-/* An empty series of the block of series `of`; NULL: out of memory. */
-static struct ggn_level_series *append_copy(struct ggn_series_set *set, int of, struct base_err *err)
+/* Appends an empty series of the block of series `of`. */
+static int append_copy(struct ggn_series_set *set, int of, struct base_err *err)
 {
-    struct ggn_level_series *c = ggn_series_set_append(set, err);
+    int rc = ggn_series_set_append(set, err);
 
-    if (!c)
-        return NULL;
+    if (rc)
+        return rc;
+    struct ggn_level_series *c = &set->series[set->n - 1];
     *c = set->series[of];
     c->synthetic = 1;
     c->n_levels = 0;
@@ -108,7 +109,7 @@ static struct ggn_level_series *append_copy(struct ggn_series_set *set, int of, 
     c->noisy = c->noise_map = c->has_noise_map = NULL;
     c->denoised = NULL;
     c->measure = NULL;
-    return c;
+    return 0;
 }
 
 /* with_reference 0: as if none had been recorded. The caller frees s->base, also after a failure. */
@@ -159,8 +160,9 @@ int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uin
         for (int k = 0; !rc && s.n_full > 0 && isfinite(s.n_reference) && k < per_series; k++) {
             const uint32_t own_seed = ggn_hash((uint32_t)(i * 64 + k), seed);
             const int n = choose_levels(spp, 0, set->first_spp, ratio, HIGHEST_SHARE * s.n_reference, 1, own_seed);
-            struct ggn_level_series *c = append_copy(set, i, err);
-            rc = c ? make_levels(set, c, 0, &s, spp, n, own_seed, err) : BASE_ENOMEM;
+            rc = append_copy(set, i, err);
+            if (!rc)
+                rc = make_levels(set, &set->series[set->n - 1], 0, &s, spp, n, own_seed, err);
         }
     }
     free(s.base);
@@ -206,8 +208,9 @@ int ggn_series_set_extend(struct ggn_series_set *set, int all, uint32_t seed, st
             continue;
         }
         if (set->keep_recorded)
-            c = append_copy(set, i, err);
-        rc = c ? simulate_series(set, c, &s, anew, 1, own_seed, err) : BASE_ENOMEM;
+            rc = append_copy(set, i, err);
+        if (!rc)
+            rc = simulate_series(set, &set->series[set->keep_recorded ? set->n - 1 : i], &s, anew, 1, own_seed, err);
     }
     free(s.base);
     return rc;

@@ -96,6 +96,19 @@ static void chains_are_as_they_were(void **state)
     transcript_end(&t, "data-chains");
 }
 
+/* Bad input, not a lack of memory. */
+static void too_many_blocks_are_refused(void **state)
+{
+    struct ggn_series_set set = {0};
+    struct base_err err = {0};
+    (void)state;
+    for (int i = 0; i < 65536; i++)
+        assert_int_equal(ggn_series_set_append(&set, &err), 0);
+    assert_int_equal(ggn_series_set_append(&set, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "more than 65536 blocks");
+    ggn_series_set_release(&set);
+}
+
 static void print_windows(FILE *f, const struct ggn_series_set *set, const struct ggn_window_options *o)
 {
     struct ggn_windows w;
@@ -180,7 +193,7 @@ static void windows_are_as_they_were(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(chains_are_as_they_were),
-                                       cmocka_unit_test(windows_are_as_they_were)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(chains_are_as_they_were), cmocka_unit_test(windows_are_as_they_were),
+                                       cmocka_unit_test(too_many_blocks_are_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
