@@ -7,7 +7,7 @@
 #include "base/err.h"
 #include "base/options.h"
 #include "base/outputs.h"
-#include "pbrt/load_options.h"
+#include "pbrt/load.h"
 #include "render/output.h"
 #include "render/render.h"
 #include "render/sequence.h"

@@ -9,12 +9,10 @@
 #define PT_PBRT_BUILD_H
 
 #include "pbrt/diag.h"
-#include "pbrt/load_options.h"
+#include "pbrt/load.h"
 #include "pbrt/names.h"
 #include "pbrt/params.h"
-#include "pbrt/source.h"
 #include "pbrt/xform.h"
-#include "scene/scene.h"
 
 /* Growing array; items owned, each of `size` bytes. */
 struct pt_list {
@@ -110,10 +108,8 @@ struct pt_builder {
 void pt_builder_init(struct pt_builder *b, struct pt_scene *scene, struct pt_scene_defaults *defaults,
                      const struct pt_load_options *options, const struct pt_source *source, struct base_err *err);
 void pt_builder_release(struct pt_builder *b);
-/* Moves the arrays into the scene's arena and derives everything: effects, camera, acceleration structure, lights. */
-int pt_builder_finish(struct pt_builder *b);
 
-/* pbrt.c: reads `path` and all that it includes; on success the builder is ready for pt_builder_finish. */
+/* pbrt.c: reads `path` and all that it includes; on success build.c can finish the scene. */
 int pt_pbrt_read(struct pt_builder *b, const char *path);
 
 /* Appends a copy of *item; index, or -1 (the diag has failed). */

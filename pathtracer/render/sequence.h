@@ -8,7 +8,7 @@
 
 #include "base/err.h"
 #include "render/render.h"
-#include "pbrt/load_options.h"
+#include "pbrt/load.h"
 
 enum { PT_SEQUENCE_MAX_LEVELS = 4000 };
 
