@@ -42,13 +42,13 @@ struct pt_state {
     const struct pt_params *attributes[PT_ATTR_COUNT]; /* borrows, NULL = none */
 };
 
-/* Header directives, kept until WorldBegin. */
+/* Header directives, kept until WorldBegin, in the order in which they are built. */
 enum pt_header {
     PT_HEADER_FILM,
-    PT_HEADER_CAMERA,
+    PT_HEADER_FILTER,
     PT_HEADER_SAMPLER,
     PT_HEADER_INTEGRATOR,
-    PT_HEADER_FILTER,
+    PT_HEADER_CAMERA,
     PT_HEADER_COUNT
 };
 

@@ -12,23 +12,14 @@ static const double max_pixels = 268435456.0; /* 2^28: 200 bytes a pixel are 50 
 
 static int is_one_of(const char *kind, const char *const *names) { return base_word_index(names, kind, strlen(kind)) >= 0; }
 
-static struct pt_params *begin(struct pt_builder *b, enum pt_header which, const char *fallback)
-{
-    struct pt_params *p = &b->header[which];
-    if (!p->text)
-        pt_params_clear(p, &b->diag, (struct pt_loc){NULL, 0, 0}, fallback);
-    return p;
-}
-
 static struct pt_loc shutter_loc(const struct pt_params *camera)
 {
     return pt_params_loc(camera, pt_params_find(camera, "shutterclose") ? "shutterclose" : "shutteropen");
 }
 
 /* The camera's, but the film depends on it. Before the first and after the second of the transforms' times nothing moves. */
-static void build_shutter(struct pt_builder *b)
+static void build_shutter(struct pt_builder *b, struct pt_params *p)
 {
-    struct pt_params *p = begin(b, PT_HEADER_CAMERA, "perspective");
     b->shutter[0] = pt_params_float(p, "shutteropen", 0);
     b->shutter[1] = pt_params_float(p, "shutterclose", 1);
     if (!(b->shutter[1] >= b->shutter[0]))
@@ -92,10 +83,9 @@ static void set_crop(struct pt_builder *b, struct pt_params *p, const int file_s
 }
 
 /* Whatever the file says of exposure ends in one factor: v3 has a scale, v4 a sensor. */
-static void build_film(struct pt_builder *b)
+static void build_film(struct pt_builder *b, struct pt_params *p)
 {
     static const char *const kinds[] = {"rgb", "image", "gbuffer", "spectral", NULL};
-    struct pt_params *p = begin(b, PT_HEADER_FILM, "rgb");
     struct pt_scene_defaults *d = b->defaults;
     if (!is_one_of(pt_params_kind(p), kinds))
         pt_params_fail(p, NULL, "unknown film \"%s\" (expected rgb, image, gbuffer or spectral)", pt_params_kind(p));
@@ -120,13 +110,11 @@ static void build_film(struct pt_builder *b)
         limit = pt_params_float_in(p, "maxsampleluminance", limit, 1e-30, FLT_MAX) * (double)b->scene->radiance_scale;
     d->integrator.max_component = (float)limit;
     pt_params_ignore(p, "diagonal savefp16 writeframe type coordinatesystem nbuckets lambdamin lambdamax");
-    pt_params_check_used(p);
 }
 
 /* v3 and v4 differ in defaults, in what sigma is, and in the names of the radii. */
-static void build_filter(struct pt_builder *b)
+static void build_filter(struct pt_builder *b, struct pt_params *p)
 {
-    struct pt_params *p = begin(b, PT_HEADER_FILTER, b->is_v3 ? "box" : "gaussian");
     struct pt_integrator *it = &b->defaults->integrator;
     const char *kind = pt_params_kind(p);
     double fallback = 0.5, sigma = 0.5;
@@ -155,15 +143,13 @@ static void build_filter(struct pt_builder *b)
     it->filter_y = (float)pt_params_float_in(p, "ywidth", y, 1e-3, 100);
     /* half the width of Mitchell's main lobe grows with the radius, that of the sinc does not */
     it->filter_sigma = strcmp(kind, "mitchell") == 0 ? 0.25f * it->filter_x : (float)sigma;
-    pt_params_check_used(p);
 }
 
-static void build_sampler(struct pt_builder *b)
+static void build_sampler(struct pt_builder *b, struct pt_params *p)
 {
     static const char *const low_discrepancy[] = {"sobol",      "zsobol",         "paddedsobol", "halton",     "pmj02bn",
                                                   "02sequence", "lowdiscrepancy", "stratified",  "maxmindist", NULL};
     static const char *const random[] = {"independent", "random", "mlt", NULL};
-    struct pt_params *p = begin(b, PT_HEADER_SAMPLER, "zsobol");
     const char *kind = pt_params_kind(p);
     b->defaults->integrator.sampler = is_one_of(kind, random) ? PT_SAMPLER_INDEPENDENT : PT_SAMPLER_SOBOL;
     if (!is_one_of(kind, random) && !is_one_of(kind, low_discrepancy))
@@ -172,15 +158,13 @@ static void build_sampler(struct pt_builder *b)
     b->defaults->spp = pt_params_int_in(p, "pixelsamples", strcmp(kind, "stratified") == 0 ? xs * ys : 16, 1, 1 << 30);
     b->defaults->integrator.seed = (uint32_t)pt_params_int_in(p, "seed", (int)b->defaults->integrator.seed, 0, 2147483647);
     pt_params_ignore(p, "randomization dimensions jitter");
-    pt_params_check_used(p);
 }
 
-static void build_integrator(struct pt_builder *b)
+static void build_integrator(struct pt_builder *b, struct pt_params *p)
 {
     static const char *const same[] = {"path", "volpath", "simplepath", "simplevolpath", NULL};
     static const char *const other[] = {"bdpt",     "mlt",     "sppm",           "lightpath",        "randomwalk", "ao",
                                         "function", "whitted", "directlighting", "ambientocclusion", NULL};
-    struct pt_params *p = begin(b, PT_HEADER_INTEGRATOR, b->is_v3 ? "path" : "volpath");
     struct pt_integrator *it = &b->defaults->integrator;
     const char *kind = pt_params_kind(p);
     if (is_one_of(kind, other))
@@ -196,7 +180,6 @@ static void build_integrator(struct pt_builder *b)
                         "numiterations photonsperiteration radius mutationsperpixel bootstrapsamples chains sigma "
                         "largestepprobability imagewritefrequency visualizestrategies visualizeweights pixelbounds seed "
                         "cossample maxdistance nsamples strategy illuminant");
-    pt_params_check_used(p);
 }
 
 static void set_screen(struct pt_params *p, struct pt_camera *c)
@@ -255,9 +238,8 @@ static double read_fov(struct pt_builder *b, struct pt_params *p)
 }
 
 /* What the options replace is read all the same: it is checked, and counts as used. */
-static void build_camera(struct pt_builder *b)
+static void build_camera(struct pt_builder *b, struct pt_params *p)
 {
-    struct pt_params *p = begin(b, PT_HEADER_CAMERA, "perspective");
     struct pt_camera *c = &b->scene->camera;
     const char *kind = pt_params_kind(p);
     c->width = b->defaults->width;
@@ -284,18 +266,27 @@ static void build_camera(struct pt_builder *b)
         pt_builder_effect(b, PT_FX_DEFOCUS, p->loc);
     if (c->animated)
         pt_builder_effect(b, PT_FX_MOTION, p->loc);
-    pt_params_check_used(p);
 }
 
 int pt_build_header(struct pt_builder *b)
 {
-    build_shutter(b);
-    build_film(b);
-    if (b->diag.rc)
-        return b->diag.rc;
-    build_filter(b);
-    build_sampler(b);
-    build_integrator(b);
-    build_camera(b);
+    static const struct {
+        const char *kinds[2]; /* of v4 and v3, where the file has none */
+        void (*build)(struct pt_builder *b, struct pt_params *p);
+    } parts[PT_HEADER_COUNT] = {[PT_HEADER_FILM] = {{"rgb", "rgb"}, build_film},
+                                [PT_HEADER_FILTER] = {{"gaussian", "box"}, build_filter},
+                                [PT_HEADER_SAMPLER] = {{"zsobol", "zsobol"}, build_sampler},
+                                [PT_HEADER_INTEGRATOR] = {{"volpath", "path"}, build_integrator},
+                                [PT_HEADER_CAMERA] = {{"perspective", "perspective"}, build_camera}};
+    for (int i = 0; i < PT_HEADER_COUNT; i++)
+        if (!b->header[i].text)
+            pt_params_clear(&b->header[i], &b->diag, (struct pt_loc){NULL, 0, 0}, parts[i].kinds[b->is_v3]);
+    build_shutter(b, &b->header[PT_HEADER_CAMERA]);
+    for (int i = 0; i < PT_HEADER_COUNT; i++) {
+        parts[i].build(b, &b->header[i]);
+        pt_params_check_used(&b->header[i]);
+        if (i == PT_HEADER_FILM && b->diag.rc) /* the others need its size */
+            break;
+    }
     return b->diag.rc;
 }

@@ -162,7 +162,7 @@ static int do_reverse_orientation(struct parser *p)
 
 static int do_header(struct parser *p)
 {
-    static const char *const names[PT_HEADER_COUNT] = {"Film", "Camera", "Sampler", "Integrator", "PixelFilter"};
+    static const char *const names[PT_HEADER_COUNT] = {"Film", "PixelFilter", "Sampler", "Integrator", "Camera"};
     const enum pt_header which = p->directive->header;
     if (p->in_world)
         return pt_parser_fail(p, "%s after WorldBegin", names[which]);
