@@ -130,25 +130,16 @@ static void *move(struct pt_builder *b, struct pt_list *list, int32_t *count)
     return kept;
 }
 
-static void move_shapes(struct pt_builder *b)
+/* The shapes of objects go behind those of the world. */
+static void join_shapes(struct pt_builder *b)
 {
-    struct pt_scene *scene = b->scene;
-    size_t world = b->world_shapes.count, objects = b->object_shapes.count;
-    scene->world_shape_count = (int32_t)world;
-    scene->shape_count = (int32_t)(world + objects);
-    if (world + objects == 0)
-        return;
-    scene->shapes = pt_arena_alloc(&scene->arena, world + objects, sizeof *scene->shapes);
-    if (!scene->shapes) {
-        pt_diag_nomem(&b->diag, "shapes");
-        return;
-    }
-    if (world > 0)
-        memcpy(scene->shapes, b->world_shapes.items, world * sizeof *scene->shapes);
-    if (objects > 0)
-        memcpy(scene->shapes + world, b->object_shapes.items, objects * sizeof *scene->shapes);
-    for (int32_t i = 0; i < scene->object_count; i++)
-        scene->objects[i].first_shape += (int32_t)world;
+    const struct pt_shape *shapes = b->object_shapes.items;
+    struct pt_object *objects = b->objects.items;
+    b->scene->world_shape_count = (int32_t)b->world_shapes.count;
+    for (size_t i = 0; i < b->objects.count; i++)
+        objects[i].first_shape += b->scene->world_shape_count;
+    for (size_t i = 0; i < b->object_shapes.count && !b->diag.rc; i++)
+        pt_list_add(b, &b->world_shapes, &shapes[i]);
 }
 
 static void add_medium_effects(struct pt_builder *b, int32_t id)
@@ -197,6 +188,7 @@ static int finish(struct pt_builder *b)
 {
     struct pt_scene *scene = b->scene;
     struct base_err *err = b->diag.err;
+    join_shapes(b);
     scene->images = move(b, &b->images, &scene->image_count);
     scene->textures = move(b, &b->textures, &scene->texture_count);
     scene->materials = move(b, &b->materials, &scene->material_count);
@@ -206,7 +198,7 @@ static int finish(struct pt_builder *b)
     scene->instances = move(b, &b->instances, &scene->instance_count);
     scene->lights = move(b, &b->lights, &scene->light_count);
     scene->media = move(b, &b->media, &scene->medium_count);
-    move_shapes(b);
+    scene->shapes = move(b, &b->world_shapes, &scene->shape_count);
     int rc = b->diag.rc;
     if (!rc)
         rc = pt_materials_build(scene, err);
