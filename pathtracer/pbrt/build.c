@@ -29,12 +29,9 @@ void pt_builder_release(struct pt_builder *b)
                                &b->lights,   &b->media,        &b->medium_infos,  &b->name_undo,      &b->object_infos};
     struct pt_names *names[] = {&b->float_textures, &b->colour_textures, &b->named_materials,
                                 &b->media_names,    &b->object_names,    &b->image_names};
-    const struct pt_material_info *infos = b->material_infos.items;
-    for (size_t i = 0; i < b->material_infos.count; i++) {
-        if (infos[i].params)
-            pt_params_release(infos[i].params);
-        free(infos[i].params);
-    }
+    struct pt_material_info *infos = b->material_infos.items;
+    for (size_t i = 0; i < b->material_infos.count; i++)
+        pt_params_release(&infos[i].params);
     for (size_t i = 0; i < sizeof lists / sizeof lists[0]; i++)
         free(lists[i]->items);
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
@@ -107,6 +104,27 @@ int pt_builder_at_shutter(const struct pt_builder *b, const struct pt_xform ctm[
             out[i] = pt_xform_interpolate(&ctm[0], &ctm[1], s);
     }
     return !pt_xform_equal(&out[0], &out[1]);
+}
+
+static void check_made(struct pt_builder *b, const struct pt_list *list, const char *what, const char *maker)
+{
+    for (size_t i = 0; i < list->count; i++) {
+        const struct pt_wanted *wanted = (const void *)((const char *)list->items + i * list->size);
+        if (wanted->name)
+            pt_diag_fail(&b->diag, wanted->loc, "unknown %s \"%s\" (expected one made by %s)", what, wanted->name, maker);
+    }
+}
+
+int pt_builder_check(struct pt_builder *b)
+{
+    check_made(b, &b->material_infos, "material", "MakeNamedMaterial");
+    check_made(b, &b->object_infos, "object", "ObjectBegin");
+    check_made(b, &b->medium_infos, "medium", "MakeNamedMedium");
+    if (b->diag.rc)
+        return b->diag.rc;
+    pt_build_drop_instances(b);
+    pt_build_check_grids(b);
+    return b->diag.rc;
 }
 
 struct pt_xform pt_builder_to_render(const struct pt_builder *b, struct pt_xform world)

@@ -52,23 +52,29 @@ enum pt_header {
     PT_HEADER_COUNT
 };
 
+/* What is used by its name before it is made. First in the items of its list. */
+struct pt_wanted {
+    const char *name;  /* in the scene's arena; NULL: it is made */
+    struct pt_loc loc; /* of the first use */
+};
+
 struct pt_material_info {
+    struct pt_wanted wanted; /* of v4 only */
     struct pt_loc loc;
     int has_opacity; /* of v3's uber, of what is mixed with an interface: becomes the alpha of shapes */
     struct pt_input opacity;
     int used;
-    const char *wanted;       /* of v4: the name that it is used by before it is made, in the scene's arena; else NULL */
-    struct pt_params *params; /* owns; of v3: its kind and parameters, which shapes may change; else NULL */
+    struct pt_params params; /* owns; of v3: its kind and parameters, which shapes may change; else empty */
 };
 struct pt_medium_info {
-    struct pt_loc defined, first_use; /* line 0: not yet */
-    const char *name;                 /* in the scene's arena */
+    struct pt_wanted wanted;
+    struct pt_loc defined;
+    const char *name; /* in the scene's arena */
 };
 
 struct pt_object_info {
-    double origin[3];   /* of its space in the space it was defined in */
-    const char *wanted; /* of v4: the name that it is instanced by before it is made, in the scene's arena; else NULL */
-    struct pt_loc used; /* by the first instance that came before it; line 0: none did, and its origin is still free */
+    struct pt_wanted wanted; /* of v4 only; line 0: nobody wanted it, and its origin is still free */
+    double origin[3];        /* of its space in the space it was defined in */
 };
 
 /* What a name meant. */
@@ -125,6 +131,8 @@ void pt_builder_forget_names(struct pt_builder *b, size_t count);
 void pt_builder_effect(struct pt_builder *b, pt_effects bits, struct pt_loc loc);
 /* Transforms at shutter open and close; whether they differ. */
 int pt_builder_at_shutter(const struct pt_builder *b, const struct pt_xform ctm[2], struct pt_xform out[2]);
+/* At the end of the text: fails for a name that was used and whose thing was never made. */
+int pt_builder_check(struct pt_builder *b);
 /* World → render. */
 struct pt_xform pt_builder_to_render(const struct pt_builder *b, struct pt_xform world);
 
@@ -173,8 +181,6 @@ int32_t pt_build_shape_material(struct pt_builder *b, int32_t id, struct pt_para
 int32_t pt_build_named_material(struct pt_builder *b, struct pt_loc loc, const char *name, int32_t before);
 /* MakeNamedMaterial. */
 int pt_build_make_named_material(struct pt_builder *b, const char *name, const char *kind, struct pt_params *p);
-/* Fails for a name that was used and never given. */
-int pt_build_materials_check(struct pt_builder *b);
 
 /* build_light.c */
 int pt_build_light(struct pt_builder *b, struct pt_params *p);
@@ -186,15 +192,15 @@ int32_t pt_build_shape_light(struct pt_builder *b, const struct pt_area_light *s
 int pt_build_medium(struct pt_builder *b, struct pt_params *p);
 /* Id of a medium by name, defined or not yet; -1 for "". */
 int32_t pt_build_medium_ref(struct pt_builder *b, const char *name, struct pt_loc loc);
-/* Fails for names that were used and never defined. */
-int pt_build_media_check(struct pt_builder *b);
+/* At the end: warns of grids that stay where they are while their object does not. */
+void pt_build_check_grids(struct pt_builder *b);
 
 /* build_shape.c */
 int pt_build_shape(struct pt_builder *b, struct pt_params *p);
 int pt_build_object_begin(struct pt_builder *b, const char *name, struct pt_loc loc);
 int pt_build_instance(struct pt_builder *b, const char *name, struct pt_loc loc);
-/* Fails for an object that was instanced and never made. */
-int pt_build_objects_check(struct pt_builder *b);
+/* At the end: leaves out the instances of objects that turned out to be empty. */
+void pt_build_drop_instances(struct pt_builder *b);
 
 /* Triangles before they are placed. Positions: pd or pf; the rest may be NULL. */
 struct pt_soup {

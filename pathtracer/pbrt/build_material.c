@@ -1,7 +1,6 @@
 /* Materials: pbrt-v4's by the tables of the scattering models, pbrt-v3's in their terms, and what stands in for the rest. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/options.h"
@@ -77,7 +76,7 @@ static struct pt_material_info *info_of(const struct pt_builder *b, int32_t id)
 static int32_t find_mixed(struct pt_builder *b, struct pt_loc loc, const char *name)
 {
     int32_t id = pt_names_get(&b->named_materials, name);
-    if (id >= 0 && !info_of(b, id)->wanted)
+    if (id >= 0 && !info_of(b, id)->wanted.name)
         return id;
     pt_diag_fail(&b->diag, loc, "unknown material \"%s\" (expected one made by MakeNamedMaterial before)", name);
     return -1;
@@ -486,23 +485,13 @@ static int32_t build(struct pt_builder *b, const char *kind, struct pt_params *p
     return !b->diag.rc ? add(b, &m, &info) : -1;
 }
 
-static void keep_params(struct pt_builder *b, int32_t id, const char *kind, const struct pt_params *p)
-{
-    struct pt_params *copy = calloc(1, sizeof *copy);
-    if (!copy) {
-        pt_diag_nomem(&b->diag, "materials");
-        return;
-    }
-    info_of(b, id)->params = copy;
-    pt_params_clear(copy, &b->diag, p->loc, kind);
-    pt_params_append(copy, p);
-}
-
 int32_t pt_build_material(struct pt_builder *b, const char *kind, struct pt_params *p)
 {
     int32_t id = build(b, kind, p);
-    if (id >= 0 && b->is_v3)
-        keep_params(b, id, kind, p);
+    if (id >= 0 && b->is_v3) {
+        pt_params_clear(&info_of(b, id)->params, &b->diag, p->loc, kind);
+        pt_params_append(&info_of(b, id)->params, p);
+    }
     return id;
 }
 
@@ -516,9 +505,8 @@ int32_t pt_build_named_material(struct pt_builder *b, struct pt_loc loc, const c
         return before;
     }
     const struct pt_material unmade = {.kind = PT_BSDF_DIFFUSE, .eta = 1.5f};
-    struct pt_material_info info = {.loc = loc, .opacity = pt_input_grey(1)};
-    info.wanted = pt_arena_strdup(&b->scene->arena, name);
-    id = info.wanted ? add(b, &unmade, &info) : -1;
+    struct pt_material_info info = {.wanted = {pt_arena_strdup(&b->scene->arena, name), loc}, .opacity = pt_input_grey(1)};
+    id = info.wanted.name ? add(b, &unmade, &info) : -1;
     if (id < 0 || pt_names_set(&b->named_materials, name, id) != 0)
         pt_diag_nomem(&b->diag, "materials");
     return b->diag.rc ? -1 : id;
@@ -529,28 +517,17 @@ int pt_build_make_named_material(struct pt_builder *b, const char *name, const c
     const int32_t id = pt_build_material(b, kind, p), wanted = pt_names_get(&b->named_materials, name);
     if (id < 0 || b->diag.rc)
         return b->diag.rc;
-    if (wanted < 0 || !info_of(b, wanted)->wanted)
+    if (wanted < 0 || !info_of(b, wanted)->wanted.name)
         return pt_builder_name(b, &b->named_materials, name, id);
     struct pt_material *all = b->materials.items;
     /* The shapes that have it took it for a surface. */
     if (all[id].kind == PT_MATERIAL_INTERFACE || info_of(b, id)->has_opacity)
-        return pt_diag_fail(&b->diag, info_of(b, wanted)->loc,
+        return pt_diag_fail(&b->diag, info_of(b, wanted)->wanted.loc,
                             "material \"%s\" lets rays through (expected it to be made before)", name);
     all[wanted] = all[id];
     *info_of(b, wanted) = *info_of(b, id);
     b->materials.count = b->material_infos.count = (size_t)id; /* it is the last, and nobody has it */
     return 0;
-}
-
-int pt_build_materials_check(struct pt_builder *b)
-{
-    for (size_t i = 0; i < b->material_infos.count; i++) {
-        const struct pt_material_info *info = info_of(b, (int32_t)i);
-        if (info->wanted)
-            return pt_diag_fail(&b->diag, info->loc, "unknown material \"%s\" (expected one made by MakeNamedMaterial)",
-                                info->wanted);
-    }
-    return b->diag.rc;
 }
 
 /* What v3's materials know and its shapes do not. */
@@ -568,7 +545,7 @@ int32_t pt_build_shape_material(struct pt_builder *b, int32_t id, struct pt_para
         asked += (size_t)pt_name_is_in(of_materials, pt_param_name(shape, &shape->items[i]));
     if (asked == 0)
         return id;
-    const struct pt_params *own = id >= 0 ? info_of(b, id)->params : NULL;
+    const struct pt_params *own = id >= 0 && info_of(b, id)->params.text ? &info_of(b, id)->params : NULL;
     const char *kind = own ? pt_params_kind(own) : "matte";
     pt_params_clear(&both, &b->diag, shape->loc, kind);
     pt_params_append(&both, shape);

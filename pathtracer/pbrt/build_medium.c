@@ -9,15 +9,12 @@ int32_t pt_build_medium_ref(struct pt_builder *b, const char *name, struct pt_lo
     if (name[0] == '\0')
         return -1;
     int32_t id = pt_names_get(&b->media_names, name);
-    if (id >= 0) {
-        struct pt_medium_info *info = &((struct pt_medium_info *)b->medium_infos.items)[id];
-        if (info->first_use.line == 0)
-            info->first_use = loc;
+    if (id >= 0)
         return id;
-    }
+    const char *kept = pt_arena_strdup(&b->scene->arena, name);
     struct pt_medium medium = {.kind = PT_MEDIUM_HOMOGENEOUS};
-    struct pt_medium_info info = {.first_use = loc, .name = pt_arena_strdup(&b->scene->arena, name)};
-    if (!info.name || pt_list_add(b, &b->medium_infos, &info) < 0 || (id = pt_list_add(b, &b->media, &medium)) < 0 ||
+    struct pt_medium_info info = {.wanted = {kept, loc}, .name = kept};
+    if (!kept || pt_list_add(b, &b->medium_infos, &info) < 0 || (id = pt_list_add(b, &b->media, &medium)) < 0 ||
         pt_names_set(&b->media_names, name, id) != 0)
         pt_diag_nomem(&b->diag, "media");
     return id;
@@ -46,7 +43,7 @@ static void say_stays(struct pt_builder *b, int32_t medium)
 }
 
 /* The densities of a grid are looked up in the world, whatever the surface that the path went in by. */
-static void check_placed_grids(struct pt_builder *b)
+void pt_build_check_grids(struct pt_builder *b)
 {
     for (size_t i = 0; i < b->instances.count; i++) {
         const struct pt_instance *instance = (struct pt_instance *)b->instances.items + i;
@@ -63,21 +60,10 @@ static void check_placed_grids(struct pt_builder *b)
     }
 }
 
-int pt_build_media_check(struct pt_builder *b)
-{
-    const struct pt_medium_info *infos = b->medium_infos.items;
-    for (size_t i = 0; i < b->medium_infos.count; i++)
-        if (infos[i].defined.line == 0)
-            return pt_diag_fail(&b->diag, infos[i].first_use, "unknown medium \"%s\" (expected one made by MakeNamedMedium)",
-                                infos[i].name);
-    check_placed_grids(b);
-    return b->diag.rc;
-}
-
 /* Jensen, Marschner, Levoy and Hanrahan 2001, "A Practical Model for Subsurface Light Transport", table 1, and, from "Lowfat
  * Milk" on, Narasimhan, Gupta, Donner, Ramamoorthi, Nayar and Jensen 2006, "Acquiring Scattering Properties of Participating
  * Media by Dilution"; 1/mm. */
-static const struct {
+static const struct preset {
     const char *name;
     pt_vec3 sigma_s, sigma_a;
 } presets[] = {{"Apple", {2.29f, 2.39f, 1.97f}, {0.0030f, 0.0034f, 0.046f}},
@@ -293,6 +279,8 @@ int pt_build_medium(struct pt_builder *b, struct pt_params *p)
     if (b->diag.rc)
         return b->diag.rc;
     ((struct pt_medium *)b->media.items)[id] = m;
-    ((struct pt_medium_info *)b->medium_infos.items)[id].defined = p->loc;
+    struct pt_medium_info *info = (struct pt_medium_info *)b->medium_infos.items + id;
+    info->wanted.name = NULL;
+    info->defined = p->loc;
     return 0;
 }

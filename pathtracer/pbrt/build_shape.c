@@ -66,7 +66,7 @@ static struct placement place(struct pt_builder *b, const struct pt_params *p, c
         if (pl.animated)
             pt_params_warn(p, NULL, "a moving shape within an object stays at its place at shutter open");
         pl.animated = 0;
-        if (((struct pt_object *)b->objects.items)[b->open_object].shape_count == 0 && info->used.line == 0)
+        if (((struct pt_object *)b->objects.items)[b->open_object].shape_count == 0 && info->wanted.loc.line == 0)
             find_origin(&pl.xform, box, info->origin);
         origin = info->origin;
     } else if (pl.animated) {
@@ -492,7 +492,7 @@ int pt_build_shape(struct pt_builder *b, struct pt_params *p)
                            "it is left out");
 }
 
-/* An object without shapes so far; wanted: the name of one that is made further down. */
+/* An object without shapes so far. */
 static int32_t add_object(struct pt_builder *b, const char *name, const struct pt_object_info *info)
 {
     const struct pt_object object = {(int32_t)b->object_shapes.count, 0};
@@ -508,8 +508,8 @@ int pt_build_object_begin(struct pt_builder *b, const char *name, struct pt_loc 
     if (b->open_object >= 0)
         return pt_diag_fail(&b->diag, loc, "ObjectBegin within an object");
     struct pt_object_info *infos = b->object_infos.items;
-    if (id >= 0 && infos[id].wanted) {
-        infos[id].wanted = NULL;
+    if (id >= 0 && infos[id].wanted.name) {
+        infos[id].wanted.name = NULL;
         ((struct pt_object *)b->objects.items)[id].first_shape = (int32_t)b->object_shapes.count;
     } else {
         id = add_object(b, name, &(struct pt_object_info){0});
@@ -529,8 +529,8 @@ static int32_t find_object(struct pt_builder *b, const char *name, struct pt_loc
         pt_diag_warn(&b->diag, loc, "unknown object \"%s\": its instance is left out", name);
         return -1;
     }
-    const struct pt_object_info info = {.wanted = pt_arena_strdup(&b->scene->arena, name), .used = loc};
-    if (!info.wanted)
+    const struct pt_object_info info = {.wanted = {pt_arena_strdup(&b->scene->arena, name), loc}};
+    if (!info.wanted.name)
         pt_diag_nomem(&b->diag, "objects");
     return b->diag.rc ? -1 : add_object(b, name, &info);
 }
@@ -544,24 +544,18 @@ int pt_build_instance(struct pt_builder *b, const char *name, struct pt_loc loc)
     if (object < 0)
         return b->diag.rc;
     const struct pt_object_info *info = (struct pt_object_info *)b->object_infos.items + object;
-    if (((struct pt_object *)b->objects.items)[object].shape_count == 0 && !info->wanted)
+    if (((struct pt_object *)b->objects.items)[object].shape_count == 0 && !info->wanted.name)
         return 0;
     pt_builder_at_shutter(b, b->state->ctm, at);
     return add_instance(b, object, at, info->origin, loc);
 }
 
-int pt_build_objects_check(struct pt_builder *b)
+void pt_build_drop_instances(struct pt_builder *b)
 {
-    const struct pt_object_info *infos = b->object_infos.items;
     struct pt_instance *instances = b->instances.items;
     size_t kept = 0;
-    for (size_t i = 0; i < b->object_infos.count; i++)
-        if (infos[i].wanted)
-            return pt_diag_fail(&b->diag, infos[i].used, "unknown object \"%s\" (expected one made by ObjectBegin)",
-                                infos[i].wanted);
-    for (size_t i = 0; i < b->instances.count; i++) /* those of what turned out to be empty go */
+    for (size_t i = 0; i < b->instances.count; i++)
         if (((struct pt_object *)b->objects.items)[instances[i].object].shape_count > 0)
             instances[kept++] = instances[i];
     b->instances.count = kept;
-    return b->diag.rc;
 }

@@ -459,10 +459,7 @@ static int finish(struct parser *p, struct pt_loc loc)
         pt_diag_warn(&p->b->diag, top->loc, "%s is never closed", begin_name(top->kind));
     if (!p->in_world)
         return pt_diag_fail(&p->b->diag, loc, "the file ends without WorldBegin");
-    int rc = pt_build_materials_check(p->b);
-    if (!rc)
-        rc = pt_build_objects_check(p->b);
-    return rc ? rc : pt_build_media_check(p->b);
+    return pt_builder_check(p->b);
 }
 
 static int run(struct parser *p)
