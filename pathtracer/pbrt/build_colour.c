@@ -5,7 +5,6 @@
 
 #include "base/text.h"
 #include "pbrt/build.h"
-#include "pbrt/number.h"
 #include "pbrt/spectra.h"
 
 static int by_wavelength(const void *a, const void *b)

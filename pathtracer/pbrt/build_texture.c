@@ -10,7 +10,6 @@
 #include "base/options.h"
 #include "picture/read.h"
 #include "pbrt/build.h"
-#include "pbrt/number.h"
 #include "shade/texture.h"
 
 struct pt_input pt_input_grey(double value) { return (struct pt_input){0, v3_splat((float)value)}; }

@@ -63,4 +63,8 @@ int pt_lexer_has_ended(const struct pt_lexer *lexer, const struct pt_token *toke
 struct pt_loc pt_lexer_fault(const struct pt_lexer *lexer, const struct pt_token *token);
 void pt_lexer_release(struct pt_lexer *lexer);
 
+/* Parses all of text[0, n) as a decimal number ("-1", "+.5", "3.", "1e-008"), whatever the locale; correctly rounded. Returns
+ * 1, or 0 when it is no number or not finite. Thread-safe. */
+int pt_number_parse(const char *text, size_t n, double *out);
+
 #endif

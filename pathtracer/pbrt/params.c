@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "base/options.h"
-#include "pbrt/number.h"
 
 static const struct {
     const char *name;

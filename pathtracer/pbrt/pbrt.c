@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "base/options.h"
-#include "pbrt/number.h"
 #include "pbrt/pbrt_parser.h"
 #include "pbrt/spectra.h"
 

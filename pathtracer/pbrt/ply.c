@@ -6,8 +6,7 @@
 #include <strings.h>
 
 #include "base/options.h"
-#include "pbrt/number.h"
-#include "scene/arena.h"
+#include "pbrt/lexer.h"
 
 enum ply_type { T_NONE, T_I8, T_U8, T_I16, T_U16, T_I32, T_U32, T_F32, T_F64 };
 static const uint8_t type_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};

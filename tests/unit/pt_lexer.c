@@ -13,7 +13,6 @@
 #include <cmocka.h>
 
 #include "pbrt/names.h"
-#include "pbrt/number.h"
 #include "pbrt/params.h"
 
 /* Several files in memory. */
