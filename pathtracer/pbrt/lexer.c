@@ -57,13 +57,8 @@ static void skip_blanks(struct pt_lexer_file *f)
     f->at = at;
 }
 
-static struct pt_token bad(const struct pt_token *t)
-{
-    return (struct pt_token){.kind = PT_TOKEN_BAD, .text = "", .loc = t->loc};
-}
-
-/* f->at is behind the opening quote. Escapes are resolved in place. */
-static struct pt_token read_string(struct pt_lexer *lexer, struct pt_lexer_file *f, struct pt_token t)
+/* f->at is behind the opening quote. Escapes are resolved in place. The token stays bad after a failure. */
+static int read_string(struct pt_lexer *lexer, struct pt_lexer_file *f, struct pt_token *t)
 {
     char *out = f->at, *start = f->at;
     for (; f->at < f->end && *f->at != '"' && *f->at != '\n' && *f->at != '\r'; f->at++) {
@@ -72,27 +67,22 @@ static struct pt_token read_string(struct pt_lexer *lexer, struct pt_lexer_file 
             c = *++f->at;
             static const char letters[] = "nrtbf\\'\"", meanings[] = "\n\r\t\b\f\\'\"";
             const char *known = memchr(letters, c, sizeof letters - 1);
-            if (!known) {
-                pt_diag_fail(lexer->diag, t.loc, "unknown escape \\%c in a string", c);
-                return bad(&t);
-            }
+            if (!known)
+                return pt_diag_fail(lexer->diag, t->loc, "unknown escape \\%c in a string", c);
             c = meanings[known - letters];
         }
-        if (c == '\0') {
-            pt_diag_fail(lexer->diag, t.loc, "a zero byte in a string");
-            return bad(&t);
-        }
+        if (c == '\0')
+            return pt_diag_fail(lexer->diag, t->loc, "a zero byte in a string");
         *out++ = c;
     }
-    if (f->at >= f->end || *f->at != '"') {
-        pt_diag_fail(lexer->diag, t.loc, "string without a closing quote on its line");
-        return bad(&t);
-    }
+    if (f->at >= f->end || *f->at != '"')
+        return pt_diag_fail(lexer->diag, t->loc, "string without a closing quote on its line");
     f->at++;
-    t.kind = PT_TOKEN_STRING;
-    t.text = start;
-    t.length = (size_t)(out - start);
-    return t;
+    *out = '\0'; /* at the latest where the quote was */
+    t->kind = PT_TOKEN_STRING;
+    t->text = start;
+    t->length = (size_t)(out - start);
+    return 0;
 }
 
 static int ends_word(char c)
@@ -130,7 +120,9 @@ static struct pt_token read_token(struct pt_lexer *lexer)
         }
         if (c == '"') {
             f->at++;
-            return read_string(lexer, f, t);
+            t.kind = PT_TOKEN_BAD;
+            read_string(lexer, f, &t);
+            return t;
         }
         t.kind = PT_TOKEN_WORD;
         t.text = f->at;

@@ -17,7 +17,7 @@ enum pt_token_kind {
     PT_TOKEN_END,      /* of the outermost file */
     PT_TOKEN_FILE_END, /* of a file included with `scoped` */
     PT_TOKEN_WORD,     /* directive, number, true, false … */
-    PT_TOKEN_STRING,   /* quotes removed, escapes resolved */
+    PT_TOKEN_STRING,   /* quotes removed, escapes resolved, NUL behind it */
     PT_TOKEN_OPEN,     /* [ */
     PT_TOKEN_CLOSE,    /* ] */
     PT_TOKEN_BAD       /* the diag has failed */

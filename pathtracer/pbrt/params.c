@@ -108,15 +108,12 @@ struct declaration { /* offsets in the token's text */
 /* `"type name"` */
 static struct declaration split_declaration(const struct pt_token *t)
 {
+    static const char blanks[] = " \t";
     struct declaration d = {.kind = -1, .name_end = t->length};
-    while (d.type < t->length && (t->text[d.type] == ' ' || t->text[d.type] == '\t'))
-        d.type++;
-    for (d.type_end = d.type; d.type_end < t->length && t->text[d.type_end] != ' ' && t->text[d.type_end] != '\t';)
-        d.type_end++;
-    d.name = d.type_end;
-    while (d.name < d.name_end && (t->text[d.name] == ' ' || t->text[d.name] == '\t'))
-        d.name++;
-    while (d.name_end > d.name && (t->text[d.name_end - 1] == ' ' || t->text[d.name_end - 1] == '\t'))
+    d.type = strspn(t->text, blanks);
+    d.type_end = d.type + strcspn(t->text + d.type, blanks);
+    d.name = d.type_end + strspn(t->text + d.type_end, blanks);
+    while (d.name_end > d.name && strchr(blanks, t->text[d.name_end - 1]))
         d.name_end--;
     const size_t length = d.type_end - d.type;
     for (size_t i = 0; i < sizeof type_names / sizeof type_names[0]; i++)
