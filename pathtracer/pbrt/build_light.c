@@ -210,20 +210,6 @@ static void make_infinite(struct context *c)
     light_space(c);
 }
 
-static void make_projection(struct context *c)
-{
-    pt_params_warn(c->p, NULL, "light \"%s\" is replaced by a spot light without its image", pt_params_kind(c->p));
-    pt_params_ignore(c->p, "fov mapname filename");
-    make_spot(c);
-}
-
-static void make_goniometric(struct context *c)
-{
-    pt_params_warn(c->p, NULL, "light \"%s\" is replaced by a point light without its image", pt_params_kind(c->p));
-    pt_params_ignore(c->p, "mapname filename");
-    make_point(c);
-}
-
 static int add_light(struct pt_builder *b, const struct pt_light *light, struct pt_loc loc)
 {
     if (b->lights.count == 1)
@@ -233,32 +219,34 @@ static int add_light(struct pt_builder *b, const struct pt_light *light, struct 
 
 int pt_build_light(struct pt_builder *b, struct pt_params *p)
 {
-    static const struct {
+    static const struct light_kind {
         const char *name;
         int32_t kind;
         pt_effects needs;
         void (*make)(struct context *c);
-    } kinds[] = {{"point", PT_LIGHT_POINT, PT_FX_DELTA_LIGHT, make_point},
-                 {"spot", PT_LIGHT_SPOT, PT_FX_DELTA_LIGHT, make_spot},
-                 {"distant", PT_LIGHT_DISTANT, PT_FX_DELTA_LIGHT, make_distant},
-                 {"infinite", PT_LIGHT_ENV_CONSTANT, PT_FX_ENVIRONMENT, make_infinite},
-                 {"exinfinite", PT_LIGHT_ENV_CONSTANT, PT_FX_ENVIRONMENT, make_infinite},
-                 {"projection", PT_LIGHT_SPOT, PT_FX_DELTA_LIGHT, make_projection},
-                 {"goniometric", PT_LIGHT_POINT, PT_FX_DELTA_LIGHT, make_goniometric}};
-    struct pt_light light = {.kind = -1, .shape = -1, .image = -1};
+        const char *instead, *ignored; /* what stands in for one with an image, and what that does not read */
+    } kinds[] = {{"point", PT_LIGHT_POINT, PT_FX_DELTA_LIGHT, make_point, NULL, ""},
+                 {"spot", PT_LIGHT_SPOT, PT_FX_DELTA_LIGHT, make_spot, NULL, ""},
+                 {"distant", PT_LIGHT_DISTANT, PT_FX_DELTA_LIGHT, make_distant, NULL, ""},
+                 {"infinite", PT_LIGHT_ENV_CONSTANT, PT_FX_ENVIRONMENT, make_infinite, NULL, ""},
+                 {"exinfinite", PT_LIGHT_ENV_CONSTANT, PT_FX_ENVIRONMENT, make_infinite, NULL, ""},
+                 {"projection", PT_LIGHT_SPOT, PT_FX_DELTA_LIGHT, make_spot, "spot", "fov mapname filename"},
+                 {"goniometric", PT_LIGHT_POINT, PT_FX_DELTA_LIGHT, make_point, "point", "mapname filename"}};
+    const struct light_kind *kind = pt_row(kinds, pt_params_kind(p));
+    struct pt_light light = {.shape = -1, .image = -1};
     struct pt_xform at[2];
     if (pt_builder_at_shutter(b, b->state->ctm, at))
         pt_params_warn(p, NULL, "lights do not move: the transform at shutter open is used");
     struct context c = {b, p, at[0], &light};
-    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
-        if (strcmp(kinds[i].name, pt_params_kind(p)) == 0) {
-            light.kind = kinds[i].kind;
-            pt_builder_effect(b, kinds[i].needs, p->loc);
-            kinds[i].make(&c);
-        }
-    if (light.kind < 0)
+    if (!kind)
         return pt_diag_unknown(&b->diag, p->loc, "light", pt_params_kind(p), "point, spot, distant, infinite …",
                                "it is left out");
+    light.kind = kind->kind;
+    pt_builder_effect(b, kind->needs, p->loc);
+    if (kind->instead)
+        pt_params_warn(p, NULL, "light \"%s\" is replaced by a %s light without its image", kind->name, kind->instead);
+    pt_params_ignore(p, kind->ignored);
+    kind->make(&c);
     pt_params_ignore(p, "nsamples samples");
     pt_params_check_used(p);
     if (!b->diag.rc && !v3_is_black(light.emission))

@@ -212,12 +212,12 @@ static void read_mix(struct making *c)
 static int build_v4(struct making *c)
 {
     static const char *const interface[] = {"interface", "none", "", NULL};
-    for (int32_t i = 0; i < PT_BSDF_COUNT; i++)
-        if (strcmp(pt_bsdf_models[i].file_name, c->kind) == 0) {
-            c->m->kind = i;
-            read_model(c, &pt_bsdf_models[i]);
-            return 1;
-        }
+    const struct pt_bsdf_model *model = pt_row(pt_bsdf_models, c->kind);
+    if (model) {
+        c->m->kind = (int32_t)(model - pt_bsdf_models);
+        read_model(c, model);
+        return 1;
+    }
     if (strcmp(c->kind, "mix") == 0 && !pt_params_find(c->p, "namedmaterial1")) { /* else v3's */
         read_mix(c);
         return 1;
@@ -430,7 +430,7 @@ static const struct stand_in stand_ins[] = {
 /* 0: unknown. */
 static int build_v3(struct making *c)
 {
-    static const struct {
+    static const struct v3_kind {
         const char *name;
         void (*make)(struct making *c);
     } kinds[] = {{"matte", make_matte},       {"plastic", make_plastic},
@@ -438,20 +438,15 @@ static int build_v3(struct making *c)
                  {"metal", make_metal},       {"mirror", make_mirror},
                  {"glass", make_glass},       {"translucent", make_translucent},
                  {"mix", make_mix},           {"shinymetal", make_shiny_metal}};
-    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
-        if (strcmp(kinds[i].name, c->kind) == 0) {
-            kinds[i].make(c);
-            c->m->bump = read_bump(c, "bumpmap");
-            return 1;
-        }
-    for (size_t i = 0; i < sizeof stand_ins / sizeof stand_ins[0]; i++)
-        if (strcmp(stand_ins[i].name, c->kind) == 0) {
-            stand_in(c, &stand_ins[i]);
-            if (stand_ins[i].is_of_v3)
-                c->m->bump = read_bump(c, "bumpmap");
-            return 1;
-        }
-    return 0;
+    const struct v3_kind *kind = pt_row(kinds, c->kind);
+    const struct stand_in *other = pt_row(stand_ins, c->kind);
+    if (kind)
+        kind->make(c);
+    else if (other)
+        stand_in(c, other);
+    if (kind || (other && other->is_of_v3))
+        c->m->bump = read_bump(c, "bumpmap");
+    return kind || other;
 }
 
 static int32_t add(struct pt_builder *b, const struct pt_material *m, const struct pt_material_info *info)

@@ -122,19 +122,15 @@ static int has_many(struct pt_params *p, const char *name)
 
 static void read_coefficients(struct pt_builder *b, struct pt_params *p, int is_grid, struct pt_medium *m)
 {
-    const char *preset = pt_params_string(p, "preset", "");
+    const char *name = pt_params_string(p, "preset", "");
+    const struct preset *preset = pt_row(presets, name);
     /* pbrt's defaults: whole milk in a homogeneous medium, 1 in a grid. */
-    m->sigma_a = is_grid && !b->is_v3 ? v3_splat(1) : v3(0.0011f, 0.0024f, 0.014f);
-    m->sigma_s = is_grid && !b->is_v3 ? v3_splat(1) : v3(2.55f, 3.21f, 3.77f);
-    int known = preset[0] == '\0';
-    for (size_t i = 0; i < sizeof presets / sizeof presets[0] && !known; i++)
-        if (strcmp(presets[i].name, preset) == 0) {
-            m->sigma_s = presets[i].sigma_s;
-            m->sigma_a = presets[i].sigma_a;
-            known = 1;
-        }
-    if (!known)
-        pt_params_warn(p, "preset", "unknown medium preset \"%s\": whole milk is used", preset);
+    if (!preset && (!is_grid || b->is_v3))
+        preset = pt_row(presets, "Wholemilk");
+    m->sigma_s = preset ? preset->sigma_s : v3_splat(1);
+    m->sigma_a = preset ? preset->sigma_a : v3_splat(1);
+    if (name[0] != '\0' && !pt_row(presets, name))
+        pt_params_warn(p, "preset", "unknown medium preset \"%s\": whole milk is used", name);
     pt_build_colour(b, p, "sigma_a", PT_USE_UNBOUNDED, &m->sigma_a);
     pt_build_colour(b, p, "sigma_s", PT_USE_UNBOUNDED, &m->sigma_s);
     m->g = (float)pt_params_float_in(p, "g", 0, -0.9999, 0.9999);

@@ -469,8 +469,8 @@ static int make_nurbs(struct pt_builder *b, struct pt_params *p)
 
 int pt_build_shape(struct pt_builder *b, struct pt_params *p)
 {
-    static const struct {
-        const char *kind;
+    static const struct shape_kind {
+        const char *name;
         int (*make)(struct pt_builder *b, struct pt_params *p);
     } kinds[] = {{"plymesh", make_ply_mesh},
                  {"trianglemesh", make_triangle_mesh},
@@ -485,11 +485,10 @@ int pt_build_shape(struct pt_builder *b, struct pt_params *p)
                  {"paraboloid", pt_build_revolved},
                  {"hyperboloid", pt_build_revolved},
                  {"nurbs", make_nurbs}};
-    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
-        if (strcmp(kinds[i].kind, pt_params_kind(p)) == 0)
-            return kinds[i].make(b, p);
-    return pt_diag_unknown(&b->diag, p->loc, "shape", pt_params_kind(p), "trianglemesh, plymesh, sphere, disk …",
-                           "it is left out");
+    const struct shape_kind *kind = pt_row(kinds, pt_params_kind(p));
+    return kind ? kind->make(b, p)
+                : pt_diag_unknown(&b->diag, p->loc, "shape", pt_params_kind(p), "trianglemesh, plymesh, sphere, disk …",
+                                  "it is left out");
 }
 
 /* An object without shapes so far. */

@@ -369,7 +369,7 @@ static void count_lookups(const struct pt_texture *all, const struct pt_texture 
 
 int pt_build_texture(struct pt_builder *b, const char *name, const char *class_name, struct pt_params *p)
 {
-    static const struct {
+    static const struct texture_class {
         const char *name;
         int32_t kind;
         void (*make)(struct context *c, struct pt_texture *t);
@@ -388,12 +388,10 @@ int pt_build_texture(struct pt_builder *b, const char *name, const char *class_n
         return pt_params_fail(p, NULL, "texture \"%s\" of type \"%s\" (expected float or spectrum)", name, class_name);
     struct context c = {b, p, is_float};
     struct pt_texture t = {.kind = PT_TEXTURE_CONSTANT, .scale = 1, .su = 1, .sv = 1};
-    size_t i = 0;
-    while (i < sizeof kinds / sizeof kinds[0] && strcmp(kinds[i].name, kind) != 0)
-        i++;
-    if (i < sizeof kinds / sizeof kinds[0]) {
-        t.kind = kinds[i].kind;
-        kinds[i].make(&c, &t);
+    const struct texture_class *made_so = pt_row(kinds, kind);
+    if (made_so) {
+        t.kind = made_so->kind;
+        made_so->make(&c, &t);
     } else if (base_word_index(stand_ins, kind, strlen(kind)) >= 0) {
         make_stand_in(&c, &t);
     } else {

@@ -8,21 +8,17 @@
 #include "base/err.h"
 
 struct named {
-    const char *name; /* in `text`, or the one that is looked for */
+    const char *name; /* in `text` */
     int32_t value;
     char text[];
 };
 
-static int by_name(const void *a, const void *b)
-{
-    const struct named *x = a, *y = b;
-    return strcmp(x->name, y->name);
-}
+/* Both begin with their name. */
+static int by_name(const void *a, const void *b) { return strcmp(*(const char *const *)a, *(const char *const *)b); }
 
 static struct named *find(const struct pt_names *names, const char *name)
 {
-    const struct named key = {.name = name};
-    struct named *const *node = tfind(&key, &names->tree, by_name);
+    struct named *const *node = tfind(&name, &names->tree, by_name);
     return node ? *node : NULL;
 }
 
@@ -56,4 +52,9 @@ void pt_names_release(struct pt_names *names)
 {
     tdestroy(names->tree, free);
     names->tree = NULL;
+}
+
+const void *pt_row_named(const void *rows, size_t count, size_t size, const char *name)
+{
+    return lfind(&name, rows, &count, size, by_name);
 }

@@ -1,11 +1,11 @@
-/*
- * A map from names to small numbers. Zero-initialise; owns copies of the names until release. Not thread-safe.
- */
+/* Names: a map from them to small numbers, and rows of tables. Not thread-safe. */
 #ifndef PT_PBRT_NAMES_H
 #define PT_PBRT_NAMES_H
 
+#include <stddef.h>
 #include <stdint.h>
 
+/* Zero-initialise; owns copies of the names until release. */
 struct pt_names {
     void *tree; /* owns; of search.h */
 };
@@ -16,5 +16,9 @@ int32_t pt_names_get(const struct pt_names *names, const char *name);
  * fails. */
 int pt_names_set(struct pt_names *names, const char *name, int32_t value);
 void pt_names_release(struct pt_names *names);
+
+/* The row of an array that begins with `name`, a const char *, or NULL. */
+#define pt_row(rows, name) pt_row_named(rows, sizeof(rows) / sizeof *(rows), sizeof *(rows), name)
+const void *pt_row_named(const void *rows, size_t count, size_t size, const char *name);
 
 #endif

@@ -92,7 +92,7 @@ static enum ply_type type_of(const char *name)
 
 static enum role role_of(const struct element *e, const char *name, int is_list)
 {
-    static const struct {
+    static const struct vertex_role {
         const char *name;
         enum role role;
     } roles[] = {{"x", R_X},         {"y", R_Y},         {"z", R_Z},         {"nx", R_NX},      {"ny", R_NY},
@@ -102,11 +102,8 @@ static enum role role_of(const struct element *e, const char *name, int is_list)
         return R_CORNER_UVS;
     if (strcmp(e->name, "face") == 0 && is_list)
         return strcmp(name, "vertex_indices") == 0 || strcmp(name, "vertex_index") == 0 ? R_INDICES : R_SKIP;
-    if (strcmp(e->name, "vertex") == 0 && !is_list)
-        for (size_t i = 0; i < sizeof roles / sizeof roles[0]; i++)
-            if (strcmp(roles[i].name, name) == 0)
-                return roles[i].role;
-    return R_SKIP;
+    const struct vertex_role *known = strcmp(e->name, "vertex") == 0 && !is_list ? pt_row(roles, name) : NULL;
+    return known ? known->role : R_SKIP;
 }
 
 static int read_property(struct reader *r, struct element *e, char *words[], int n)

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/options.h"
+#include "pbrt/names.h"
 
 /* CIE 1931 2° colour-matching functions, analytic fit: Wyman, Sloan and Shirley 2013, "Simple Analytic Approximations to the
  * CIE XYZ Color Matching Functions", JCGT 2(2), eq. 4. */
@@ -27,19 +28,20 @@ static const double d65_10nm[] = {49.9755, 54.6482, 82.7549, 91.486,  93.4318, 8
                                   80.0268, 80.2146, 82.2778, 78.2842, 69.7213, 71.6091, 74.349,  61.604,  69.8856,
                                   75.087,  63.5927, 46.4182, 66.8054, 63.3828};
 
-/* Lynch and Hunter 1985 in Palik's Handbook of Optical Constants of Solids: photon energy eV; n and k. */
+/* Lynch and Hunter 1985 in Palik's Handbook of Optical Constants of Solids: photon energy eV; n and k of
+ * copper, silver and gold. */
 static const struct {
-    double ev, cu[2], ag[2], au[2];
+    double ev, nk[3][2];
 } noble_metals[] = {
-    {3.2, {1.180, 2.210}, {0.192, 1.810}, {1.674, 1.936}}, {3.1, {1.175, 2.130}, {0.173, 1.950}, {1.658, 1.956}},
-    {3.0, {1.180, 2.210}, {0.173, 2.110}, {1.636, 1.958}}, {2.9, {1.175, 2.289}, {0.160, 2.260}, {1.616, 1.940}},
-    {2.8, {1.170, 2.362}, {0.157, 2.400}, {1.562, 1.904}}, {2.7, {1.160, 2.433}, {0.144, 2.560}, {1.426, 1.846}},
-    {2.6, {1.150, 2.504}, {0.132, 2.720}, {1.242, 1.796}}, {2.5, {1.135, 2.564}, {0.130, 2.880}, {0.916, 1.840}},
-    {2.4, {1.120, 2.605}, {0.130, 3.070}, {0.608, 2.120}}, {2.3, {1.040, 2.583}, {0.129, 3.250}, {0.402, 2.540}},
-    {2.2, {0.826, 2.599}, {0.120, 3.450}, {0.306, 2.880}}, {2.1, {0.468, 2.809}, {0.121, 3.660}, {0.236, 2.970}},
-    {2.0, {0.272, 3.240}, {0.131, 3.880}, {0.194, 3.060}}, {1.9, {0.214, 3.670}, {0.140, 4.150}, {0.166, 3.150}},
-    {1.8, {0.213, 4.050}, {0.140, 4.440}, {0.160, 3.800}}, {1.7, {0.223, 4.430}, {0.148, 4.740}, {0.164, 4.357}},
-    {1.6, {0.250, 4.817}, {0.143, 5.090}, {0.176, 4.860}},
+    {3.2, {{1.180, 2.210}, {0.192, 1.810}, {1.674, 1.936}}}, {3.1, {{1.175, 2.130}, {0.173, 1.950}, {1.658, 1.956}}},
+    {3.0, {{1.180, 2.210}, {0.173, 2.110}, {1.636, 1.958}}}, {2.9, {{1.175, 2.289}, {0.160, 2.260}, {1.616, 1.940}}},
+    {2.8, {{1.170, 2.362}, {0.157, 2.400}, {1.562, 1.904}}}, {2.7, {{1.160, 2.433}, {0.144, 2.560}, {1.426, 1.846}}},
+    {2.6, {{1.150, 2.504}, {0.132, 2.720}, {1.242, 1.796}}}, {2.5, {{1.135, 2.564}, {0.130, 2.880}, {0.916, 1.840}}},
+    {2.4, {{1.120, 2.605}, {0.130, 3.070}, {0.608, 2.120}}}, {2.3, {{1.040, 2.583}, {0.129, 3.250}, {0.402, 2.540}}},
+    {2.2, {{0.826, 2.599}, {0.120, 3.450}, {0.306, 2.880}}}, {2.1, {{0.468, 2.809}, {0.121, 3.660}, {0.236, 2.970}}},
+    {2.0, {{0.272, 3.240}, {0.131, 3.880}, {0.194, 3.060}}}, {1.9, {{0.214, 3.670}, {0.140, 4.150}, {0.166, 3.150}}},
+    {1.8, {{0.213, 4.050}, {0.140, 4.440}, {0.160, 3.800}}}, {1.7, {{0.223, 4.430}, {0.148, 4.740}, {0.164, 4.357}}},
+    {1.6, {{0.250, 4.817}, {0.143, 5.090}, {0.176, 4.860}}},
 };
 enum { NOBLE_COUNT = sizeof noble_metals / sizeof noble_metals[0] };
 
@@ -119,16 +121,14 @@ void pt_spd_blackbody(double kelvin, struct pt_spd *out)
 
 static int noble_metal(const char *metal, int is_k, struct pt_spd *out)
 {
+    static const char *const names[] = {"Cu", "Ag", "Au", NULL};
+    const int which = base_word_index(names, metal, strlen(metal));
     double pairs[2 * NOBLE_COUNT];
+    if (which < 0)
+        return 0;
     for (int i = 0; i < NOBLE_COUNT; i++) {
-        const double *nk = strcmp(metal, "Cu") == 0   ? noble_metals[i].cu
-                           : strcmp(metal, "Ag") == 0 ? noble_metals[i].ag
-                           : strcmp(metal, "Au") == 0 ? noble_metals[i].au
-                                                      : NULL;
-        if (!nk)
-            return 0;
         pairs[2 * i] = 1239.84198 / noble_metals[i].ev;
-        pairs[2 * i + 1] = nk[is_k];
+        pairs[2 * i + 1] = noble_metals[i].nk[which][is_k];
     }
     from_table(pairs, NOBLE_COUNT, out);
     return 1;
@@ -179,22 +179,20 @@ int pt_spd_named(const char *name, struct pt_spd *out)
 double pt_glass_index(const char *name)
 {
     /* Schott's catalogue values n_d. */
-    static const struct {
+    static const struct glass {
         const char *name;
         double nd;
     } glasses[] = {{"glass-BK7", 1.5168},  {"glass-BAF10", 1.67003}, {"glass-FK51A", 1.48656}, {"glass-LASF9", 1.85025},
                    {"glass-F5", 1.67270},  {"glass-SF5", 1.67270},   {"glass-F10", 1.72825},   {"glass-SF10", 1.72825},
                    {"glass-F11", 1.78472}, {"glass-SF11", 1.78472}};
-    for (size_t i = 0; i < sizeof glasses / sizeof glasses[0]; i++)
-        if (strcmp(glasses[i].name, name) == 0)
-            return glasses[i].nd;
-    return 0;
+    const struct glass *glass = pt_row(glasses, name);
+    return glass ? glass->nd : 0;
 }
 
 int pt_illuminant_named(const char *name, pt_vec3 *rgb)
 {
     /* CIE 15, chromaticities for the 2° observer. */
-    static const struct {
+    static const struct illuminant {
         const char *name;
         double x, y;
     } lights[] = {{"stdillum-A", 0.44757, 0.40745},   {"stdillum-D50", 0.34567, 0.35850}, {"stdillum-D65", 0.31271, 0.32902},
@@ -203,13 +201,10 @@ int pt_illuminant_named(const char *name, pt_vec3 *rgb)
                   {"stdillum-F7", 0.3129, 0.3292},    {"stdillum-F8", 0.3458, 0.3586},    {"stdillum-F9", 0.3741, 0.3727},
                   {"stdillum-F10", 0.3458, 0.3588},   {"stdillum-F11", 0.3805, 0.3769},   {"stdillum-F12", 0.4370, 0.4042},
                   {"illum-acesD60", 0.32168, 0.33767}};
-    for (size_t i = 0; i < sizeof lights / sizeof lights[0]; i++)
-        if (strcmp(lights[i].name, name) == 0) {
-            double x = lights[i].x, y = lights[i].y;
-            *rgb = pt_xyz_to_rgb(x / y, 1, (1 - x - y) / y);
-            return 1;
-        }
-    return 0;
+    const struct illuminant *light = pt_row(lights, name);
+    if (light)
+        *rgb = pt_xyz_to_rgb(light->x / light->y, 1, (1 - light->x - light->y) / light->y);
+    return light != NULL;
 }
 
 pt_vec3 pt_xyz_to_rgb(double x, double y, double z)
