@@ -14,10 +14,10 @@ static int by_wavelength(const void *a, const void *b)
     return (x[k] > y[k]) - (x[k] < y[k]);
 }
 
-/* A spectrum of pairs: where its wavelengths do not rise, pbrt-v3 sorts them and v4 refuses it. `file` is "" or names the
- * file that they are from. */
-static int read_pairs(struct pt_builder *b, const struct pt_param *param, const char *file, const double *pairs,
-                      size_t count, int extend, struct pt_spd *out)
+/* A spectrum of pairs: where its wavelengths do not rise, pbrt-v3 sorts them (here in place) and v4 refuses it. `file` is ""
+ * or names the file that they are from. */
+static int read_pairs(struct pt_builder *b, const struct pt_param *param, const char *file, double *pairs, size_t count,
+                      int extend, struct pt_spd *out)
 {
     size_t i = 1;
     while (i < count && (pairs[2 * i] > pairs[2 * i - 2] || (b->is_v3 && pairs[2 * i] == pairs[2 * i - 2])))
@@ -25,15 +25,9 @@ static int read_pairs(struct pt_builder *b, const struct pt_param *param, const 
     if (i < count && !b->is_v3)
         return pt_diag_fail(&b->diag, param->loc, "%s%swavelength %g after %g (expected rising ones)", file,
                             *file ? ": " : "", pairs[2 * i], pairs[2 * i - 2]);
-    double *sorted = i < count ? malloc(2 * count * sizeof *sorted) : NULL;
-    if (i < count && !sorted)
-        return pt_diag_nomem(&b->diag, "spectrum");
-    if (sorted) {
-        memcpy(sorted, pairs, 2 * count * sizeof *sorted);
-        qsort(sorted, count, 2 * sizeof *sorted, by_wavelength);
-    }
-    pt_spd_from_pairs(sorted ? sorted : pairs, count, extend, out);
-    free(sorted);
+    if (i < count)
+        qsort(pairs, count, 2 * sizeof *pairs, by_wavelength);
+    pt_spd_from_pairs(pairs, count, extend, out);
     return 0;
 }
 
@@ -79,7 +73,7 @@ static int read_spd_file(struct pt_builder *b, const struct pt_param *param, con
     return b->diag.rc;
 }
 
-static const double *values_of(const struct pt_params *p, const struct pt_param *param)
+static double *values_of(const struct pt_params *p, const struct pt_param *param)
 {
     return param->count > 0 && !param->is_text ? p->numbers + param->first : NULL;
 }
@@ -87,7 +81,7 @@ static const double *values_of(const struct pt_params *p, const struct pt_param 
 /* SPECTRUM and BLACKBODY parameters. `extend`: see pt_spd_from_pairs. */
 static int read_spectrum(struct pt_builder *b, struct pt_params *p, struct pt_param *param, int extend, struct pt_spd *out)
 {
-    const double *v = values_of(p, param);
+    double *v = values_of(p, param);
     pt_spd_constant(0, out);
     if (param->type == PT_PARAM_BLACKBODY) {
         if (param->count < 1 || param->count > 2 || !(v[0] >= 100 && v[0] <= 1e6))
