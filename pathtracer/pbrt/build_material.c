@@ -231,6 +231,7 @@ static int build_v4(struct making *c)
 /* Kinds of v3 in terms of v4's. */
 
 static int is_black(struct pt_input in) { return !in.texture && v3_is_black(in.value); }
+static int is_clear(struct pt_input in) { return !in.texture && v3_luminance(in.value) >= 0.999f; }
 
 static void clear_coat(struct making *c)
 {
@@ -282,13 +283,6 @@ static struct pt_input read_share(struct making *c, const char *name, float fall
     return pt_input_grey((double)v3_luminance(in.value));
 }
 
-/* What glass lets through is all but what it reflects. */
-static void say_clear(struct making *c, struct pt_input kt)
-{
-    if (kt.texture || v3_luminance(kt.value) < 0.999f)
-        pt_params_warn(c->p, "Kt", "Kt of an uber material without Kd is taken as 1");
-}
-
 /* A sum of four lobes there. Here it is the one that stands alone, or else a coated diffuse surface. */
 static void make_uber(struct making *c)
 {
@@ -303,7 +297,8 @@ static void make_uber(struct making *c)
         c->info->has_opacity = c->info->opacity.texture || c->info->opacity.value.x < 1;
     }
     if (!is_black(kt) && is_black(kd)) {
-        say_clear(c, kt);
+        if (!is_clear(kt)) /* what glass lets through is all but what it reflects */
+            pt_params_warn(c->p, "Kt", "Kt of an uber material without Kd is taken as 1");
         c->m->kind = PT_BSDF_DIELECTRIC;
         c->m->roughness_u = c->m->roughness_v = pt_input_grey(0);
     } else if (!is_black(kr) && is_black(kd) && is_black(ks)) {
@@ -344,7 +339,7 @@ static void make_glass(struct making *c)
     c->m->kind = PT_BSDF_DIELECTRIC;
     read_surface_roughness(c, "", 0, 1);
     c->m->eta = (float)index_of(c, 1.5);
-    if (kr.texture || kt.texture || v3_luminance(kr.value) < 0.999f || v3_luminance(kt.value) < 0.999f)
+    if (!is_clear(kr) || !is_clear(kt))
         pt_params_warn(c->p, pt_params_find(c->p, "Kr") ? "Kr" : "Kt", "Kr and Kt of glass are taken as 1");
 }
 
@@ -529,8 +524,7 @@ int pt_build_make_named_material(struct pt_builder *b, const char *name, const c
 static const char of_materials[] =
     "Kd Ks Kr Kt amount anisotropic beta_m beta_n bsdffile bumpmap clearcoat clearcoatgloss color difftrans eta eumelanin "
     "flatness g index k metallic mfp namedmaterial1 namedmaterial2 opacity pheomelanin reflect remaproughness roughness "
-    "scale "
-    "scatterdistance sheen sheentint sigma sigma_a sigma_s spectrans speculartint thin transmit uroughness vroughness";
+    "scale scatterdistance sheen sheentint sigma sigma_a sigma_s spectrans speculartint thin transmit uroughness vroughness";
 
 int32_t pt_build_shape_material(struct pt_builder *b, int32_t id, struct pt_params *shape)
 {

@@ -178,14 +178,9 @@ static int place_grid(struct pt_builder *b, struct pt_params *p, struct pt_mediu
     if (!(p0[0] != p1[0] && p0[1] != p1[1] && p0[2] != p1[2]))
         return pt_params_fail(p, pt_params_find(p, "p1") ? "p1" : "p0",
                               "the box of a grid medium is empty (expected p0 and p1 apart in all axes)");
-    for (int i = 0; i < 3; i++)
-        if (p0[i] > p1[i]) { /* any two corners name the box; the densities always run upwards */
-            double swap = p0[i];
-            p0[i] = p1[i];
-            p1[i] = swap;
-        }
-    struct pt_xform box = pt_xform_translate(p0[0], p0[1], p0[2]);
-    struct pt_xform size = pt_xform_scale(p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]);
+    /* Any two corners name the box; the densities always run upwards. */
+    struct pt_xform box = pt_xform_translate(fmin(p0[0], p1[0]), fmin(p0[1], p1[1]), fmin(p0[2], p1[2]));
+    struct pt_xform size = pt_xform_scale(fabs(p1[0] - p0[0]), fabs(p1[1] - p0[1]), fabs(p1[2] - p0[2]));
     box = pt_builder_to_render(b, pt_xform_mul(at[0], pt_xform_mul(box, size)));
     if (!pt_xform_invert(&box, &inverse))
         return pt_params_fail(p, NULL, "singular transform of a medium");

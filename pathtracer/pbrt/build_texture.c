@@ -256,19 +256,12 @@ static void make_constant(struct context *c, struct pt_texture *t) { t->in[0] = 
 
 static void make_scale(struct context *c, struct pt_texture *t)
 {
-    struct pt_input x, y;
-    if (pt_params_find(c->p, "tex") || pt_params_find(c->p, "scale")) { /* v4 */
-        x = input(c, "tex", 1);
-        y = pt_build_float_input(c->b, c->p, "scale", 1);
-    } else {
-        x = input(c, "tex1", 1);
-        y = input(c, "tex2", 1);
-    }
-    t->in[0] = x;
-    t->in[1] = y;
-    if (!x.texture && !y.texture) {
+    const int is_v4 = pt_params_find(c->p, "tex") || pt_params_find(c->p, "scale");
+    t->in[0] = input(c, is_v4 ? "tex" : "tex1", 1);
+    t->in[1] = is_v4 ? pt_build_float_input(c->b, c->p, "scale", 1) : input(c, "tex2", 1);
+    if (!t->in[0].texture && !t->in[1].texture) {
         t->kind = PT_TEXTURE_CONSTANT;
-        t->in[0].value = v3_mul(x.value, y.value);
+        t->in[0] = pt_input_product(c->b, t->in[0], t->in[1]);
     }
 }
 
@@ -278,9 +271,8 @@ static void make_mix(struct context *c, struct pt_texture *t)
     t->in[1] = input(c, "tex2", 1);
     t->in[2] = pt_build_float_input(c->b, c->p, "amount", 0.5);
     if (!t->in[0].texture && !t->in[1].texture && !t->in[2].texture) {
-        float a = t->in[2].value.x;
         t->kind = PT_TEXTURE_CONSTANT;
-        t->in[0].value = v3_add(v3_scale(t->in[0].value, 1 - a), v3_scale(t->in[1].value, a));
+        t->in[0] = pt_input_mix(c->b, t->in[0], t->in[1], t->in[2]);
     }
 }
 
@@ -328,10 +320,9 @@ static void make_imagemap(struct context *c, struct pt_texture *t)
     t->is_signed = c->is_float && !t->invert;
     read_mapping(c, t);
     pt_params_ignore(p, "maxanisotropy trilinear");
-    struct pt_param *named = pt_params_find(p, "filename");
     t->image = -1;
     if (!c->b->diag.rc)
-        t->image = pt_build_image_map(c->b, named ? named->loc : p->loc, file, encoding,
+        t->image = pt_build_image_map(c->b, pt_params_loc(p, "filename"), file, encoding,
                                       c->is_float ? PT_IMAGE_DATA : PT_IMAGE_COLOUR);
     if (t->image >= 0 && c->is_float) {
         const struct pt_image_map *m = &((struct pt_image_map *)c->b->images.items)[t->image];
