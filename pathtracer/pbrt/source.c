@@ -14,8 +14,11 @@ struct unpacked {
     size_t size, room;
 };
 
-/* From z->next_in to the end of its member. */
-static int unpack_member(const char *name, z_stream *z, struct unpacked *out, struct base_err *err)
+/* Whether another member begins there. */
+static int has_member(const z_stream *z) { return z->avail_in >= 2 && z->next_in[0] == 0x1f && z->next_in[1] == 0x8b; }
+
+/* All members from z->next_in on: they are one text (RFC 1952, 2.2); bgzip, pigz and cat make such files. */
+static int unpack(const char *name, z_stream *z, struct unpacked *out, struct base_err *err)
 {
     for (int status = Z_OK; status != Z_STREAM_END;) {
         if (out->size == out->room) {
@@ -30,27 +33,20 @@ static int unpack_member(const char *name, z_stream *z, struct unpacked *out, st
         z->avail_out = (uInt)space;
         status = inflate(z, Z_NO_FLUSH);
         out->size += space - z->avail_out;
-        if (status != Z_OK && status != Z_STREAM_END)
+        if (status == Z_STREAM_END && has_member(z))
+            status = inflateReset(z);
+        else if (status != Z_OK && status != Z_STREAM_END)
             return base_fail(err, BASE_EINVAL, "%s: damaged or truncated gzip file", name);
     }
+    /* Zeros may fill up a block. Anything else would be lost. */
+    for (uInt i = 0; i < z->avail_in; i++)
+        if (z->next_in[i] != 0)
+            return base_fail(err, BASE_EINVAL,
+                             "%s: %u bytes behind its last gzip member are no member (expected none, or zeros)", name,
+                             z->avail_in);
     return 0;
 }
 
-/* Whether another member follows; zeros that fill up a block do not count. Anything else would be lost. */
-static int has_member(const char *name, const z_stream *z, struct base_err *err)
-{
-    const Bytef *at = z->next_in, *end = at + z->avail_in;
-    if (end - at >= 2 && at[0] == 0x1f && at[1] == 0x8b)
-        return 1;
-    while (at < end && *at == 0)
-        at++;
-    return at == end ? 0
-                     : base_fail(err, BASE_EINVAL,
-                                 "%s: %u bytes behind its last gzip member are no member (expected none, or zeros)", name,
-                                 z->avail_in);
-}
-
-/* The members of a gzip file are one text (RFC 1952, 2.2): bgzip, pigz and cat make such files. */
 int pt_source_unpack(const char *name, const char *packed, size_t packed_size, char **bytes, size_t *size,
                      struct base_err *err)
 {
@@ -63,13 +59,7 @@ int pt_source_unpack(const char *name, const char *packed, size_t packed_size, c
         free(out.bytes);
         return base_fail_nomem(err, name);
     }
-    int rc = 1; /* another member */
-    while (rc > 0) {
-        rc = unpack_member(name, &z, &out, err);
-        if (!rc)
-            rc = has_member(name, &z, err);
-        inflateReset(&z);
-    }
+    int rc = unpack(name, &z, &out, err);
     inflateEnd(&z);
     if (rc) {
         free(out.bytes);
