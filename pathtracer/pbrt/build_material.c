@@ -72,12 +72,16 @@ static struct pt_material_info *info_of(const struct pt_builder *b, int32_t id)
     return (struct pt_material_info *)b->material_infos.items + id;
 }
 
-/* A material of a mix, made before; -1 after a failure. */
-static int32_t find_mixed(struct pt_builder *b, struct pt_loc loc, const char *name)
+/* A material of a mix, made before; else matte, as in pbrt-v3, or -1 after a failure. */
+static int32_t find_mixed(struct pt_builder *b, struct pt_loc loc, const char *name, int or_matte)
 {
     int32_t id = pt_names_get(&b->named_materials, name);
     if (id >= 0 && !info_of(b, id)->wanted.name)
         return id;
+    if (or_matte) {
+        pt_diag_warn(&b->diag, loc, "unknown material \"%s\": matte in its stead", name);
+        return pt_build_default_material(b);
+    }
     pt_diag_fail(&b->diag, loc, "unknown material \"%s\" (expected one made by MakeNamedMaterial before)", name);
     return -1;
 }
@@ -202,8 +206,8 @@ static void read_mix(struct making *c)
         return;
     }
     list->used = 1;
-    c->m->mix_a = find_mixed(c->b, list->loc, pt_params_string_at(c->p, list, 0));
-    c->m->mix_b = find_mixed(c->b, list->loc, pt_params_string_at(c->p, list, 1));
+    c->m->mix_a = find_mixed(c->b, list->loc, pt_params_string_at(c->p, list, 0), 0);
+    c->m->mix_b = find_mixed(c->b, list->loc, pt_params_string_at(c->p, list, 1), 0);
     c->m->mix_amount = pt_build_float_input(c->b, c->p, "amount", 0.5);
     set_mix_opacity(c);
 }
@@ -354,17 +358,6 @@ static void make_translucent(struct making *c)
         pt_params_warn(c->p, "Ks", "Ks of a translucent material is ignored");
 }
 
-/* pbrt-v3 mixes matte where there is no material of that name. */
-static int32_t mixed(struct making *c, const char *parameter)
-{
-    const struct pt_param *param = pt_params_find(c->p, parameter);
-    const char *name = pt_params_string(c->p, parameter, "");
-    if (!c->b->is_v3 || pt_names_get(&c->b->named_materials, name) >= 0)
-        return find_mixed(c->b, param->loc, name);
-    pt_diag_warn(&c->b->diag, param->loc, "unknown material \"%s\": matte in its stead", name);
-    return pt_build_default_material(c->b);
-}
-
 /* v3 gives the share of the first material, v4 that of the second. */
 static void make_mix(struct making *c)
 {
@@ -374,8 +367,8 @@ static void make_mix(struct making *c)
         pt_params_fail(c->p, NULL, "mix needs \"string namedmaterial1\" and \"string namedmaterial2\"");
         return;
     }
-    c->m->mix_b = mixed(c, "namedmaterial1");
-    c->m->mix_a = mixed(c, "namedmaterial2");
+    c->m->mix_b = find_mixed(c->b, first->loc, pt_params_string(c->p, "namedmaterial1", ""), c->b->is_v3);
+    c->m->mix_a = find_mixed(c->b, second->loc, pt_params_string(c->p, "namedmaterial2", ""), c->b->is_v3);
     struct pt_param *amount = pt_params_find(c->p, "amount");
     c->m->mix_amount = amount && amount->type == PT_PARAM_FLOAT ? pt_build_float_input(c->b, c->p, "amount", 0.5)
                                                                 : read_share(c, "amount", 0.5f);
