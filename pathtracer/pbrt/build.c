@@ -252,38 +252,30 @@ int pt_scene_load_source(const char *path, const struct pt_source *source, const
 {
     static const struct pt_load_options no_options;
     struct pt_scene_defaults found = {0};
-    struct pt_scene *scene = calloc(1, sizeof *scene);
-    struct pt_builder *b = calloc(1, sizeof *b);
-    int rc;
+    struct pt_builder b;
     double start_s = base_clock_wall_s();
-    if (!scene || !b) {
-        rc = base_fail_nomem(err, "the scene");
-        goto out;
-    }
-    pt_builder_init(b, scene, &found, options ? options : &no_options, source, err);
     const char *slash = strrchr(path, '/');
     size_t length = slash ? (size_t)(slash - path) + 1 : 0;
-    if (length >= sizeof b->directory) {
-        rc = base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", path);
-        goto out;
-    }
-    memcpy(b->directory, path, length);
-    rc = pt_pbrt_read(b, path);
+    if (length >= sizeof b.directory)
+        return base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", path);
+    struct pt_scene *scene = calloc(1, sizeof *scene);
+    if (!scene)
+        return base_fail_nomem(err, "the scene");
+    pt_builder_init(&b, scene, &found, options ? options : &no_options, source, err);
+    memcpy(b.directory, path, length);
+    int rc = pt_pbrt_read(&b, path);
     /* Textures are read while the file is parsed, but their time has a row of its own. */
     scene->stats.parse_s = base_clock_wall_s() - start_s - scene->stats.texture_s;
     start_s = base_clock_wall_s();
     if (!rc)
-        rc = finish(b);
+        rc = finish(&b);
     scene->stats.build_s = base_clock_wall_s() - start_s - scene->stats.accel_s;
     if (!rc) {
         *out = scene;
         *defaults = found;
         scene = NULL;
     }
-out:
-    if (b)
-        pt_builder_release(b);
-    free(b);
+    pt_builder_release(&b);
     pt_scene_destroy(scene);
     return rc;
 }

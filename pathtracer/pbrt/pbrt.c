@@ -489,31 +489,25 @@ static int run(struct parser *p)
 
 int pt_pbrt_read(struct pt_builder *b, const char *path)
 {
-    struct parser *p = calloc(1, sizeof *p);
-    if (!p)
-        return pt_diag_nomem(&b->diag, "parser");
-    p->b = b;
-    p->lexer.source = b->source;
-    p->lexer.diag = &b->diag;
-    p->lexer.arena = &b->scene->arena;
-    p->lexer.is_directive = is_directive;
-    p->state = (struct pt_state){
-        .ctm = {pt_xform_identity(), pt_xform_identity()}, .active = 3, .material = -1, .medium_in = -1, .medium_out = -1};
-    b->state = &p->state;
-    int rc = pt_lexer_include(&p->lexer, path, (struct pt_loc){NULL, 0, 0}, 0);
+    struct parser p = {.b = b, .state = {.active = 3, .material = -1, .medium_in = -1, .medium_out = -1}};
+    p.lexer =
+        (struct pt_lexer){.source = b->source, .diag = &b->diag, .arena = &b->scene->arena, .is_directive = is_directive};
+    p.state.ctm[0] = p.state.ctm[1] = pt_xform_identity();
+    b->state = &p.state;
+    int rc = pt_lexer_include(&p.lexer, path, (struct pt_loc){NULL, 0, 0}, 0);
     if (!rc)
-        rc = run(p);
-    struct pt_params **attributes = p->attributes.items;
-    for (size_t i = 0; i < p->attributes.count; i++) {
+        rc = run(&p);
+    struct pt_params **attributes = p.attributes.items;
+    for (size_t i = 0; i < p.attributes.count; i++) {
         pt_params_release(attributes[i]);
         free(attributes[i]);
     }
-    free(p->attributes.items);
-    free(p->frames.items);
-    free(p->systems.items);
-    pt_names_release(&p->system_names);
-    pt_params_release(&p->params);
-    pt_lexer_release(&p->lexer);
-    free(p);
+    free(p.attributes.items);
+    free(p.frames.items);
+    free(p.systems.items);
+    pt_names_release(&p.system_names);
+    pt_params_release(&p.params);
+    pt_lexer_release(&p.lexer);
+    b->state = NULL;
     return rc;
 }
