@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/options.h"
 #include "base/text.h"
 
 int pt_lexer_include(struct pt_lexer *lexer, const char *path, struct pt_loc from, int scoped)
@@ -248,4 +249,65 @@ int pt_number_parse(const char *text, size_t n, double *out)
         return 1;
     }
     return parse_slowly(text, n, out);
+}
+
+int pt_lexer_string(struct pt_lexer *lexer, const char *what, char *out, size_t room)
+{
+    struct pt_token t = pt_lexer_next(lexer);
+    if (t.kind == PT_TOKEN_BAD)
+        return lexer->diag->rc;
+    int bracket = t.kind == PT_TOKEN_OPEN;
+    if (bracket)
+        t = pt_lexer_next(lexer);
+    if (t.kind != PT_TOKEN_STRING)
+        return pt_diag_fail(lexer->diag, pt_lexer_fault(lexer, &t), "expected a quoted %s", what);
+    if (t.length >= room)
+        return pt_diag_fail(lexer->diag, t.loc, "%s of %zu characters (expected less than %zu)", what, t.length, room);
+    strcpy(out, t.text);
+    if (bracket && (t = pt_lexer_next(lexer)).kind != PT_TOKEN_CLOSE)
+        return pt_diag_fail(lexer->diag, pt_lexer_fault(lexer, &t), "expected ] after the %s", what);
+    return lexer->diag->rc;
+}
+
+int pt_lexer_numbers(struct pt_lexer *lexer, const char *what, int count, double *out)
+{
+    struct pt_token t;
+    int bracket = pt_lexer_peek(lexer).kind == PT_TOKEN_OPEN;
+    if (bracket)
+        pt_lexer_next(lexer);
+    for (int i = 0; i < count; i++) {
+        t = pt_lexer_next(lexer);
+        if (t.kind == PT_TOKEN_BAD)
+            return lexer->diag->rc;
+        if (pt_lexer_has_ended(lexer, &t))
+            return pt_diag_fail(lexer->diag, pt_lexer_fault(lexer, &t), "%s has %d numbers (expected %d)", what, i, count);
+        if (t.kind != PT_TOKEN_WORD || !pt_number_parse(t.text, t.length, &out[i]))
+            return pt_diag_fail(lexer->diag, t.loc, "%s: \"%.*s\" (expected %d numbers)", what,
+                                t.length < 40 ? (int)t.length : 40, t.text, count);
+    }
+    if (bracket && (t = pt_lexer_next(lexer)).kind != PT_TOKEN_CLOSE)
+        return pt_diag_fail(lexer->diag, pt_lexer_fault(lexer, &t), "%s: expected ] after %d numbers", what, count);
+    return 0;
+}
+
+int pt_lexer_option(struct pt_lexer *lexer, const char *name, uint32_t *value)
+{
+    struct pt_token t = pt_lexer_next(lexer);
+    double number = -1;
+    if (t.kind == PT_TOKEN_BAD)
+        return lexer->diag->rc;
+    int is_number = t.kind == PT_TOKEN_WORD && pt_number_parse(t.text, t.length, &number);
+    if (value && is_number && number >= 0 && number <= INT32_MAX && number == floor(number)) {
+        *value = (uint32_t)number;
+        return 0;
+    }
+    static const char *const words[] = {"true", "false", NULL};
+    if (!value && (is_number || t.kind == PT_TOKEN_STRING ||
+                   (t.kind == PT_TOKEN_WORD && base_word_index(words, t.text, t.length) >= 0)))
+        return 0;
+    if (t.kind == PT_TOKEN_OPEN || t.kind == PT_TOKEN_CLOSE || pt_lexer_has_ended(lexer, &t))
+        return pt_diag_fail(lexer->diag, pt_lexer_fault(lexer, &t), "Option \"%.40s\" has no value", name);
+    return pt_diag_fail(lexer->diag, t.loc, "Option \"%.40s\" is \"%.*s\" (expected %s)", name,
+                        t.length < 40 ? (int)t.length : 40, t.text,
+                        value ? "a whole number from 0 to 2147483647" : "a number, true, false or a string");
 }

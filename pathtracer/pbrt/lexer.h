@@ -1,5 +1,5 @@
 /*
- * Scene text to tokens, across included files, each with its place.
+ * Scene text to tokens, across included files, each with its place; and what directives read of them besides parameters.
  *
  * Files form a stack: pt_lexer_include pushes one, tokens come from the top, its end pops it. A parameter list may therefore
  * go on in the including file. Token texts point into file buffers and are valid until the next call.
@@ -61,6 +61,13 @@ int pt_lexer_has_ended(const struct pt_lexer *lexer, const struct pt_token *toke
 /* Where the fault is that the token taken last brought to light: in front of it if something is missing there, which may be
  * in another file. */
 struct pt_loc pt_lexer_fault(const struct pt_lexer *lexer, const struct pt_token *token);
+/* Reads a quoted string of less than `room` bytes, with or without brackets; `what` names it in errors. */
+int pt_lexer_string(struct pt_lexer *lexer, const char *what, char *out, size_t room);
+/* Reads so many numbers, with or without brackets; `what` names what needs them. */
+int pt_lexer_numbers(struct pt_lexer *lexer, const char *what, int count, double *out);
+/* Reads the value of an Option: a number, true, false or a string. `value`: NULL, or where a whole number from 0 to 2^31 - 1,
+ * which it must be then, goes. */
+int pt_lexer_option(struct pt_lexer *lexer, const char *name, uint32_t *value);
 void pt_lexer_release(struct pt_lexer *lexer);
 
 /* Parses all of text[0, n) as a decimal number ("-1", "+.5", "3.", "1e-008"), whatever the locale; correctly rounded. Returns

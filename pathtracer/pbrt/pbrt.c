@@ -4,60 +4,68 @@
 #include <string.h>
 
 #include "base/options.h"
-#include "pbrt/pbrt_parser.h"
+#include "pbrt/build.h"
 #include "pbrt/spectra.h"
 
-/* A quoted string, with or without brackets, of less than `room` bytes; `what` names it in errors. */
-static int read_string(struct parser *p, const char *what, char *out, size_t room)
-{
-    struct pt_token t = pt_lexer_next(&p->lexer);
-    if (t.kind == PT_TOKEN_BAD)
-        return p->b->diag.rc;
-    int bracket = t.kind == PT_TOKEN_OPEN;
-    if (bracket)
-        t = pt_lexer_next(&p->lexer);
-    if (t.kind != PT_TOKEN_STRING)
-        return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "expected a quoted %s", what);
-    if (t.length >= room)
-        return pt_diag_fail(&p->b->diag, t.loc, "%s of %zu characters (expected less than %zu)", what, t.length, room);
-    memcpy(out, t.text, t.length);
-    out[t.length] = '\0';
-    if (bracket && (t = pt_lexer_next(&p->lexer)).kind != PT_TOKEN_CLOSE)
-        return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "expected ] after the %s", what);
-    return p->b->diag.rc;
-}
+enum { NAME_MAX_BYTES = 1024, STATE_DEPTH = 1024 };
 
-/* Those of the directive, with or without brackets. */
-static int read_numbers(struct parser *p)
-{
-    const struct directive *d = p->directive;
-    int bracket = pt_lexer_peek(&p->lexer).kind == PT_TOKEN_OPEN;
-    if (bracket)
-        pt_lexer_next(&p->lexer);
-    for (int i = 0; i < d->numbers; i++) {
-        struct pt_token t = pt_lexer_next(&p->lexer);
-        if (t.kind == PT_TOKEN_BAD)
-            return p->b->diag.rc;
-        if (pt_lexer_has_ended(&p->lexer, &t))
-            return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "%s has %d numbers (expected %d)", d->name, i,
-                                d->numbers);
-        if (t.kind != PT_TOKEN_WORD || !pt_number_parse(t.text, t.length, &p->numbers[i]))
-            return pt_diag_fail(&p->b->diag, t.loc, "%s: \"%.*s\" (expected %d numbers)", d->name,
-                                t.length < 40 ? (int)t.length : 40, t.text, d->numbers);
-    }
-    struct pt_token t;
-    if (bracket && (t = pt_lexer_next(&p->lexer)).kind != PT_TOKEN_CLOSE)
-        return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "%s: expected ] after %d numbers", d->name,
-                            d->numbers);
-    return 0;
-}
+struct frame {
+    struct pt_state state;
+    char kind; /* 'A'ttribute, 'T'ransform, 'O'bject, 'I'mport */
+    struct pt_loc loc;
+    size_t named; /* pt_builder.name_undo.count when it was opened */
+};
+
+struct parser {
+    struct pt_builder *b;
+    struct pt_lexer lexer;
+    struct pt_state state;
+    struct pt_list frames;  /* struct frame */
+    struct pt_list systems; /* struct pt_xform[2]: named coordinate systems */
+    struct pt_names system_names;
+    const struct directive *directive; /* the current one, its place, and what was read before it runs: */
+    struct pt_loc loc;
+    char name[NAME_MAX_BYTES];
+    double numbers[16];
+    struct pt_params params;
+    struct pt_list attributes; /* struct pt_params *: owns what states point to */
+    int in_world, ended;
+};
+
+/* Whose parameters are read before a directive runs, with those of an Attribute. */
+enum directive_reads {
+    READ_NOTHING,
+    READ_PLAIN,
+    READ_FOR_SHAPE, /* and on in the order of enum pt_attribute */
+    READ_FOR_LIGHT,
+    READ_FOR_MATERIAL,
+    READ_FOR_MEDIUM
+};
+
+struct directive {
+    const char *name;
+    int (*run)(struct parser *p); /* NULL: the choice is ours */
+    int in_world;                 /* refused before WorldBegin */
+    /* what goes into parser.name, .numbers or .params first, or none of them: */
+    const char *text; /* a quoted string, called so in errors */
+    int numbers;      /* so many */
+    enum directive_reads reads;
+    /* of directives that share their function: */
+    char block; /* frame.kind of what it opens or closes */
+    enum pt_header header;
+    int replaces; /* the transform instead of adding to it */
+};
+
+/* Messages with the place of the directive. */
+#define pt_parser_fail(p, ...) pt_diag_fail(&(p)->b->diag, (p)->loc, __VA_ARGS__)
+#define pt_parser_warn(p, ...) pt_diag_warn(&(p)->b->diag, (p)->loc, __VA_ARGS__)
 
 /* Kind and parameter list into p->params, with those of Attribute `target` added (-1: none). */
 static int read_entity(struct parser *p, int target)
 {
     char kind[NAME_MAX_BYTES];
     struct pt_params *params = &p->params;
-    int rc = read_string(p, "name of what follows", kind, sizeof kind);
+    int rc = pt_lexer_string(&p->lexer, "name of what follows", kind, sizeof kind);
     if (rc)
         return rc;
     pt_params_clear(params, &p->b->diag, p->loc, kind);
@@ -135,6 +143,98 @@ static int pop(struct parser *p)
     return 0;
 }
 
+/* Names a coordinate system. */
+static int save_system(struct parser *p, const char *name, const struct pt_xform ctm[2])
+{
+    int32_t id = pt_list_add(p->b, &p->systems, (const struct pt_xform(*)[2])ctm);
+    if (id < 0 || pt_names_set(&p->system_names, name, id) != 0)
+        return pt_diag_nomem(&p->b->diag, "coordinate systems");
+    return 0;
+}
+
+/* A transform may flatten what comes (Scale 0 hides things in animations): who needs its inverse sees to that. */
+static int concat(struct parser *p, struct pt_xform t)
+{
+    for (int i = 0; i < 2; i++) {
+        if ((p->state.active >> i & 1) == 0)
+            continue;
+        struct pt_xform next = p->directive->replaces ? t : pt_xform_mul(p->state.ctm[i], t);
+        for (int k = 0; k < 12; k++)
+            if (!isfinite(next.m[k / 4][k % 4]))
+                return pt_parser_fail(p, "the transform is out of range (expected finite numbers)");
+        p->state.ctm[i] = next;
+    }
+    return 0;
+}
+
+static int do_identity(struct parser *p) { return concat(p, pt_xform_identity()); }
+
+static int do_translate(struct parser *p)
+{
+    return concat(p, pt_xform_translate(p->numbers[0], p->numbers[1], p->numbers[2]));
+}
+
+static int do_scale(struct parser *p) { return concat(p, pt_xform_scale(p->numbers[0], p->numbers[1], p->numbers[2])); }
+
+static int do_rotate(struct parser *p)
+{
+    const double *v = p->numbers;
+    if (v[1] == 0 && v[2] == 0 && v[3] == 0)
+        return pt_parser_fail(p, "Rotate about the axis 0 0 0 (expected a direction)");
+    return concat(p, pt_xform_rotate(v[0], v[1], v[2], v[3]));
+}
+
+static int do_look_at(struct parser *p)
+{
+    struct pt_xform t;
+    if (!pt_xform_look_at(p->numbers, p->numbers + 3, p->numbers + 6, &t))
+        return pt_parser_fail(p, "LookAt is degenerate (expected eye and target apart, up not along the view)");
+    return concat(p, t);
+}
+
+static int do_transform(struct parser *p)
+{
+    struct pt_xform t;
+    if (!pt_xform_from16(p->numbers, &t))
+        return pt_parser_fail(p, "%s is not affine (expected 0 0 0 1 as every fourth number)", p->directive->name);
+    return concat(p, t);
+}
+
+static int do_coordinate_system(struct parser *p) { return save_system(p, p->name, p->state.ctm); }
+
+static int do_coord_sys_transform(struct parser *p)
+{
+    const int32_t id = pt_names_get(&p->system_names, p->name);
+    if (id < 0) { /* pbrt says so and goes on */
+        pt_parser_warn(p, "unknown coordinate system \"%s\": the transform stays", p->name);
+        return p->b->diag.rc;
+    }
+    const struct pt_xform(*systems)[2] = p->systems.items;
+    /* Of both times, whatever ActiveTransform says: so pbrt does. */
+    memcpy(p->state.ctm, systems[id], sizeof p->state.ctm);
+    return 0;
+}
+
+static int do_active_transform(struct parser *p)
+{
+    struct pt_token t = pt_lexer_next(&p->lexer);
+    /* by the bits of pt_state.active, from 1 on */
+    static const char *const words[] = {"StartTime", "EndTime", "All", NULL};
+    const int word = base_word_index(words, t.text, t.length);
+    if (word < 0)
+        return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "ActiveTransform needs StartTime, EndTime or All");
+    p->state.active = (unsigned)word + 1;
+    return 0;
+}
+
+static int do_transform_times(struct parser *p)
+{
+    if (p->in_world || !(p->numbers[1] >= p->numbers[0]))
+        return pt_parser_fail(p, "TransformTimes must come before WorldBegin, start before end");
+    memcpy(p->b->transform_times, p->numbers, sizeof p->b->transform_times);
+    return 0;
+}
+
 static int do_object_begin(struct parser *p)
 {
     int rc = pt_build_object_begin(p->b, p->name, p->loc);
@@ -193,7 +293,7 @@ static int do_camera(struct parser *p)
     for (int i = 0; i < 2; i++)
         if (!pt_xform_invert(&p->state.ctm[i], &inverse[i]))
             return pt_parser_fail(p, "the camera's transform is singular");
-    return pt_parser_save_system(p, "camera", inverse);
+    return save_system(p, "camera", inverse);
 }
 
 static int do_world_begin(struct parser *p)
@@ -205,7 +305,7 @@ static int do_world_begin(struct parser *p)
     p->in_world = 1;
     p->state.ctm[0] = p->state.ctm[1] = pt_xform_identity();
     p->state.active = 3;
-    int rc = pt_parser_save_system(p, "world", p->state.ctm);
+    int rc = save_system(p, "world", p->state.ctm);
     return rc ? rc : pt_build_header(p->b);
 }
 
@@ -252,7 +352,7 @@ static int do_named_material(struct parser *p)
 static int do_texture(struct parser *p)
 {
     char type[64];
-    int rc = read_string(p, "texture type", type, sizeof type);
+    int rc = pt_lexer_string(&p->lexer, "texture type", type, sizeof type);
     if (!rc)
         rc = read_entity(p, PT_ATTR_TEXTURE);
     return rc ? rc : pt_build_texture(p->b, p->name, type, &p->params);
@@ -266,7 +366,7 @@ static int do_medium_interface(struct parser *p)
     int rc = 0;
     strcpy(outside, p->name);
     if (pt_lexer_peek(&p->lexer).kind == PT_TOKEN_STRING)
-        rc = read_string(p, "medium name", outside, sizeof outside);
+        rc = pt_lexer_string(&p->lexer, "medium name", outside, sizeof outside);
     if (rc)
         return rc;
     p->state.medium_in = pt_build_medium_ref(p->b, p->name, p->loc);
@@ -300,7 +400,7 @@ static int do_attribute(struct parser *p)
 static int do_color_space(struct parser *p)
 {
     char name[64];
-    int rc = read_string(p, "colour space", name, sizeof name);
+    int rc = pt_lexer_string(&p->lexer, "colour space", name, sizeof name);
     if (rc)
         return rc;
     int space = pt_colour_space_named(name);
@@ -310,29 +410,6 @@ static int do_color_space(struct parser *p)
     return 0;
 }
 
-/* A number, true, false or a string. `value`: NULL, or where a whole number from 0 to 2^31 - 1 goes. */
-static int read_option_value(struct parser *p, const char *name, uint32_t *value)
-{
-    struct pt_token t = pt_lexer_next(&p->lexer);
-    double number = -1;
-    if (t.kind == PT_TOKEN_BAD)
-        return p->b->diag.rc;
-    int is_number = t.kind == PT_TOKEN_WORD && pt_number_parse(t.text, t.length, &number);
-    if (value && is_number && number >= 0 && number <= INT32_MAX && number == floor(number)) {
-        *value = (uint32_t)number;
-        return 0;
-    }
-    static const char *const words[] = {"true", "false", NULL};
-    if (!value && (is_number || t.kind == PT_TOKEN_STRING ||
-                   (t.kind == PT_TOKEN_WORD && base_word_index(words, t.text, t.length) >= 0)))
-        return 0;
-    if (t.kind == PT_TOKEN_OPEN || t.kind == PT_TOKEN_CLOSE || pt_lexer_has_ended(&p->lexer, &t))
-        return pt_diag_fail(&p->b->diag, pt_lexer_fault(&p->lexer, &t), "Option \"%.40s\" has no value", name);
-    return pt_diag_fail(&p->b->diag, t.loc, "Option \"%.40s\" is \"%.*s\" (expected %s)", name,
-                        t.length < 40 ? (int)t.length : 40, t.text,
-                        value ? "a whole number from 0 to 2147483647" : "a number, true, false or a string");
-}
-
 /* pbrt-v4's: a name, of which it ignores case, '-' and '_', and one value. */
 static int read_option(struct parser *p)
 {
@@ -340,17 +417,17 @@ static int read_option(struct parser *p)
                                 "forcediffuse msereferenceimage msereferenceout pixelstats rendercoordsys wavefront";
     char name[NAME_MAX_BYTES], plain[NAME_MAX_BYTES] = "";
     size_t n = 0;
-    int rc = read_string(p, "option", name, sizeof name);
+    int rc = pt_lexer_string(&p->lexer, "option", name, sizeof name);
     if (rc)
         return rc;
     for (const char *at = name; *at; at++)
         if (*at != '-' && *at != '_' && *at != ' ' && *at != '\t')
             plain[n++] = *at >= 'A' && *at <= 'Z' ? (char)(*at - 'A' + 'a') : *at;
     if (strcmp(plain, "seed") == 0)
-        return read_option_value(p, name, &p->b->defaults->integrator.seed);
+        return pt_lexer_option(&p->lexer, name, &p->b->defaults->integrator.seed);
     if (!pt_name_is_in(known, plain))
         return pt_parser_fail(p, "unknown option \"%.40s\"", name);
-    rc = read_option_value(p, name, NULL);
+    rc = pt_lexer_option(&p->lexer, name, NULL);
     if (!rc)
         pt_parser_warn(p, "Option \"%s\" is ignored", name);
     return rc ? rc : p->b->diag.rc;
@@ -417,16 +494,24 @@ static const struct directive directives[] = {
     {"Accelerator", .reads = READ_PLAIN},
     {.name = "WorldBegin", .run = do_world_begin},
     {"WorldEnd", do_world_end, .in_world = 1},
-    {0},
+    {"Transform", do_transform, .numbers = 16, .replaces = 1},
+    {"ConcatTransform", do_transform, .numbers = 16},
+    {"Translate", do_translate, .numbers = 3},
+    {"Rotate", do_rotate, .numbers = 4},
+    {"Scale", do_scale, .numbers = 3},
+    {"Identity", do_identity, .replaces = 1},
+    {"LookAt", do_look_at, .numbers = 9},
+    {"CoordinateSystem", do_coordinate_system, .text = "name"},
+    {"CoordSysTransform", do_coord_sys_transform, .text = "name"},
+    {.name = "ActiveTransform", .run = do_active_transform},
+    {"TransformTimes", do_transform_times, .numbers = 2},
 };
 
 static const struct directive *find_directive(const struct pt_token *t)
 {
-    const struct directive *const lists[] = {directives, pt_transform_directives};
-    for (int i = 0; i < 2 && t->kind == PT_TOKEN_WORD; i++)
-        for (const struct directive *d = lists[i]; d->name; d++)
-            if (strlen(d->name) == t->length && memcmp(d->name, t->text, t->length) == 0)
-                return d;
+    for (size_t i = 0; i < sizeof directives / sizeof directives[0] && t->kind == PT_TOKEN_WORD; i++)
+        if (strlen(directives[i].name) == t->length && memcmp(directives[i].name, t->text, t->length) == 0)
+            return &directives[i];
     return NULL;
 }
 
@@ -442,8 +527,8 @@ static int run_directive(struct parser *p, const struct pt_token *t)
     if (d->in_world && !p->in_world)
         return pt_diag_fail(&p->b->diag, t->loc, "%s before WorldBegin", d->name);
     p->directive = d;
-    int rc = d->text                    ? read_string(p, d->text, p->name, sizeof p->name)
-             : d->numbers > 0           ? read_numbers(p)
+    int rc = d->text                    ? pt_lexer_string(&p->lexer, d->text, p->name, sizeof p->name)
+             : d->numbers > 0           ? pt_lexer_numbers(&p->lexer, d->name, d->numbers, p->numbers)
              : d->reads != READ_NOTHING ? read_entity(p, (int)d->reads - READ_FOR_SHAPE)
                                         : 0;
     return rc || !d->run ? rc : d->run(p);
