@@ -202,13 +202,14 @@ int pt_build_instance(struct pt_builder *b, const char *name, struct pt_loc loc)
 /* At the end: leaves out the instances of objects that turned out to be empty. */
 void pt_build_drop_instances(struct pt_builder *b);
 
-/* Triangles before they are placed. Positions: pd or pf; the rest may be NULL. */
+/* Triangles before they are placed. Positions: pd or pf; indices: as one or the other; the rest may be NULL. */
 struct pt_soup {
     size_t vertex_count, triangle_count;
     const double *pd;
     const float *pf;
     const double *nd, *uvd;
     const float *nf, *uvf;
+    const double *indices_d;
     const uint32_t *indices;
 };
 int pt_build_mesh(struct pt_builder *b, struct pt_params *p, const struct pt_soup *soup);

@@ -263,7 +263,8 @@ static int store_mesh(struct pt_builder *b, struct pt_params *p, const struct pt
         vertices[i].u = (float)value(soup->uvd, soup->uvf, 2 * i);
         vertices[i].v = (float)value(soup->uvd, soup->uvf, 2 * i + 1);
     }
-    memcpy(indices, soup->indices, soup->triangle_count * 3 * sizeof *indices);
+    for (size_t i = 0; i < 3 * soup->triangle_count; i++)
+        indices[i] = soup->indices_d ? (uint32_t)soup->indices_d[i] : soup->indices[i];
     *m = (struct pt_mesh){(uint32_t)n, (uint32_t)soup->triangle_count, vertices, indices, has_n, has_uv};
     return 0;
 }
@@ -305,31 +306,24 @@ int pt_build_check_index(const struct pt_params *p, double v, size_t vertex_coun
                           vertex_count > 0 ? vertex_count - 1 : 0);
 }
 
-/* A list as vertex indices in [0, vertex_count); malloc'ed. */
-static int read_indices(struct pt_params *p, size_t vertex_count, uint32_t **out, size_t *count)
+/* The vertices of triangles, each in [0, vertex_count). */
+static int read_indices(struct pt_params *p, size_t vertex_count, const double **out, size_t *count)
 {
-    const double *given = pt_params_ints(p, "indices", count);
+    static const double triangle[3] = {0, 1, 2};
+    *out = pt_params_ints(p, "indices", count);
     if (p->diag->rc)
         return p->diag->rc;
-    if (!given && vertex_count != 3)
+    if (!*out && vertex_count != 3)
         return pt_params_fail(p, NULL, "a trianglemesh of %zu vertices needs \"integer indices\"", vertex_count);
-    if (!given)
+    if (!*out) {
+        *out = triangle;
         *count = 3;
+    }
     if (*count % 3 != 0)
         return pt_params_fail(p, "indices", "%zu indices (expected a multiple of 3)", *count);
-    uint32_t *indices = malloc(*count * sizeof *indices);
-    if (!indices)
-        return pt_diag_nomem(p->diag, "a mesh");
-    for (size_t i = 0; i < *count; i++) {
-        double v = given ? given[i] : (double)i;
-        if (pt_build_check_index(p, v, vertex_count) != 0) {
-            free(indices);
-            return p->diag->rc;
-        }
-        indices[i] = (uint32_t)v;
-    }
-    *out = indices;
-    return 0;
+    for (size_t i = 0; i < *count && !p->diag->rc; i++)
+        pt_build_check_index(p, (*out)[i], vertex_count);
+    return p->diag->rc;
 }
 
 static int is_empty(const struct pt_params *p, const char *name)
@@ -357,15 +351,11 @@ static int make_triangle_mesh(struct pt_builder *b, struct pt_params *p)
         return pt_params_fail(p, "N", "%zu normals for %zu vertices", n_count, soup.vertex_count);
     if (soup.uvd && uv_count != soup.vertex_count)
         return pt_params_fail(p, uv_name, "%zu texture coordinates for %zu vertices", uv_count, soup.vertex_count);
-    uint32_t *indices = NULL;
-    if (read_indices(p, soup.vertex_count, &indices, &index_count) != 0)
+    if (read_indices(p, soup.vertex_count, &soup.indices_d, &index_count) != 0)
         return b->diag.rc;
-    soup.indices = indices;
     soup.triangle_count = index_count / 3;
     pt_params_ignore(p, "S faceIndices discarddegenerateUVs");
-    pt_build_mesh(b, p, &soup);
-    free(indices);
-    return b->diag.rc;
+    return pt_build_mesh(b, p, &soup);
 }
 
 /* The arrays of the file go as soon as the mesh is stored: nothing large is kept twice for long. */
