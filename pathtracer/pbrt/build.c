@@ -224,6 +224,7 @@ static int finish(struct pt_builder *b)
         rc = pt_media_build(scene, err);
     if (rc)
         return rc;
+    /* In this order: effects ask for finished materials and media, lights for the bounds of all shapes. */
     add_shape_effects(b);
     scene->effects |= b->options->forced;
     scene->light_selection = b->options->light_selection;

@@ -533,6 +533,7 @@ int32_t pt_build_shape_material(struct pt_builder *b, int32_t id, struct pt_para
     pt_params_append(&both, shape);
     if (own)
         pt_params_append(&both, own);
+    /* Only building it shows which of them its kind reads. */
     int32_t made = b->diag.rc ? -1 : build(b, kind, &both);
     for (size_t i = 0; i < shape->count && made >= 0; i++) {
         const char *name = pt_param_name(shape, &shape->items[i]);

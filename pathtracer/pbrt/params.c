@@ -388,8 +388,7 @@ double pt_params_float_in(struct pt_params *params, const char *name, double fal
     double v = pt_params_float(params, name, fallback);
     if (!pt_params_find(params, name) || (v >= low && v <= high))
         return v;
-    pt_diag_fail(params->diag, pt_params_find(params, name)->loc, "parameter \"%s\" is %g (expected %g to %g)", name, v, low,
-                 high);
+    pt_params_fail(params, name, "parameter \"%s\" is %g (expected %g to %g)", name, v, low, high);
     return fallback;
 }
 
