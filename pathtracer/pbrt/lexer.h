@@ -65,13 +65,13 @@ struct pt_loc pt_lexer_fault(const struct pt_lexer *lexer, const struct pt_token
 int pt_lexer_string(struct pt_lexer *lexer, const char *what, char *out, size_t room);
 /* Reads so many numbers, with or without brackets; `what` names what needs them. */
 int pt_lexer_numbers(struct pt_lexer *lexer, const char *what, int count, double *out);
-/* Reads the value of an Option: a number, true, false or a string. `value`: NULL, or where a whole number from 0 to 2^31 - 1,
- * which it must be then, goes. */
+/* Reads the value of an Option: a number, true, false or a string. `value`: NULL, or where it goes, which must then be a
+ * whole number from 0 to 2^31 - 1. */
 int pt_lexer_option(struct pt_lexer *lexer, const char *name, uint32_t *value);
 void pt_lexer_release(struct pt_lexer *lexer);
 
-/* Parses all of text[0, n) as a decimal number ("-1", "+.5", "3.", "1e-008"), whatever the locale; correctly rounded. Returns
- * 1, or 0 when it is no number or not finite. Thread-safe. */
+/* Parses all of text[0, n) as a decimal number ("-1", "+.5", "3.", "1e-008"), whatever the locale; correctly rounded.
+ * Returns 1, or 0 when it is no number or not finite. Thread-safe. */
 int pt_number_parse(const char *text, size_t n, double *out);
 
 #endif
