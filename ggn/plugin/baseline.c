@@ -33,29 +33,21 @@ static struct gp_slot slot_of(const void *of, int32_t width, int32_t height)
     return (struct gp_slot){.kept = sizeof(double) * ggn_baseline_feature_count(in->model, width, height)};
 }
 
-static void worker_destroy(void *data)
+static void worker_release(void *data)
 {
     struct worker *w = data;
 
-    if (!w)
-        return;
     ggn_baseline_reader_destroy(w->reader);
     free(w->codes);
-    free(w);
 }
 
-static void *worker_create(const struct lull_instance *in, const struct ggn_meter_room *room, struct base_err *err)
+static int worker_init(void *data, const struct lull_instance *in, const struct ggn_meter_room *room, struct base_err *err)
 {
-    struct worker *w = calloc(1, sizeof *w);
+    struct worker *w = data;
 
-    if (!w)
-        return NULL;
     w->codes = malloc(3 * room->pixels);
     w->reader = w->codes ? ggn_baseline_reader_create(in->model, err) : NULL;
-    if (w->reader)
-        return w;
-    worker_destroy(w);
-    return NULL;
+    return w->reader ? 0 : err->code;
 }
 
 static void model_destroy(void *model)
@@ -72,7 +64,7 @@ static long read_image(const struct gp_block_view *seen, uint32_t slot)
     long broken = gp_windowed_read(seen, w->codes);
 
     ggn_baseline_extract(w->reader, w->codes, b->x1 - b->x0, b->y1 - b->y0,
-                         gp_history_kept(&seen->in->history, b->id, slot));
+                         gp_history_kept(&seen->in->frame.history, b->id, slot));
     return broken;
 }
 
@@ -84,7 +76,7 @@ static double window_logit(void *data)
     const double *features[GGN_WINDOW_MAX];
 
     for (int i = 0; i < seen->in->rule.window; i++)
-        features[i] = gp_history_kept(&seen->in->history, b->id, seen->head->order[i]);
+        features[i] = gp_history_kept(&seen->in->frame.history, b->id, seen->head->order[i]);
     return ggn_baseline_logit(w->reader, features, b->x1 - b->x0, b->y1 - b->y0);
 }
 
@@ -99,7 +91,7 @@ static void hash_model(struct lull_instance *in, const struct ggn_baseline *b)
         gp_windowed_hash(in, s->values, sizeof *s->values * ggn_svm_values(s));
 }
 
-static int32_t load(struct lull_instance *in, int kind, const char *path, struct lull_error *err)
+static int32_t load(struct lull_instance *in, const char *path, struct lull_error *err)
 {
     struct base_err error = {0};
     struct ggn_baseline *b = calloc(1, sizeof *b);
@@ -107,7 +99,7 @@ static int32_t load(struct lull_instance *in, int kind, const char *path, struct
     in->model = b;
     if (!b)
         return lull_kit_fail(err, LULL_E_MEMORY, "create: out of memory");
-    if (ggn_baseline_load(b, path, (enum ggn_baseline_kind)kind, &error))
+    if (ggn_baseline_load(b, path, (enum ggn_baseline_kind)in->ops->kind, &error))
         return gp_fail_from(err, LULL_E_IO, "model", &error);
     in->rule = (struct ggn_stop_rule){.policy = b->policy, .window = b->window};
     hash_model(in, b);
@@ -115,30 +107,23 @@ static int32_t load(struct lull_instance *in, int kind, const char *path, struct
     return LULL_OK;
 }
 
-static const struct gp_block_view_ops ops = {.load = load,
-                                             .slot = slot_of,
-                                             .worker_create = worker_create,
-                                             .worker_destroy = worker_destroy,
-                                             .model_destroy = model_destroy,
-                                             .read = read_image,
-                                             .evidence = {NULL, window_logit, NULL}};
+#define BASELINE(its_kind, table, identity, title, eye) \
+    static const struct gp_block_view_ops its_kind##_ops = {.model = identity, \
+                                                            .kind = its_kind, \
+                                                            .load = load, \
+                                                            .slot = slot_of, \
+                                                            .worker_size = sizeof(struct worker), \
+                                                            .worker_init = worker_init, \
+                                                            .worker_release = worker_release, \
+                                                            .model_destroy = model_destroy, \
+                                                            .read = read_image, \
+                                                            .evidence = {NULL, window_logit, NULL}}; \
+    GP_CRITERION(table, &gp_windowed_rule, &its_kind##_ops, .version = "1.0", .id = identity, .name = title, \
+                 .description = "Probability that noise is still seen in the block, from " eye ".")
 
-/* X(kind, member of criteria.h, id, name, its features) */
-#define BASELINES(X) \
-    X(GGN_SVD_ENTROPY, svd_entropy, "svd-entropy", "SVD-entropy LSTM", \
-      "the entropy of the singular values of\n20x20 pixels over six images, by an LSTM (Buisine et al. 2021)") \
-    X(GGN_ATTRIBUTES_SVM, attributes, "attributes", "26 attributes + SVM", \
-      "what 13 filters take off the\nlightness, by a support vector machine (Constantin et al. 2015)") \
-    X(GGN_MASK_SVM, noise_mask, "noise-mask", "Noise mask + SVM", \
-      "the noise masks of the image and of\na smoothed one, by a support vector machine (Takouachet et al. 2017)")
-
-#define TABLE(kind, member, identity, title, eye) \
-    static int32_t create_##member(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, \
-                                   uint32_t pair_stride, struct lull_instance **instance, struct lull_error *err) \
-    { \
-        return gp_windowed_create(&ops, kind, &ggn_plugin_##member, host, pairs, pair_count, pair_stride, instance, err); \
-    } \
-    const struct lull_criterion ggn_plugin_##member = \
-        GP_WINDOWED_TABLE(.create = create_##member, .id = identity, .name = title, \
-                          .description = "Probability that noise is still seen in the block, from " eye ".");
-BASELINES(TABLE)
+BASELINE(GGN_SVD_ENTROPY, ggn_plugin_svd_entropy, "svd-entropy", "SVD-entropy LSTM",
+         "the entropy of the singular values of\n20x20 pixels over six images, by an LSTM (Buisine et al. 2021)");
+BASELINE(GGN_ATTRIBUTES_SVM, ggn_plugin_attributes, "attributes", "26 attributes + SVM",
+         "what 13 filters take off the\nlightness, by a support vector machine (Constantin et al. 2015)");
+BASELINE(GGN_MASK_SVM, ggn_plugin_noise_mask, "noise-mask", "Noise mask + SVM",
+         "the noise masks of the image and of\na smoothed one, by a support vector machine (Takouachet et al. 2017)");

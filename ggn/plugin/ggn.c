@@ -48,31 +48,23 @@ static struct gp_slot slot_of(const void *of, int32_t width, int32_t height)
     return (struct gp_slot){.made = 2 * values, .kept = values + (in->rule.reach > 0 ? sizeof(struct ggn_measure) : 0)};
 }
 
-static void worker_destroy(void *data)
+static void worker_release(void *data)
 {
     struct worker *w = data;
 
-    if (!w)
-        return;
     ggn_inference_destroy(w->inference);
     ggn_meter_release(&w->meter);
     free(w->noise_map);
-    free(w);
 }
 
-static void *worker_create(const struct lull_instance *in, const struct ggn_meter_room *room, struct base_err *err)
+static int worker_init(void *data, const struct lull_instance *in, const struct ggn_meter_room *room, struct base_err *err)
 {
-    struct worker *w = calloc(1, sizeof *w);
+    struct worker *w = data;
 
-    if (!w)
-        return NULL;
     w->noise_map = malloc(room->pixels);
     if (w->noise_map && (in->rule.reach <= 0 || !ggn_meter_init(&w->meter, room, err)))
         w->inference = ggn_inference_create(in->model, NULL, err);
-    if (w->inference)
-        return w;
-    worker_destroy(w);
-    return NULL;
+    return w->inference ? 0 : err->code;
 }
 
 static void model_destroy(void *model) { ggn_model_destroy(model); }
@@ -80,7 +72,7 @@ static void model_destroy(void *model) { ggn_model_destroy(model); }
 /* Where a slot keeps what was measured of its image; not aligned. */
 static unsigned char *measured(const struct gp_block_view *seen, uint32_t slot)
 {
-    return (unsigned char *)gp_history_kept(&seen->in->history, seen->block->id, slot) + values_of(seen->block);
+    return (unsigned char *)gp_history_kept(&seen->in->frame.history, seen->block->id, slot) + values_of(seen->block);
 }
 
 static long read_image(const struct gp_block_view *seen, uint32_t slot)
@@ -89,7 +81,7 @@ static long read_image(const struct gp_block_view *seen, uint32_t slot)
 
     if (seen->in->rule.reach > 0)
         memcpy(measured(seen, slot), &w->measure, sizeof w->measure);
-    return gp_windowed_read(seen, gp_history_kept(&seen->in->history, seen->block->id, slot));
+    return gp_windowed_read(seen, gp_history_kept(&seen->in->frame.history, seen->block->id, slot));
 }
 
 /* The two pictures of the block into the worker's meter. Returns whether they tell anything; *differ: whether they do
@@ -102,13 +94,13 @@ static int read_pair(const struct gp_block_view *seen, int *differ, double *spli
     struct lull_kit_tally tally = {0};
 
     *split = 0.5;
-    if (in->means.count) {
+    if (in->frame.means.count) {
         int known;
-        *differ = gp_pair_of_means(&in->kit, seen->view, b, &in->means, rgb, &tally, &known);
+        *differ = gp_pair_of_means(&in->kit, seen->view, b, &in->frame.means, rgb, &tally, &known);
         return known;
     }
     if (!gp_has_halves(b)) {
-        gp_say_once(&in->kit, LULL_LOG_WARNING, &in->warned,
+        gp_say_once(&in->kit, LULL_LOG_WARNING, &in->frame.warned,
                     "ggn: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped by "
                     "it");
         return 0;
@@ -135,7 +127,7 @@ static void measure_block(const struct gp_block_view *seen)
         ggn_measure(&w->meter, b->x1 - b->x0, b->y1 - b->y0, split, 0, &w->measure, w->noise_map);
     else
         w->measure.visible =
-            gp_error_of_same(&in->kit, gp_pair_has_structure(w->meter.rgb[0], (size_t)lull_kit_pixels(b)), &in->warned,
+            gp_error_of_same(&in->kit, gp_pair_has_structure(w->meter.rgb[0], (size_t)lull_kit_pixels(b)), &in->frame.warned,
                              "ggn: the planes say that a block has no noise, yet it is not of one colour: "
                              "HALF must hold a fixed half of the samples, COLOR the mean of all",
                              &tally);
@@ -168,7 +160,7 @@ static void scalars_of(struct gp_block_view *seen, float scalars[GGN_SCALARS])
 static double window_logit(void *data)
 {
     struct gp_block_view *seen = data;
-    const struct gp_history *history = &seen->in->history;
+    const struct gp_history *history = &seen->in->frame.history;
     const struct ggn_model *model = seen->in->model;
     const struct worker *worker = seen->worker;
     const uint8_t *noise_map = model->hyper.noise_map && model->hyper.reach > 0 ? worker->noise_map : NULL;
@@ -192,11 +184,10 @@ static double window_logit(void *data)
     return ggn_inference_logit(worker->inference, noisy, denoised, noise_map, scalars, w, h);
 }
 
-static int32_t load(struct lull_instance *in, int kind, const char *path, struct lull_error *err)
+static int32_t load(struct lull_instance *in, const char *path, struct lull_error *err)
 {
     struct base_err error = {0};
     struct ggn_model *model = NULL;
-    (void)kind;
 
     int rc = ggn_model_load(path, &model, &error);
     in->model = model;
@@ -216,21 +207,16 @@ static const struct gp_block_view_ops ops = {.model = "lull-3",
                                              .variable = "LULL_MODEL",
                                              .load = load,
                                              .slot = slot_of,
-                                             .worker_create = worker_create,
-                                             .worker_destroy = worker_destroy,
+                                             .worker_size = sizeof(struct worker),
+                                             .worker_init = worker_init,
+                                             .worker_release = worker_release,
                                              .model_destroy = model_destroy,
                                              .measure = measure_block,
                                              .read = read_image,
                                              .evidence = {NULL, window_logit, law}};
 
-static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
-                      struct lull_instance **instance, struct lull_error *err)
-{
-    return gp_windowed_create(&ops, 0, &ggn_plugin_ggn, host, pairs, pair_count, pair_stride, instance, err);
-}
-
-const struct lull_criterion ggn_plugin_ggn = GP_WINDOWED_TABLE(
-        .create = create, .id = "ggn", .name = "Guided-Generative Network",
-        .description =
-            "Probability that a viewer still sees noise in the block, from the last images of it (Buisine, Teytaud,\n"
-            "Delepoulle, Renaud 2022). `error`, of a model with residual, is the visible noise over what is just visible.");
+GP_CRITERION(
+    ggn_plugin_ggn, &gp_windowed_rule, &ops, .version = "1.0", .id = "ggn", .name = "Guided-Generative Network",
+    .description =
+        "Probability that a viewer still sees noise in the block, from the last images of it (Buisine, Teytaud,\n"
+        "Delepoulle, Renaud 2022). `error`, of a model with residual, is the visible noise over what is just visible.");

@@ -47,16 +47,20 @@ static const struct lull_param params[P_COUNT] = {
     [P_PPD] = GP_PARAM_PPD,
 };
 
+struct frame {
+    atomic_flag warned;    /* of planes that say nothing about noise: once per frame */
+    atomic_flag held;      /* likewise, of blocks that wait for light alone */
+    struct gp_means means; /* without HALF */
+    struct lull_rect area; /* around all blocks */
+    struct ggn_meter_room room;
+    struct ggn_meter *meter; /* [workers] */
+    uint32_t workers;
+};
+
 struct lull_instance {
     struct lull_kit kit;
     struct gp_viewer viewer;
-    atomic_flag warned;     /* of planes that say nothing about noise: once per frame */
-    atomic_flag held;       /* likewise, of blocks that wait for light alone */
-    struct gp_means means;  /* of a frame without HALF */
-    uint32_t workers;       /* of the open frame */
-    struct lull_rect frame; /* around all blocks */
-    struct ggn_meter_room room;
-    struct ggn_meter *worker; /* owns */
+    struct frame frame;
 };
 
 /* A side of what surrounds a small block: WINDOW pixels about it, as far as the frame reaches. */
@@ -162,7 +166,7 @@ static double verdict_on(struct lull_instance *in, const struct lull_view *view,
 {
     const int structure = !differ && gp_pair_has_structure(w->rgb[0], (size_t)lull_kit_pixels(b));
     const double error = error_of(in, view, b, gp_rect_of(b), differ, split, w);
-    return isnan(error) ? gp_error_of_same(&in->kit, structure, &in->warned, same, tally) : error;
+    return isnan(error) ? gp_error_of_same(&in->kit, structure, &in->frame.warned, same, tally) : error;
 }
 
 static double split_of(const struct lull_block *b) { return 0.5 * seq_half_scale((double)b->spp, (double)b->half_spp); }
@@ -172,7 +176,7 @@ static double error_of_halves(struct lull_instance *in, const struct lull_view *
 {
     if (!gp_has_halves(b)) {
         gp_say_once(
-            &in->kit, LULL_LOG_WARNING, &in->warned,
+            &in->kit, LULL_LOG_WARNING, &in->frame.warned,
             "observer: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped "
             "by it");
         tally->early = 1;
@@ -189,8 +193,9 @@ static double error_of_halves(struct lull_instance *in, const struct lull_view *
 static int has_room(const struct lull_instance *in, struct lull_rect area)
 {
     const int32_t width = area.x1 - area.x0, height = area.y1 - area.y0;
-    return width > 0 && height > 0 && width <= in->room.width && (size_t)width * (size_t)height <= in->room.pixels &&
-           ggn_visible_patches(width, height) <= in->room.patches;
+    return width > 0 && height > 0 && width <= in->frame.room.width &&
+           (size_t)width * (size_t)height <= in->frame.room.pixels &&
+           ggn_visible_patches(width, height) <= in->frame.room.patches;
 }
 
 /* The error of an area around a block; 0 where it is the block, or tells of no noise. */
@@ -213,14 +218,14 @@ static double error_around(struct lull_instance *in, const struct lull_view *vie
                            struct ggn_meter *w)
 {
     const struct lull_rect own = gp_rect_of(b);
-    return view->all ? error_of_area(in, view, b, window_of(&in->frame, own), w) / AROUND : 0;
+    return view->all ? error_of_area(in, view, b, window_of(&in->frame.area, own), w) / AROUND : 0;
 }
 
 /* What a block shows together with the pixels at its edges, where light of those may reach over them unmet; 0 elsewhere. */
 static double error_at_edges(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                              struct ggn_meter *w)
 {
-    const struct lull_rect own = gp_rect_of(b), area = border_of(&in->frame, own);
+    const struct lull_rect own = gp_rect_of(b), area = border_of(&in->frame.area, own);
     if (!has_room(in, area) || !view->all || !lull_kit_plane(view, LULL_PLANE_MOMENT2) || b->spp < 2)
         return 0;
     gp_pair_of_moments(&in->kit, view, b, area, 1, w->rgb);
@@ -230,7 +235,7 @@ static double error_at_edges(struct lull_instance *in, const struct lull_view *v
 static double error_of_means(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                              struct ggn_meter *w, struct lull_kit_tally *tally)
 {
-    int known, differ = gp_pair_of_means(&in->kit, view, b, &in->means, w->rgb, tally, &known);
+    int known, differ = gp_pair_of_means(&in->kit, view, b, &in->frame.means, w->rgb, tally, &known);
 
     if (!known) {
         tally->early = 1;
@@ -245,21 +250,21 @@ static double error_of_means(struct lull_instance *in, const struct lull_view *v
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                   struct lull_decision *d, uint32_t worker)
 {
-    struct ggn_meter *w = &in->worker[worker < in->workers ? worker : 0];
+    struct ggn_meter *w = &in->frame.meter[worker < in->frame.workers ? worker : 0];
     struct lull_kit_tally tally = {0};
     double error = (double)NAN;
 
     if (b->spp < in->kit.need.first_spp)
         tally.early = 1;
     else
-        error = (in->means.count ? error_of_means : error_of_halves)(in, view, b, w, &tally);
+        error = (in->frame.means.count ? error_of_means : error_of_halves)(in, view, b, w, &tally);
     /* What surrounds a block, and what it may not have met, is read where it matters: before a stop, and where the answer is
      * all that is wanted. */
-    if (!in->means.count && (error <= in->viewer.stop_error || (b->flags & LULL_BLOCK_FINAL && !isnan(error)))) {
+    if (!in->frame.means.count && (error <= in->viewer.stop_error || (b->flags & LULL_BLOCK_FINAL && !isnan(error)))) {
         const double around = fmax(error_around(in, view, b, w), error_at_edges(in, view, b, w));
         const double seen = fmax(error, around), unmet = gp_undersampled_error(&in->kit, view, b);
         if (seen <= in->viewer.stop_error && unmet > in->viewer.stop_error)
-            gp_say_once(&in->kit, LULL_LOG_INFO, &in->held,
+            gp_say_once(&in->kit, LULL_LOG_INFO, &in->frame.held,
                         "blocks below 100x100 pixels go on though no noise is seen: a few samples like their "
                         "brightest would be");
         error = fmax(seen, unmet);
@@ -271,150 +276,87 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
         d->p_noisy = ggn_observer_p_noisy(&ggn_observer_default, d->error);
 }
 
-/* As lull_kit_evaluate; a call that failed leaves no trace in the means. */
-static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
-                        uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
-                        struct lull_error *err)
+static void keep(struct lull_instance *in, const struct lull_block *b)
 {
-    int32_t status = lull_kit_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
-
-    for (uint32_t i = 0; i < count && !status && in->means.count; i++) {
-        const struct lull_block *b = lull_kit_at(blocks, block_stride, i);
-        if (b->spp >= in->kit.need.first_spp)
-            gp_means_commit(&in->means, b->id);
-    }
-    return status;
+    if (in->frame.means.count && b->spp >= in->kit.need.first_spp)
+        gp_means_commit(&in->frame.means, b->id);
 }
 
-static void workers_release(struct ggn_meter *worker, uint32_t count)
+static void frame_release(void *data)
 {
-    for (uint32_t i = 0; worker && i < count; i++)
-        ggn_meter_release(&worker[i]);
-    free(worker);
-}
-
-/* NULL without memory. */
-static struct ggn_meter *workers_create(uint32_t count, const struct ggn_meter_room *room)
-{
-    struct ggn_meter *worker = calloc(count, sizeof *worker);
-    for (uint32_t i = 0; worker && i < count; i++)
-        if (ggn_meter_init(&worker[i], room, NULL)) {
-            workers_release(worker, count);
-            return NULL;
-        }
-    return worker;
-}
-
-static void frame_release(struct lull_instance *in)
-{
-    workers_release(in->worker, in->workers);
-    gp_means_release(&in->means);
-    in->worker = NULL;
-    in->workers = 0;
+    struct frame *f = data;
+    for (uint32_t i = 0; i < f->workers; i++)
+        ggn_meter_release(&f->meter[i]);
+    free(f->meter);
+    gp_means_release(&f->means);
 }
 
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
 {
     if (!has_room(in, gp_rect_of(b)) ||
-        (in->means.count && (size_t)lull_kit_pixels(b) * 3 != gp_means_values(&in->means, b->id)))
+        (in->frame.means.count && (size_t)lull_kit_pixels(b) * 3 != gp_means_values(&in->frame.means, b->id)))
         return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
     return LULL_OK;
 }
 
-static const struct lull_kit_rule rule;
-
-static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
-                      struct lull_instance **instance, struct lull_error *err)
+static int32_t init(struct lull_instance *in, const void *own, const char *const *text, struct lull_error *err)
 {
-    struct lull_instance *in = NULL;
-    int32_t status = lull_kit_create(&rule, &ggn_plugin_observer, sizeof *in, host, pairs, pair_count, pair_stride, NULL,
-                                     instance ? &in : NULL, err);
-
-    if (status)
-        return status;
-    atomic_flag_clear(&in->warned);
+    (void)own;
+    (void)text;
+    (void)err;
     gp_viewer_init(&in->viewer, in->kit.value, P_VISIBLE, P_ERROR, P_FPS, P_PPD);
     in->kit.need.halo = WINDOW / 2;
-    *instance = in;
     return LULL_OK;
 }
 
 static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
 {
-    int32_t status = lull_kit_frame_check(in, frame, err);
-    struct ggn_meter_room room = {0};
-    struct ggn_meter *worker = NULL;
-    struct gp_means means = {0};
-
-    if (status)
-        return status;
-    const struct lull_rect all = gp_rect_of_frame(frame);
     const uint32_t workers = lull_kit_workers(&in->kit);
+    struct frame fresh = {.area = gp_rect_of_frame(frame), .meter = calloc(workers, sizeof *fresh.meter)};
+    int good = fresh.meter != NULL;
+
     for (uint32_t i = 0; i < frame->block_count; i++) {
-        const struct lull_rect own = *lull_kit_rect(frame, i), around[] = {window_of(&all, own), border_of(&all, own)};
+        const struct lull_rect own = *lull_kit_rect(frame, i),
+                               around[] = {window_of(&fresh.area, own), border_of(&fresh.area, own)};
         for (int k = 0; k < 2; k++)
-            ggn_meter_make_room(&room, around[k].x1 - around[k].x0, around[k].y1 - around[k].y0);
+            ggn_meter_make_room(&fresh.room, around[k].x1 - around[k].x0, around[k].y1 - around[k].y0);
     }
-    if (!(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)))
-        status = gp_means_create(&means, frame, err);
-    if (!status && !(worker = workers_create(workers, &room)))
+    int32_t status = frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF) ? LULL_OK : gp_means_create(&fresh.means, frame, err);
+    while (good && fresh.workers < workers)
+        good = !ggn_meter_init(&fresh.meter[fresh.workers++], &fresh.room, NULL);
+    if (!status && !good)
         status = lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: out of memory");
-    if (status) {
-        gp_means_release(&means);
-        return status;
-    }
-    frame_release(in);
-    in->room = room;
-    in->worker = worker;
-    in->workers = workers;
-    in->means = means;
-    in->frame = all;
-    atomic_flag_clear(&in->warned);
-    atomic_flag_clear(&in->held);
-    lull_kit_frame_open(in, frame);
-    if (in->means.count)
+    status = gp_frame_open(in, frame, &fresh, status);
+    if (!status && in->frame.means.count)
         gp_log(&in->kit, LULL_LOG_INFO, "observer: no plane HALF: noise is told from how the mean changes between checks");
-    return LULL_OK;
+    return status;
 }
 
-static void end_frame(struct lull_instance *in)
+/* Of a frame with HALF nothing is saved. */
+static int32_t save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {
-    if (!in)
-        return;
-    frame_release(in);
-    lull_kit_end_frame(in);
+    return gp_means_save(&in->frame.means, writer, err);
 }
 
-static void destroy(struct lull_instance *in)
+static int32_t load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
 {
-    end_frame(in);
-    lull_kit_destroy(in);
+    return gp_means_load(&in->frame.means, reader, err);
 }
 
-static const struct lull_kit_rule rule = {
-    .planes_required = COLOR, .planes_used = PLANES, .first_spp = "first-spp", .judge = judge, .check = check_block};
+static const struct gp_rule rule = {
+    .kit = {.planes_required = COLOR, .planes_used = PLANES, .first_spp = "first-spp", .judge = judge, .check = check_block},
+    .size = sizeof(struct lull_instance),
+    .frame_at = offsetof(struct lull_instance, frame),
+    .frame_size = sizeof(struct frame),
+    .init = init,
+    .begin_frame = begin_frame,
+    .frame_release = frame_release,
+    .keep = keep,
+    .save = save,
+    .load = load,
+};
 
-/* State: of a frame with HALF there is none. */
-
-static int32_t state_save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
-{
-    int32_t status = gp_save_check(in, writer, err);
-    return status ? status : gp_means_save(&in->means, writer, err);
-}
-
-static int32_t state_load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
-{
-    int32_t status = gp_load_check(in, reader, err);
-    return status ? status : gp_means_load(&in->means, reader, err);
-}
-
-static const struct lull_state state = {.struct_size = sizeof state, .save = state_save, .load = state_load};
-
-static const void *get_extension(const char *id) { return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL; }
-
-const struct lull_criterion ggn_plugin_observer =
-    GP_TABLE(.version = "1.1", .create = create, .begin_frame = begin_frame, .evaluate = evaluate, .end_frame = end_frame,
-             .destroy = destroy, .get_extension = get_extension, .id = "observer", .name = "Model observer",
+GP_CRITERION(ggn_plugin_observer, &rule, NULL, .version = "1.1", .id = "observer", .name = "Model observer",
              .description =
                  "Noise that people would see, from the two halves of the samples (without half buffers, from how the\n"
                  "mean changes between checks) and from their second moments: lightness, slightly blurred and pooled so\n"

@@ -52,24 +52,6 @@ struct ggn_display gp_display_of(const struct lull_kit *kit)
     return d;
 }
 
-int32_t gp_save_check(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
-{
-    if (writer && !LULL_HAS(struct lull_writer, writer, write))
-        return lull_kit_fail(err, LULL_E_VERSION, "save: the host's struct is older than version 1.0");
-    if (!in || !writer || !writer->write)
-        return lull_kit_fail(err, LULL_E_INVALID, "save: an argument is missing");
-    return lull_kit_read_of(in)->block_count ? LULL_OK : lull_kit_fail(err, LULL_E_STATE, "save: no frame is open");
-}
-
-int32_t gp_load_check(const struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
-{
-    if (reader && !LULL_HAS(struct lull_reader, reader, read))
-        return lull_kit_fail(err, LULL_E_VERSION, "load: the host's struct is older than version 1.0");
-    if (!in || !reader || !reader->read)
-        return lull_kit_fail(err, LULL_E_INVALID, "load: an argument is missing");
-    return lull_kit_read_of(in)->block_count ? LULL_OK : lull_kit_fail(err, LULL_E_STATE, "load: no frame is open");
-}
-
 float gp_shown(const struct lull_kit *kit, double radiance)
 {
     double v = kit->exposure * radiance;

@@ -35,8 +35,4 @@ struct ggn_display gp_display_of(const struct lull_kit *kit);
 /* The light that a display sends, in [0, 1], relative to its white. */
 float gp_shown(const struct lull_kit *kit, double radiance);
 
-/* Arguments of lull.state/1: a struct of this version's size or longer, nothing missing, an open frame. */
-int32_t gp_save_check(const struct lull_instance *instance, const struct lull_writer *writer, struct lull_error *err);
-int32_t gp_load_check(const struct lull_instance *instance, const struct lull_reader *reader, struct lull_error *err);
-
 #endif

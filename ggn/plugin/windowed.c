@@ -1,46 +1,59 @@
+#define _GNU_SOURCE /* dladdr */
 #include "plugin/windowed.h"
 
+#include <dlfcn.h>
+#include <unistd.h>
+
 #include "model/setting.h"
-#include "plugin/model_path.h"
 #include "plugin/translate.h"
 
-static const struct lull_kit_rule rule;
-
-/* The model that the first parameter names, or the default one. */
-static int32_t load_model(struct lull_instance *in, int kind, const char *id, const char *path, struct lull_error *err)
+int gp_model_find(const char *name, const char *variable, char *path, size_t room)
 {
+    /* a prefix has us in lib/lull or lib/TRIPLET/lull; the tree in build/lib/lull and build/MODE/lib/lull */
+    static const char *const places[] = {
+        ".", "../share/lull", "../../share/lull", "../../../share/lull", "../../../ggn/models", "../../../../ggn/models"};
+    static const char anchor = 0; /* an address inside this shared object */
+    const char *named = variable ? getenv(variable) : NULL;
+    char folder[4096] = ".";
+    Dl_info info;
+
+    if (named && *named) {
+        snprintf(path, room, "%s", named);
+        return 1;
+    }
+    if (dladdr(&anchor, &info) && info.dli_fname) {
+        const char *slash = strrchr(info.dli_fname, '/');
+        if (slash)
+            snprintf(folder, sizeof folder, "%.*s", (int)(slash - info.dli_fname), info.dli_fname);
+    }
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
+        int n = snprintf(path, room, "%s/%s/%s", folder, places[i], name);
+        if (n > 0 && (size_t)n < room && access(path, R_OK) == 0)
+            return 1;
+    }
+    snprintf(path, room,
+             "no %s beside %.200s, in share/lull of its prefix or the source tree's ggn/models; give model=FILE%s%s", name,
+             info.dli_fname ? info.dli_fname : "the criterion", variable ? " or set " : "", variable ? variable : "");
+    return 0;
+}
+
+static int32_t init(struct lull_instance *in, const void *own, const char *const *text, struct lull_error *err)
+{
+    const char *path = text[0];
     char name[64], found[5000];
 
+    in->ops = own;
+    in->key = UINT32_C(2166136261);
     if (!path) {
-        snprintf(name, sizeof name, "%s.ggn", in->ops->model ? in->ops->model : id);
+        snprintf(name, sizeof name, "%s.ggn", in->ops->model);
         if (!gp_model_find(name, in->ops->variable, found, sizeof found))
             return lull_kit_fail(err, LULL_E_VALUE, "model: %.480s", found);
         path = found;
     }
-    return in->ops->load(in, kind, path, err);
+    return in->ops->load(in, path, err);
 }
 
-int32_t gp_windowed_create(const struct gp_block_view_ops *ops, int kind, const struct lull_criterion *table,
-                           const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count,
-                           uint32_t pair_stride, struct lull_instance **instance, struct lull_error *err)
-{
-    const char *text[LULL_KIT_PARAM_MAX];
-    struct lull_instance *in = NULL;
-    int32_t status =
-        lull_kit_create(&rule, table, sizeof *in, host, pairs, pair_count, pair_stride, text, instance ? &in : NULL, err);
-
-    if (status)
-        return status;
-    in->ops = ops;
-    in->key = UINT32_C(2166136261);
-    status = load_model(in, kind, table->id, text[0], err);
-    if (status) {
-        gp_windowed_destroy(in);
-        return status;
-    }
-    *instance = in;
-    return LULL_OK;
-}
+static void release(struct lull_instance *in) { in->ops->model_destroy(in->model); }
 
 void gp_windowed_hash(struct lull_instance *in, const void *data, size_t size)
 {
@@ -71,35 +84,30 @@ void gp_windowed_ready(struct lull_instance *in, const struct lull_param *params
     need->bytes_per_block = gp_history_block_bytes(in->rule.window, in->ops->slot(in, width, height));
 }
 
-static void workers_release(const struct gp_block_view_ops *ops, void **worker, uint32_t count)
+static void frame_release(void *data)
 {
-    for (uint32_t i = 0; worker && i < count; i++)
-        ops->worker_destroy(worker[i]);
-    free(worker);
+    struct gp_windowed_frame *f = data;
+    gp_history_release(&f->history);
+    gp_means_release(&f->means);
+    for (uint32_t i = 0; i < f->workers; i++)
+        f->ops->worker_release(f->worker + i * f->ops->worker_size);
+    free(f->worker);
 }
 
 /* Scratch for as many workers as can be busy. */
-static int32_t workers_create(const struct lull_instance *in, uint32_t count, const struct ggn_meter_room *room, void ***out,
+static int32_t workers_create(struct gp_windowed_frame *f, const struct lull_instance *in, const struct ggn_meter_room *room,
                               struct lull_error *err)
 {
     struct base_err error = {.code = BASE_ENOMEM, .text = "out of memory"};
-    void **worker = calloc(count, sizeof *worker);
-    int good = worker != NULL;
+    const uint32_t count = lull_kit_workers(&in->kit);
+    const size_t size = in->ops->worker_size;
+    int rc;
 
-    for (uint32_t i = 0; i < count && good; i++)
-        good = (worker[i] = in->ops->worker_create(in, room, &error)) != NULL;
-    *out = worker;
-    if (good)
-        return LULL_OK;
-    workers_release(in->ops, worker, count);
-    return gp_fail_from(err, LULL_E_IO, "begin_frame", &error);
-}
-
-static void frame_release(struct lull_instance *in)
-{
-    gp_history_release(&in->history);
-    gp_means_release(&in->means);
-    workers_release(in->ops, in->worker, in->workers);
+    f->worker = calloc(count, size);
+    rc = f->worker ? 0 : BASE_ENOMEM;
+    while (!rc && f->workers < count)
+        rc = in->ops->worker_init(f->worker + f->workers++ * size, in, room, &error);
+    return rc ? gp_fail_from(err, LULL_E_IO, "begin_frame", &error) : LULL_OK;
 }
 
 /* What the model has not learned with. */
@@ -107,7 +115,7 @@ static void log_setting(const struct lull_instance *in, const struct lull_frame 
 {
     const struct lull_requirements *need = &in->kit.need;
     const struct ggn_setting learned = {(int)need->block_width, (int)need->block_height, GGN_TRANSFER_SRGB};
-    struct ggn_setting here = {0, 0, in->display.transfer};
+    struct ggn_setting here = {0, 0, gp_display_of(&in->kit).transfer};
     char difference[200], text[400];
 
     for (uint32_t i = 0; i < frame->block_count; i++) {
@@ -121,73 +129,37 @@ static void log_setting(const struct lull_instance *in, const struct lull_frame 
     gp_log(&in->kit, in->rule.reach > 0 ? LULL_LOG_DEBUG : LULL_LOG_WARNING, text);
 }
 
-int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
+static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
 {
-    struct gp_history history = {0};
-    struct gp_means means = {0};
-    void **worker;
-    int32_t status = lull_kit_frame_check(in, frame, err);
-
-    if (status)
-        return status;
-    const uint32_t count = lull_kit_workers(&in->kit);
     const size_t bytes_per_pixel = 1024; /* more than history and scratch need of either */
+    struct gp_windowed_frame fresh = {.ops = in->ops};
     struct ggn_meter_room room = {0};
+
     for (uint32_t i = 0; i < frame->block_count; i++) {
         const struct lull_rect *r = lull_kit_rect(frame, i);
         ggn_meter_make_room(&room, r->x1 - r->x0, r->y1 - r->y0);
     }
     if (room.pixels > PTRDIFF_MAX / bytes_per_pixel)
         return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: a block is too large for memory");
-    status = workers_create(in, count, &room, &worker, err);
+    int32_t status = workers_create(&fresh, in, &room, err);
+    if (!status)
+        status = gp_history_create(&fresh.history, in->rule.window, frame, in->ops->slot, in, err);
+    if (!status && in->rule.reach > 0 && !(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)))
+        status = gp_means_create(&fresh.means, frame, err);
+    status = gp_frame_open(in, frame, &fresh, status);
     if (status)
         return status;
-    status = gp_history_create(&history, in->rule.window, frame, in->ops->slot, in, err);
-    if (!status && in->rule.reach > 0 && !(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)))
-        status = gp_means_create(&means, frame, err);
-    if (status) {
-        gp_history_release(&history);
-        workers_release(in->ops, worker, count);
-        return status;
-    }
-    frame_release(in);
-    in->history = history;
-    in->means = means;
-    atomic_flag_clear(&in->warned);
-    atomic_flag_clear(&in->late);
-    in->worker = worker;
-    in->workers = count;
-    lull_kit_frame_open(in, frame);
-    if (in->means.count)
+    if (in->frame.means.count)
         gp_log(&in->kit, LULL_LOG_INFO, "ggn: no plane HALF: noise is told from how the mean changes between checks");
-    in->display = gp_display_of(&in->kit);
     log_setting(in, frame);
     return LULL_OK;
-}
-
-void gp_windowed_end_frame(struct lull_instance *in)
-{
-    if (!in)
-        return;
-    frame_release(in);
-    in->worker = NULL;
-    in->workers = 0;
-    lull_kit_end_frame(in);
-}
-
-void gp_windowed_destroy(struct lull_instance *in)
-{
-    if (!in)
-        return;
-    gp_windowed_end_frame(in);
-    in->ops->model_destroy(in->model);
-    lull_kit_destroy(in);
 }
 
 long gp_windowed_read(const struct gp_block_view *seen, uint8_t *out)
 {
     const struct lull_block *b = seen->block;
     const size_t w = (size_t)(b->x1 - b->x0), plane = w * (size_t)(b->y1 - b->y0);
+    const struct ggn_display display = gp_display_of(&seen->in->kit);
     long bad = 0;
     struct lull_kit_span s;
 
@@ -195,8 +167,7 @@ long gp_windowed_read(const struct gp_block_view *seen, uint8_t *out)
         uint8_t *to = out + (size_t)(s.y - b->y0) * w + (size_t)(s.x - b->x0);
         for (int32_t i = 0; i < s.count; i++)
             for (int c = 0; c < 3; c++)
-                to[(size_t)c * plane + (size_t)i] =
-                    ggn_preprocess(s.value[LULL_PLANE_COLOR][i][c], &seen->in->display, &bad);
+                to[(size_t)c * plane + (size_t)i] = ggn_preprocess(s.value[LULL_PLANE_COLOR][i][c], &display, &bad);
     }
     return bad;
 }
@@ -215,18 +186,19 @@ static void log_late(struct lull_instance *in, const struct ggn_stopper *before,
         text, sizeof text,
         "the model is asked at %llu samples behind %.0f, where it has learned %.0f: the host's checks are further apart",
         (unsigned long long)spp, last, next);
-    gp_say_once(&in->kit, LULL_LOG_WARNING, &in->late, text);
+    gp_say_once(&in->kit, LULL_LOG_WARNING, &in->frame.late, text);
 }
 
-/* Fills in->history.block[b->id].pending with the verdict on a checked block. */
+/* Fills in->frame.history.block[b->id].pending with the verdict on a checked block. */
 static void read_block(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, uint32_t worker)
 {
-    struct gp_head *head = &in->history.block[b->id].pending;
-    struct gp_block_view seen = {in, view, b, head, in->worker[worker < in->workers ? worker : 0]};
+    struct gp_head *head = &in->frame.history.block[b->id].pending;
+    void *scratch = in->frame.worker + (worker < in->frame.workers ? worker : 0) * in->ops->worker_size;
+    struct gp_block_view seen = {in, view, b, head, scratch};
     struct ggn_evidence evidence = in->ops->evidence;
 
     evidence.data = &seen;
-    *head = in->history.block[b->id].head;
+    *head = in->frame.history.block[b->id].head;
     const struct ggn_stopper before = head->stopper;
     const int what = ggn_stopper_ask(&in->rule, &head->stopper, b->spp);
     if (what == GGN_LOOK_IMAGE)
@@ -246,7 +218,7 @@ static void read_block(struct lull_instance *in, const struct lull_view *view, c
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                   struct lull_decision *d, uint32_t worker)
 {
-    const struct gp_head *head = &in->history.block[b->id].pending;
+    const struct gp_head *head = &in->frame.history.block[b->id].pending;
     const struct ggn_verdict *v = &head->stopper.verdict;
 
     read_block(in, view, b, worker);
@@ -260,62 +232,58 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
 
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
 {
-    return gp_check_block(b, &in->history.block[b->id].rect, in->history.block[b->id].head.stopper.asked_spp, err);
+    return gp_check_block(b, &in->frame.history.block[b->id].rect, in->frame.history.block[b->id].head.stopper.asked_spp,
+                          err);
 }
 
-int32_t gp_windowed_evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
-                             uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride,
-                             uint32_t count, struct lull_error *err)
+static void keep(struct lull_instance *in, const struct lull_block *b)
 {
-    int32_t status = lull_kit_evaluate(in, view, blocks, block_stride, decisions, decision_stride, count, err);
+    struct gp_history_block *of = &in->frame.history.block[b->id];
 
-    for (uint32_t i = 0; i < count && !status; i++) { /* a call that failed leaves no trace */
-        const struct lull_block *b = lull_kit_at(blocks, block_stride, i);
-        if (in->means.count && in->history.block[b->id].pending.measured)
-            gp_means_commit(&in->means, b->id);
-        in->history.block[b->id].head = in->history.block[b->id].pending;
-    }
-    return status;
+    if (in->frame.means.count && of->pending.measured)
+        gp_means_commit(&in->frame.means, b->id);
+    of->head = of->pending;
 }
 
-static const struct lull_kit_rule rule = {
-    .planes_required = LULL_PLANE_BIT(LULL_PLANE_COLOR),
-    .planes_used = LULL_PLANE_BIT(LULL_PLANE_COLOR),
-    .judge = judge,
-    .check = check_block,
-};
-
-static int32_t state_save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
+static int32_t save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {
-    int32_t status = gp_save_check(in, writer, err);
-    if (!status)
-        status = gp_history_save(&in->history, in->key, writer, err);
-    return status ? status : gp_means_save(&in->means, writer, err);
+    int32_t status = gp_history_save(&in->frame.history, in->key, writer, err);
+    return status ? status : gp_means_save(&in->frame.means, writer, err);
 }
 
-static int32_t state_load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
+static int32_t load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
 {
-    struct gp_history history = {0};
-    int32_t status = gp_load_check(in, reader, err);
-
-    if (status)
-        return status;
+    struct gp_history *open = &in->frame.history, history = {0};
     struct lull_frame frame = {
-        .blocks = &in->history.block->rect, .block_count = in->history.count, .block_stride = sizeof *in->history.block};
-    status = gp_history_create(&history, in->rule.window, &frame, in->ops->slot, in, err);
+        .blocks = &open->block->rect, .block_count = open->count, .block_stride = sizeof *open->block};
+    int32_t status = gp_history_create(&history, in->rule.window, &frame, in->ops->slot, in, err);
+
     if (!status)
         status = gp_history_load(&history, &in->rule, in->key, reader, err);
     if (!status)
-        status = gp_means_load(&in->means, reader, err);
+        status = gp_means_load(&in->frame.means, reader, err);
     if (status) {
         gp_history_release(&history);
         return status;
     }
-    gp_history_release(&in->history);
-    in->history = history;
+    gp_history_release(open);
+    *open = history;
     return LULL_OK;
 }
 
-static const struct lull_state state = {.struct_size = sizeof state, .save = state_save, .load = state_load};
-
-const void *gp_windowed_get_extension(const char *id) { return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL; }
+const struct gp_rule gp_windowed_rule = {
+    .kit = {.planes_required = LULL_PLANE_BIT(LULL_PLANE_COLOR),
+            .planes_used = LULL_PLANE_BIT(LULL_PLANE_COLOR),
+            .judge = judge,
+            .check = check_block},
+    .size = sizeof(struct lull_instance),
+    .frame_at = offsetof(struct lull_instance, frame),
+    .frame_size = sizeof(struct gp_windowed_frame),
+    .init = init,
+    .release = release,
+    .begin_frame = begin_frame,
+    .frame_release = frame_release,
+    .keep = keep,
+    .save = save,
+    .load = load,
+};

@@ -27,23 +27,36 @@ struct gp_block_view {
     void *worker;
 };
 
-/* What such a criterion keeps of a block and computes from it; static. */
+/* What such a criterion keeps of a block and computes from it; static. Its GP_CRITERION: gp_windowed_rule and this; the first
+ * parameter is the file of the model. */
 struct gp_block_view_ops {
-    const char *model,
-        *variable; /* MODEL.ggn by default (NULL: named as the criterion), or what this variable names (NULL: none) */
+    const char *model, *variable; /* MODEL.ggn by default, or what this variable names (NULL: none) */
+    int kind;                     /* for load */
     /* Reads the model file: in->model, in->rule, gp_windowed_ready. What it made before it failed is destroyed. */
-    int32_t (*load)(struct lull_instance *in, int kind, const char *path, struct lull_error *err);
+    int32_t (*load)(struct lull_instance *in, const char *path, struct lull_error *err);
     /* What its slots hold; of: the instance. */
     struct gp_slot (*slot)(const void *of, int32_t width, int32_t height);
-    /* Scratch of one worker for blocks that `room` has been made for. NULL on failure. */
-    void *(*worker_create)(const struct lull_instance *in, const struct ggn_meter_room *room, struct base_err *err);
-    void (*worker_destroy)(void *worker); /* NULL is allowed */
-    void (*model_destroy)(void *model);   /* NULL is allowed */
+    /* Scratch of one worker, of zeros, for blocks that `room` has been made for; a failure may leave it half made. */
+    size_t worker_size;
+    int (*worker_init)(void *worker, const struct lull_instance *in, const struct ggn_meter_room *room,
+                       struct base_err *err);
+    void (*worker_release)(void *worker);
+    void (*model_destroy)(void *model); /* NULL is allowed */
     /* Measures the block as it is now, before it is read or judged. NULL: nothing is measured. */
     void (*measure)(const struct gp_block_view *seen);
     /* Puts what is kept of the block's image into `slot`; returns how many values of it were broken. */
     long (*read)(const struct gp_block_view *seen, uint32_t slot);
     struct ggn_evidence evidence; /* its functions are given a struct gp_block_view */
+};
+
+struct gp_windowed_frame {
+    struct gp_history history;
+    struct gp_means means; /* with rule.reach, without HALF */
+    uint32_t workers;
+    unsigned char *worker; /* owns; [workers][ops->worker_size] */
+    const struct gp_block_view_ops *ops;
+    atomic_flag warned; /* of planes that say nothing about noise: once per frame */
+    atomic_flag late;   /* of checks that are too far apart: likewise */
 };
 
 struct lull_instance {
@@ -52,19 +65,11 @@ struct lull_instance {
     void *model;               /* owns, by ops->model_destroy */
     struct ggn_stop_rule rule; /* the model's policy, with the parameters over it */
     uint32_t key;              /* of saved state: a hash of model and policy */
-    struct ggn_display display;
-    struct gp_history history; /* of the open frame */
-    struct gp_means means;     /* likewise; with rule.reach, without HALF */
-    atomic_flag warned;        /* of planes that say nothing about noise: once per frame */
-    atomic_flag late;          /* of checks that are too far apart: likewise */
-    uint32_t workers;
-    void **worker;
+    struct gp_windowed_frame frame;
 };
 
-/* create of such a criterion, whose first parameter is the file of its model. kind: for ops->load. */
-int32_t gp_windowed_create(const struct gp_block_view_ops *ops, int kind, const struct lull_criterion *table,
-                           const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count,
-                           uint32_t pair_stride, struct lull_instance **instance, struct lull_error *err);
+extern const struct gp_rule gp_windowed_rule;
+
 /* The end of ops->load: parameters over the policy, requirements, the key. width, height: blocks that the model was made
  * for. */
 void gp_windowed_ready(struct lull_instance *in, const struct lull_param *params, uint32_t count, int width, int height);
@@ -73,18 +78,10 @@ void gp_windowed_hash(struct lull_instance *in, const void *data, size_t size);
 /* Display codes of the block, [3][height][width]; returns how many values were broken. */
 long gp_windowed_read(const struct gp_block_view *seen, uint8_t *out);
 
-int32_t gp_windowed_begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err);
-int32_t gp_windowed_evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
-                             uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride,
-                             uint32_t count, struct lull_error *err);
-void gp_windowed_end_frame(struct lull_instance *in);
-void gp_windowed_destroy(struct lull_instance *in);
-const void *gp_windowed_get_extension(const char *id);
-
-/* Table of such a criterion; see GP_TABLE. */
-#define GP_WINDOWED_TABLE(...) \
-    GP_TABLE(.version = "1.0", .begin_frame = gp_windowed_begin_frame, .evaluate = gp_windowed_evaluate, \
-             .end_frame = gp_windowed_end_frame, .destroy = gp_windowed_destroy, \
-             .get_extension = gp_windowed_get_extension, __VA_ARGS__)
+/* Where the criterion finds its model when no parameter names one: the first of these that exists goes into path: the one
+ * that the environment variable names (NULL: none); a file of this name beside the shared object; share/lull of the prefix
+ * that it is installed in; ggn/models of the source tree that it was built in. Without any, returns 0 and path holds the list
+ * of places for the message. */
+int gp_model_find(const char *name, const char *variable, char *path, size_t room);
 
 #endif

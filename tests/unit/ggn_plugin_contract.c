@@ -19,7 +19,6 @@
 #include "model/window.h"
 #include "nn/hash.h"
 #include "plugin/criteria.h"
-#include "plugin/model_path.h"
 #include "plugin/windowed.h"
 #include "sequence/tail.h"
 #include "support/approve.h"
@@ -209,8 +208,8 @@ static void follow(const struct lull_criterion *c, const char *path, int is_netw
                     /* an image is denoised once, when the network is first asked about it */
                     uint32_t made = 0;
                     for (int i = 0; is_network && i < WINDOW && !isnan(others[id].stopper.verdict.p); i++)
-                        made |= UINT32_C(1) << in->history.block[id].head.order[i];
-                    assert_int_equal(in->history.block[id].head.made & made, made);
+                        made |= UINT32_C(1) << in->frame.history.block[id].head.order[i];
+                    assert_int_equal(in->frame.history.block[id].head.made & made, made);
                 }
             assert_int_equal(gp_host_evaluate(c, in, levels[k] - 1, 1, d), LULL_E_INVALID); /* fewer samples than before */
         }

@@ -57,11 +57,12 @@ struct sight { /* of a block that is asked about */
     struct lull_kit_tally tally;
 };
 
-struct frame { /* what an open one needs; owns what it points to */
+struct frame {          /* what an open one needs; owns what it points to */
+    atomic_flag warned; /* of halves that are none: once per frame */
     struct gd_form form;
-    uint32_t workers;
     struct gd_look look;
-    struct gd_block_view *seen;  /* [workers] */
+    struct gd_block_view *seen; /* [workers] */
+    uint32_t workers;
     struct lull_rect *rect;      /* [blocks] */
     struct past *past, *pending; /* [blocks] */
     struct sight *sight;         /* [blocks] */
@@ -73,8 +74,7 @@ struct frame { /* what an open one needs; owns what it points to */
 struct lull_instance {
     struct lull_kit kit;
     struct gp_viewer viewer;
-    char *library;      /* owns; NULL: the usual places */
-    atomic_flag warned; /* of halves that are none: once per frame */
+    char *library; /* owns; NULL: the usual places */
     struct frame frame;
 };
 
@@ -87,7 +87,7 @@ static double error_of(struct lull_instance *in, struct gd_block_view *seen, con
     *tally = sight->tally;
     if (sight->halves != GD_HALVES_DIFFER)
         return now->halves = now->crossed =
-                   gp_error_of_same(&in->kit, sight->halves == GD_HALVES_STRUCTURED, &in->warned,
+                   gp_error_of_same(&in->kit, sight->halves == GD_HALVES_STRUCTURED, &in->frame.warned,
                                     "denoised: COLOR and HALF are the same in a block that is not of one colour: HALF must "
                                     "hold a fixed half of the samples",
                                     tally);
@@ -148,7 +148,7 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
         else
             tally.early = 1;
         if (b->spp >= in->kit.need.first_spp && !gp_has_halves(b))
-            gp_say_once(&in->kit, LULL_LOG_WARNING, &in->warned,
+            gp_say_once(&in->kit, LULL_LOG_WARNING, &in->frame.warned,
                         "denoised: HALF holds none or all of a block's samples, so that errors cannot be told; no block is "
                         "stopped by it");
         decide(in, b, &tally, error, now, d);
@@ -178,31 +178,6 @@ static const struct lull_block *block_at(const struct lull_kit_batch *batch, uin
     return lull_kit_at(batch->blocks, batch->block_stride, i);
 }
 
-/* Some blocks of a question. */
-struct some {
-    struct lull_kit_batch batch;
-    const uint32_t *members; /* which */
-};
-
-static void judge_task(void *arg, uint64_t task, uint32_t worker)
-{
-    struct some *some = arg;
-    lull_kit_task(&some->batch, some->members[task], worker);
-}
-
-static int32_t judge_all(const struct lull_kit_batch *batch, const uint32_t *members, uint32_t count, struct lull_error *err)
-{
-    const struct lull_host *host = batch->in->kit.host;
-    struct some some = {*batch, members};
-    if (host && host->parallel_for && count > 0) {
-        int32_t status = host->parallel_for(host, count, judge_task, &some);
-        return status == LULL_OK ? LULL_OK : lull_kit_fail(err, status, "evaluate: the host left out blocks");
-    }
-    for (uint32_t i = 0; i < count; i++)
-        judge_task(&some, i, 0);
-    return LULL_OK;
-}
-
 /* Denoises a group's blocks together, then judges each. */
 static int32_t look_at(struct lull_instance *in, const struct lull_kit_batch *batch, const struct gd_group *group,
                        struct lull_error *err)
@@ -224,7 +199,7 @@ static int32_t look_at(struct lull_instance *in, const struct lull_kit_batch *ba
     }
     if (gd_look_run(&in->frame.look, in->kit.host, &why))
         return gp_fail_from(err, LULL_E_INTERNAL, "evaluate", &why);
-    return judge_all(batch, in->frame.members, count, err);
+    return gp_judge(batch, in->frame.members, count, err);
 }
 
 /* Finds the blocks that must be denoised, each a group of its own, and in members[] the others. Returns how many of each. */
@@ -248,48 +223,43 @@ static uint32_t sort_out(struct lull_instance *in, const struct lull_kit_batch *
     return groups;
 }
 
-/* As lull_kit_evaluate, but denoises neighbours together; fails when blocks could not be denoised. A call that failed leaves
- * no trace. */
-static int32_t evaluate(struct lull_instance *in, const struct lull_view *view, const struct lull_block *blocks,
-                        uint32_t block_stride, struct lull_decision *decisions, uint32_t decision_stride, uint32_t count,
-                        struct lull_error *err)
+/* Denoises neighbours together; fails when blocks could not be denoised. */
+static int32_t answer(const struct lull_kit_batch *batch, struct lull_error *err)
 {
-    const struct lull_kit_batch batch = {in, view, blocks, decisions, block_stride, decision_stride, count};
-    int32_t status = lull_kit_batch_check(&batch, err);
+    struct lull_instance *in = batch->in;
     uint32_t others;
-    if (status != LULL_OK)
-        return status;
-    if (count > in->kit.block_count)
+    if (batch->count > in->kit.block_count)
         return lull_kit_fail(err, LULL_E_INVALID, "evaluate: more blocks than the frame has");
-    uint32_t groups = sort_out(in, &batch, &others);
-    status = judge_all(&batch, in->frame.members, others, err);
-    if (view->all)
+    uint32_t groups = sort_out(in, batch, &others);
+    int32_t status = gp_judge(batch, in->frame.members, others, err);
+    if (batch->view->all)
         groups = gd_cover(in->frame.groups, groups, in->frame.next, in->frame.form.most);
     for (uint32_t g = 0; g < groups && !status; g++)
-        status = look_at(in, &batch, &in->frame.groups[g], err);
-    for (uint32_t i = 0; i < count && !status; i++) {
-        const struct lull_block *b = block_at(&batch, i);
-        const int again = in->frame.past[b->id].spp == b->spp;
-        in->frame.past[b->id] = in->frame.pending[b->id];
-        if (!again)
-            log_response(in, b, &in->frame.past[b->id]);
-    }
+        status = look_at(in, batch, &in->frame.groups[g], err);
     return status;
 }
 
-static void frame_release(struct frame *f)
+static void keep(struct lull_instance *in, const struct lull_block *b)
 {
+    const int again = in->frame.past[b->id].spp == b->spp;
+    in->frame.past[b->id] = in->frame.pending[b->id];
+    if (!again)
+        log_response(in, b, &in->frame.past[b->id]);
+}
+
+static void frame_release(void *data)
+{
+    struct frame *f = data;
     for (uint32_t i = 0; i < f->workers; i++)
         gd_block_view_release(&f->seen[i]);
-    gd_look_close(&f->look);
     free(f->seen);
+    gd_look_close(&f->look);
     free(f->rect);
     free(f->past);
     free(f->sight);
     free(f->asked);
     free(f->groups);
     free(f->next);
-    *f = (struct frame){0};
 }
 
 static int blocks_create(struct frame *f, const struct lull_frame *frame, uint32_t workers, struct base_err *why)
@@ -311,37 +281,21 @@ static int blocks_create(struct frame *f, const struct lull_frame *frame, uint32
     return 0;
 }
 
-static int32_t frame_create(const struct lull_instance *in, const struct lull_frame *frame, struct frame *f,
-                            struct lull_error *err)
-{
-    const uint32_t workers = lull_kit_workers(&in->kit);
-    struct base_err why = {0};
-    *f = (struct frame){
-        .form = gd_form_of(frame, (enum lull_oidn_quality)(LULL_OIDN_FAST + (int)in->kit.value[P_QUALITY]), workers)};
-    int rc = blocks_create(f, frame, workers, &why);
-    if (!rc)
-        rc = gd_look_open(&f->look, &f->form, in->library, &why);
-    while (!rc && f->workers < workers)
-        if (!(rc = gd_block_view_create(&f->seen[f->workers], &f->form, &why)))
-            f->workers++;
-    if (!rc)
-        return LULL_OK;
-    frame_release(f);
-    return gp_fail_from(err, LULL_E_INTERNAL, "begin_frame", &why);
-}
-
 static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
 {
-    struct frame fresh;
-    int32_t status = lull_kit_frame_check(in, frame, err);
-    if (!status)
-        status = frame_create(in, frame, &fresh, err);
+    const enum lull_oidn_quality quality = (enum lull_oidn_quality)(LULL_OIDN_FAST + (int)in->kit.value[P_QUALITY]);
+    const uint32_t workers = lull_kit_workers(&in->kit);
+    struct frame fresh = {.form = gd_form_of(frame, quality, workers)};
+    struct base_err why = {0};
+    int rc = blocks_create(&fresh, frame, workers, &why);
+    if (!rc)
+        rc = gd_look_open(&fresh.look, &fresh.form, in->library, &why);
+    while (!rc && fresh.workers < workers)
+        rc = gd_block_view_create(&fresh.seen[fresh.workers++], &fresh.form, &why);
+    int32_t status = rc ? gp_fail_from(err, LULL_E_INTERNAL, "begin_frame", &why) : LULL_OK;
+    status = gp_frame_open(in, frame, &fresh, status);
     if (status)
         return status;
-    frame_release(&in->frame);
-    in->frame = fresh;
-    atomic_flag_clear(&in->warned);
-    lull_kit_frame_open(in, frame);
     if ((frame->planes & AUXILIARY) != AUXILIARY)
         gp_log(&in->kit, LULL_LOG_WARNING,
                "denoised: without the planes ALBEDO and NORMAL the denoiser blurs textures: "
@@ -353,29 +307,10 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     return LULL_OK;
 }
 
-static void end_frame(struct lull_instance *in)
-{
-    if (!in)
-        return;
-    frame_release(&in->frame);
-    lull_kit_end_frame(in);
-}
-
-static void destroy(struct lull_instance *in)
-{
-    end_frame(in);
-    if (in)
-        free(in->library);
-    lull_kit_destroy(in);
-}
-
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
 {
     return gp_check_block(b, &in->frame.rect[b->id], in->frame.past[b->id].spp, err);
 }
-
-static const struct lull_kit_rule rule = {
-    .planes_required = REQUIRED, .planes_used = REQUIRED | AUXILIARY, .judge = judge, .check = check_block};
 
 /* Drafts are good enough earlier. With these first looks stops are no more often off than with 64 samples for all
  * (docs/results/denoised.md). */
@@ -385,37 +320,27 @@ static uint64_t first_spp(const struct lull_instance *in)
     return (uint64_t)(isnan(given) ? fmin(fmax(128 / in->viewer.stop_error, 16), 64) : given);
 }
 
-static int32_t create(const struct lull_host *host, const struct lull_pair *pairs, uint32_t pair_count, uint32_t pair_stride,
-                      struct lull_instance **instance, struct lull_error *err)
+static int32_t init(struct lull_instance *in, const void *own, const char *const *text, struct lull_error *err)
 {
-    const char *text[LULL_KIT_PARAM_MAX];
-    struct lull_instance *in = NULL;
     struct lull_oidn *oidn = NULL;
     struct base_err why = {0};
-    int32_t status = lull_kit_create(&rule, &ggn_plugin_denoised, sizeof *in, host, pairs, pair_count, pair_stride, text,
-                                     instance ? &in : NULL, err);
-    if (status)
-        return status;
+    (void)own;
     in->library = text[P_LIBRARY] ? strdup(text[P_LIBRARY]) : NULL;
     if (text[P_LIBRARY] && !in->library)
-        status = lull_kit_fail(err, LULL_E_MEMORY, "create: out of memory");
-    else if (lull_oidn_open(in->library, &oidn, &why)) /* else only begin_frame would find that there is none */
-        status = gp_fail_from(err, LULL_E_VALUE, "library", &why);
+        return lull_kit_fail(err, LULL_E_MEMORY, "create: out of memory");
+    if (lull_oidn_open(in->library, &oidn, &why)) /* else only begin_frame would find that there is none */
+        return gp_fail_from(err, LULL_E_VALUE, "library", &why);
     lull_oidn_close(oidn);
-    if (status) {
-        destroy(in);
-        return status;
-    }
-    atomic_flag_clear(&in->warned);
     gp_viewer_init(&in->viewer, in->kit.value, P_VISIBLE, P_ERROR, P_FPS, P_PPD);
     in->kit.need.first_spp = first_spp(in);
     in->kit.need.halo = GD_REACH;
     in->kit.need.checks_hint = 5;
     in->kit.need.bytes_per_block = 2 * sizeof(struct past) + sizeof(struct lull_rect) + sizeof(struct sight) +
                                    sizeof(struct gd_group) + 2 * sizeof(uint32_t) + sizeof(uint8_t);
-    *instance = in;
     return LULL_OK;
 }
+
+static void release(struct lull_instance *in) { free(in->library); }
 
 struct state_header {
     char magic[8];
@@ -427,13 +352,10 @@ static struct state_header header_of(const struct lull_instance *in)
     return (struct state_header){{'d', 'e', 'n', 'o', 'i', 's', 'e', '2'}, in->kit.block_count};
 }
 
-static int32_t state_save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
+static int32_t save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {
-    int32_t status = gp_save_check(in, writer, err);
-    if (status)
-        return status;
     const struct state_header header = header_of(in);
-    status = writer->write(writer, &header, sizeof header);
+    int32_t status = writer->write(writer, &header, sizeof header);
     if (!status)
         status = writer->write(writer, in->frame.past, in->kit.block_count * sizeof *in->frame.past);
     return status ? lull_kit_fail(err, status, "save: the host could not write it") : LULL_OK;
@@ -450,13 +372,9 @@ static int plausible(const struct past *p)
            !(p->flags & ~(LULL_DECISION_TOO_EARLY | LULL_DECISION_BAD_INPUT)) && (!p->next_spp || p->next_spp > p->spp);
 }
 
-static int32_t state_load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
+static int32_t load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
 {
-    int32_t status = gp_load_check(in, reader, err);
-    struct state_header header, wanted;
-    if (status)
-        return status;
-    wanted = header_of(in);
+    struct state_header header, wanted = header_of(in);
     if (reader->read(reader, &header, sizeof header) != LULL_OK || memcmp(&header, &wanted, sizeof header) != 0)
         return lull_kit_fail(err, LULL_E_IO, "load: the state is that of another criterion or frame");
     if (reader->read(reader, in->frame.pending, in->kit.block_count * sizeof *in->frame.pending) != LULL_OK)
@@ -468,13 +386,22 @@ static int32_t state_load(struct lull_instance *in, const struct lull_reader *re
     return LULL_OK;
 }
 
-static const struct lull_state state = {.struct_size = sizeof state, .save = state_save, .load = state_load};
+static const struct gp_rule rule = {
+    .kit = {.planes_required = REQUIRED, .planes_used = REQUIRED | AUXILIARY, .judge = judge, .check = check_block},
+    .size = sizeof(struct lull_instance),
+    .frame_at = offsetof(struct lull_instance, frame),
+    .frame_size = sizeof(struct frame),
+    .init = init,
+    .release = release,
+    .begin_frame = begin_frame,
+    .frame_release = frame_release,
+    .answer = answer,
+    .keep = keep,
+    .save = save,
+    .load = load,
+};
 
-static const void *get_extension(const char *id) { return id && !strcmp(id, LULL_EXT_STATE) ? &state : NULL; }
-
-const struct lull_criterion ggn_plugin_denoised =
-    GP_TABLE(.version = "1.0", .create = create, .begin_frame = begin_frame, .evaluate = evaluate, .end_frame = end_frame,
-             .destroy = destroy, .get_extension = get_extension, .id = "denoised", .name = "Denoised picture",
+GP_CRITERION(ggn_plugin_denoised, &rule, NULL, .version = "1.0", .id = "denoised", .name = "Denoised picture",
              .description =
                  "Error that people would see in the denoised picture, its bias included: both halves of the samples are\n"
                  "denoised (Open Image Denoise) and held against each other and against the other half, noisy. `error`\n"
