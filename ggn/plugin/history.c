@@ -9,37 +9,52 @@ uint64_t gp_history_block_bytes(int window, struct gp_slot slot)
     return (uint64_t)(window + 1) * slot_bytes(slot) + 2 * sizeof(struct gp_head);
 }
 
-int32_t gp_history_create(struct gp_history *history, int window, const struct lull_frame *frame,
-                          struct gp_slot (*slot)(const void *of, int32_t width, int32_t height), const void *of,
+int32_t gp_history_create(struct gp_history *history, const struct gp_history_form *form, const struct lull_frame *frame,
                           struct lull_error *err)
 {
+    const uint64_t slots = (uint64_t)form->window + 1, heads = frame->block_count * sizeof(struct gp_history_block);
     uint64_t bytes = 0;
-    size_t n = frame->block_count;
 
+    *history = (struct gp_history){0};
     for (uint32_t i = 0; i < frame->block_count && bytes <= PTRDIFF_MAX; i++) {
         const struct lull_rect *r = lull_kit_rect(frame, i);
-        bytes += (uint64_t)(window + 1) * slot_bytes(slot(of, r->x1 - r->x0, r->y1 - r->y0));
+        const int32_t width = r->x1 - r->x0, height = r->y1 - r->y0;
+        const int countable = (uint64_t)width * (uint64_t)height <= PTRDIFF_MAX / 64; /* so that no size below overflows */
+        bytes = countable ? bytes + slots * slot_bytes(form->slot(form->of, width, height)) : UINT64_MAX;
     }
-    const uint64_t heads = n * sizeof(struct gp_history_block);
     if (bytes > PTRDIFF_MAX - heads - 64)
         return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: the blocks are too large for memory");
     /* One piece of memory, so that no check allocates and a frame that is too large fails at its beginning. */
     unsigned char *memory = aligned_alloc(64, (size_t)((bytes + heads + 63) & ~(uint64_t)63));
     if (!memory)
-        return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: no memory for the history of %u blocks", frame->block_count);
+        return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: no memory for %s %u blocks", form->what, frame->block_count);
 
-    struct gp_history h = {
-        .window = window, .count = frame->block_count, .block = (void *)(memory + bytes), .bytes = memory};
+    *history =
+        (struct gp_history){.form = *form, .count = frame->block_count, .block = (void *)(memory + bytes), .bytes = memory};
     size_t at = 0;
     for (uint32_t i = 0; i < frame->block_count; i++) {
         const struct lull_rect r = *lull_kit_rect(frame, i);
-        h.block[i] = (struct gp_history_block){.rect = r, .slot = slot(of, r.x1 - r.x0, r.y1 - r.y0), .at = at};
-        at += (size_t)(window + 1) * slot_bytes(h.block[i].slot);
-        for (uint32_t k = 0; k <= (uint32_t)window; k++)
-            h.block[i].head.order[k] = k;
+        struct gp_history_block *b = &history->block[i];
+        *b = (struct gp_history_block){.rect = r, .slot = form->slot(form->of, r.x1 - r.x0, r.y1 - r.y0), .at = at};
+        at += slots * slot_bytes(b->slot);
+        for (uint32_t k = 0; k < slots; k++)
+            b->head.order[k] = k;
     }
-    *history = h;
     return LULL_OK;
+}
+
+int32_t gp_history_like(struct gp_history *fresh, const struct gp_history *h, struct lull_error *err)
+{
+    const struct lull_frame frame = {.blocks = &h->block->rect, .block_count = h->count, .block_stride = sizeof *h->block};
+    return gp_history_create(fresh, &h->form, &frame, err);
+}
+
+int32_t gp_history_take(struct gp_history *history, struct gp_history *fresh, int32_t status)
+{
+    gp_history_release(status ? fresh : history);
+    if (!status)
+        *history = *fresh;
+    return status;
 }
 
 void gp_history_release(struct gp_history *history)
@@ -81,7 +96,7 @@ struct state_header {
 
 static struct state_header header_of(const struct gp_history *h, uint32_t key)
 {
-    struct state_header header = {{0}, key, h->count, (uint32_t)h->window, (uint32_t)sizeof(struct gp_head)};
+    struct state_header header = {{0}, key, h->count, (uint32_t)h->form.window, (uint32_t)sizeof(struct gp_head)};
 
     memcpy(header.magic, MAGIC, sizeof MAGIC);
     return header;
@@ -137,14 +152,17 @@ static int32_t load_blocks(struct gp_history *h, const struct ggn_stop_rule *rul
     return LULL_OK;
 }
 
-int32_t gp_history_load(struct gp_history *h, const struct ggn_stop_rule *rule, uint32_t key,
+int32_t gp_history_load(struct gp_history *fresh, const struct gp_history *h, const struct ggn_stop_rule *rule, uint32_t key,
                         const struct lull_reader *reader, struct lull_error *err)
 {
     struct state_header header, wanted = header_of(h, key);
+    int32_t status = gp_history_like(fresh, h, err);
 
+    if (status)
+        return status;
     if (reader->read(reader, &header, sizeof header))
         return lull_kit_fail(err, LULL_E_IO, "state: it ends early");
     if (memcmp(&header, &wanted, sizeof header))
         return lull_kit_fail(err, LULL_E_IO, "state: saved by another criterion, model, parameter set or frame");
-    return load_blocks(h, rule, reader, err);
+    return load_blocks(fresh, rule, reader, err);
 }

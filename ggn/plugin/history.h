@@ -31,6 +31,15 @@ struct gp_head {
     uint32_t measured;            /* the last call has measured it */
 };
 
+/* Of all blocks. */
+struct gp_history_form {
+    int window;       /* S */
+    const char *what; /* for messages: "the history of" */
+    /* What a slot holds of a block of this size; of: the member below. */
+    struct gp_slot (*slot)(const void *of, int32_t width, int32_t height);
+    const void *of;
+};
+
 struct gp_history_block {
     struct gp_head head, pending;
     struct lull_rect rect;
@@ -39,7 +48,7 @@ struct gp_history_block {
 };
 
 struct gp_history {
-    int window;                     /* S */
+    struct gp_history_form form;
     uint32_t count;                 /* blocks */
     struct gp_history_block *block; /* behind the slots */
     unsigned char *bytes;           /* owns all of it, as one allocation */
@@ -47,11 +56,13 @@ struct gp_history {
 
 /* Bytes of one block with such slots. */
 uint64_t gp_history_block_bytes(int window, struct gp_slot slot);
-/* Copies the rectangles of a checked frame; `slot` says what one of a block of this size holds. LULL_E_MEMORY leaves
- * *history as it was. */
-int32_t gp_history_create(struct gp_history *history, int window, const struct lull_frame *frame,
-                          struct gp_slot (*slot)(const void *of, int32_t width, int32_t height), const void *of,
+/* Copies form and rectangles of a checked frame. After LULL_E_MEMORY *history is zero. */
+int32_t gp_history_create(struct gp_history *history, const struct gp_history_form *form, const struct lull_frame *frame,
                           struct lull_error *err);
+/* Of the same blocks, with no image yet. */
+int32_t gp_history_like(struct gp_history *fresh, const struct gp_history *history, struct lull_error *err);
+/* *fresh, which was filled with this status, takes the place of *history; a failure releases it instead. */
+int32_t gp_history_take(struct gp_history *history, struct gp_history *fresh, int32_t status);
 void gp_history_release(struct gp_history *history);
 
 /* Where a slot begins: `made` bytes, 64-byte aligned, and after them, aligned as far as `made` is, `kept` bytes. */
@@ -62,9 +73,10 @@ void *gp_history_kept(const struct gp_history *h, uint32_t id, uint32_t slot);
  * window until then. */
 uint32_t gp_head_push(struct gp_head *head, int window, uint32_t before);
 
-/* lull.state/1: everything above, checked on the way in. `key` identifies model and parameters. */
+/* lull.state/1: everything above, checked on the way in, into a history of the same blocks that *fresh becomes. `key`
+ * identifies model and parameters. */
 int32_t gp_history_save(const struct gp_history *h, uint32_t key, const struct lull_writer *writer, struct lull_error *err);
-int32_t gp_history_load(struct gp_history *h, const struct ggn_stop_rule *rule, uint32_t key,
+int32_t gp_history_load(struct gp_history *fresh, const struct gp_history *h, const struct ggn_stop_rule *rule, uint32_t key,
                         const struct lull_reader *reader, struct lull_error *err);
 
 #endif

@@ -48,10 +48,10 @@ static const struct lull_param params[P_COUNT] = {
 };
 
 struct frame {
-    atomic_flag warned;    /* of planes that say nothing about noise: once per frame */
-    atomic_flag held;      /* likewise, of blocks that wait for light alone */
-    struct gp_means means; /* without HALF */
-    struct lull_rect area; /* around all blocks */
+    atomic_flag warned;      /* of planes that say nothing about noise: once per frame */
+    atomic_flag held;        /* likewise, of blocks that wait for light alone */
+    struct gp_history means; /* without HALF */
+    struct lull_rect area;   /* around all blocks */
     struct ggn_meter_room room;
     struct ggn_meter *meter; /* [workers] */
     uint32_t workers;
@@ -279,7 +279,7 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
 static void keep(struct lull_instance *in, const struct lull_block *b)
 {
     if (in->frame.means.count && b->spp >= in->kit.need.first_spp)
-        gp_means_commit(&in->frame.means, b->id);
+        in->frame.means.block[b->id].head = in->frame.means.block[b->id].pending;
 }
 
 static void frame_release(void *data)
@@ -288,13 +288,13 @@ static void frame_release(void *data)
     for (uint32_t i = 0; i < f->workers; i++)
         ggn_meter_release(&f->meter[i]);
     free(f->meter);
-    gp_means_release(&f->means);
+    gp_history_release(&f->means);
 }
 
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
 {
-    if (!has_room(in, gp_rect_of(b)) ||
-        (in->frame.means.count && (size_t)lull_kit_pixels(b) * 3 != gp_means_values(&in->frame.means, b->id)))
+    const size_t bytes = 3 * (size_t)lull_kit_pixels(b) * sizeof(float);
+    if (!has_room(in, gp_rect_of(b)) || (in->frame.means.count && bytes != in->frame.means.block[b->id].slot.kept))
         return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
     return LULL_OK;
 }

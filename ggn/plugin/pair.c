@@ -134,7 +134,7 @@ int gp_pair_of_moments(const struct lull_kit *kit, const struct lull_view *view,
 }
 
 int gp_pair_of_means(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
-                     struct gp_means *means, float *const rgb[2], struct lull_kit_tally *tally, int *known)
+                     struct gp_history *means, float *const rgb[2], struct lull_kit_tally *tally, int *known)
 {
     uint64_t spp_base;
     float *keep;

@@ -25,7 +25,7 @@ int gp_pair_of_moments(const struct lull_kit *kit, const struct lull_view *view,
 /* The mean plus and minus its noise, as an earlier mean of the block tells, which is begun to be looked at. *known: whether
  * there is one. */
 int gp_pair_of_means(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *block,
-                     struct gp_means *means, float *const rgb[2], struct lull_kit_tally *tally, int *known);
+                     struct gp_history *means, float *const rgb[2], struct lull_kit_tally *tally, int *known);
 
 /* Whether one picture, [3][pixels], is of more than one colour. */
 int gp_pair_has_structure(const float *rgb, size_t pixels);

@@ -88,7 +88,7 @@ static void frame_release(void *data)
 {
     struct gp_windowed_frame *f = data;
     gp_history_release(&f->history);
-    gp_means_release(&f->means);
+    gp_history_release(&f->means);
     for (uint32_t i = 0; i < f->workers; i++)
         f->ops->worker_release(f->worker + i * f->ops->worker_size);
     free(f->worker);
@@ -132,6 +132,7 @@ static void log_setting(const struct lull_instance *in, const struct lull_frame 
 static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *frame, struct lull_error *err)
 {
     const size_t bytes_per_pixel = 1024; /* more than history and scratch need of either */
+    const struct gp_history_form form = {in->rule.window, "the history of", in->ops->slot, in};
     struct gp_windowed_frame fresh = {.ops = in->ops};
     struct ggn_meter_room room = {0};
 
@@ -143,7 +144,7 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
         return lull_kit_fail(err, LULL_E_MEMORY, "begin_frame: a block is too large for memory");
     int32_t status = workers_create(&fresh, in, &room, err);
     if (!status)
-        status = gp_history_create(&fresh.history, in->rule.window, frame, in->ops->slot, in, err);
+        status = gp_history_create(&fresh.history, &form, frame, err);
     if (!status && in->rule.reach > 0 && !(frame->planes & LULL_PLANE_BIT(LULL_PLANE_HALF)))
         status = gp_means_create(&fresh.means, frame, err);
     status = gp_frame_open(in, frame, &fresh, status);
@@ -241,7 +242,7 @@ static void keep(struct lull_instance *in, const struct lull_block *b)
     struct gp_history_block *of = &in->frame.history.block[b->id];
 
     if (in->frame.means.count && of->pending.measured)
-        gp_means_commit(&in->frame.means, b->id);
+        in->frame.means.block[b->id].head = in->frame.means.block[b->id].pending;
     of->head = of->pending;
 }
 
@@ -253,22 +254,12 @@ static int32_t save(const struct lull_instance *in, const struct lull_writer *wr
 
 static int32_t load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
 {
-    struct gp_history *open = &in->frame.history, history = {0};
-    struct lull_frame frame = {
-        .blocks = &open->block->rect, .block_count = open->count, .block_stride = sizeof *open->block};
-    int32_t status = gp_history_create(&history, in->rule.window, &frame, in->ops->slot, in, err);
+    struct gp_history fresh;
+    int32_t status = gp_history_load(&fresh, &in->frame.history, &in->rule, in->key, reader, err);
 
     if (!status)
-        status = gp_history_load(&history, &in->rule, in->key, reader, err);
-    if (!status)
         status = gp_means_load(&in->frame.means, reader, err);
-    if (status) {
-        gp_history_release(&history);
-        return status;
-    }
-    gp_history_release(open);
-    *open = history;
-    return LULL_OK;
+    return gp_history_take(&in->frame.history, &fresh, status);
 }
 
 const struct gp_rule gp_windowed_rule = {

@@ -51,7 +51,7 @@ struct gp_block_view_ops {
 
 struct gp_windowed_frame {
     struct gp_history history;
-    struct gp_means means; /* with rule.reach, without HALF */
+    struct gp_history means; /* with rule.reach, without HALF */
     uint32_t workers;
     unsigned char *worker; /* owns; [workers][ops->worker_size] */
     const struct gp_block_view_ops *ops;
