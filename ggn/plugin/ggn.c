@@ -10,10 +10,8 @@
 #include "model/measure.h"
 #include "observer/observer.h"
 #include "plugin/pair.h"
-#include "plugin/rect.h"
 #include "plugin/translate.h"
 #include "plugin/windowed.h"
-#include "sequence/simulate.h"
 
 enum { P_MODEL, P_VISIBLE, P_PASSES, P_FIRST_SPP, P_COUNT };
 
@@ -84,50 +82,28 @@ static long read_image(const struct gp_block_view *seen, uint32_t slot)
     return gp_windowed_read(seen, gp_history_kept(&seen->in->frame.history, seen->block->id, slot));
 }
 
-/* The two pictures of the block into the worker's meter. Returns whether they tell anything; *differ: whether they do
- * anywhere, *split: as ggn_measure wants it. */
-static int read_pair(const struct gp_block_view *seen, int *differ, double *split)
-{
-    struct lull_instance *in = seen->in;
-    const struct lull_block *b = seen->block;
-    float *const *rgb = ((const struct worker *)seen->worker)->meter.rgb;
-    struct lull_kit_tally tally = {0};
-
-    *split = 0.5;
-    if (in->frame.means.count) {
-        int known;
-        *differ = gp_pair_of_means(&in->kit, seen->view, b, &in->frame.means, rgb, &tally, &known);
-        return known;
-    }
-    if (!gp_has_halves(b)) {
-        gp_say_once(&in->kit, LULL_LOG_WARNING, &in->frame.warned,
-                    "ggn: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped by "
-                    "it");
-        return 0;
-    }
-    *split *= seq_half_scale((double)b->spp, (double)b->half_spp);
-    *differ = gp_pair_of_halves(&in->kit, seen->view, b, gp_rect_of(b), rgb, &tally);
-    return 1;
-}
-
 static void measure_block(const struct gp_block_view *seen)
 {
     struct lull_instance *in = seen->in;
     const struct lull_block *b = seen->block;
+    const struct gp_sight of = {&in->kit, seen->view, b};
     struct worker *w = seen->worker;
+    float *const *rgb = w->meter.rgb;
     struct lull_kit_tally tally = {0};
     double split;
-    int differ;
 
     w->measure = (struct ggn_measure){.visible = (double)NAN};
-    if (in->rule.reach <= 0 || !read_pair(seen, &differ, &split))
+    if (in->rule.reach <= 0)
+        return;
+    const int differ = gp_pair_of_block(&of, &in->frame.means, "ggn", &in->frame.warned, rgb, &tally, &split);
+    if (differ < 0)
         return;
     memset(w->noise_map, 0, (size_t)lull_kit_pixels(b));
     if (differ)
         ggn_measure(&w->meter, b->x1 - b->x0, b->y1 - b->y0, split, 0, &w->measure, w->noise_map);
     else
         w->measure.visible =
-            gp_error_of_same(&in->kit, gp_pair_has_structure(w->meter.rgb[0], (size_t)lull_kit_pixels(b)), &in->frame.warned,
+            gp_error_of_same(&in->kit, gp_pair_has_structure(rgb[0], (size_t)lull_kit_pixels(b)), &in->frame.warned,
                              "ggn: the planes say that a block has no noise, yet it is not of one colour: "
                              "HALF must hold a fixed half of the samples, COLOR the mean of all",
                              &tally);

@@ -93,6 +93,13 @@ static struct lull_rect border_of(const struct lull_rect *frame, struct lull_rec
         within((int64_t)r.x1 + BORDER, frame->x0, frame->x1), within((int64_t)r.y1 + BORDER, frame->y0, frame->y1)};
 }
 
+/* A block that is asked about. */
+struct question {
+    struct lull_instance *in;
+    struct gp_sight of;
+    struct ggn_meter *w;
+};
+
 static void see_both(struct ggn_meter *w, size_t pixels)
 {
     for (int k = 0; k < 2; k++)
@@ -101,11 +108,11 @@ static void see_both(struct ggn_meter *w, size_t pixels)
 
 /* Visible noise of the two pictures of w, whose difference is made as strong as the noise of the mean by `split`; the
  * texture they share stays in w. *gain: of the noise, where it is that of one frame of many. */
-static double noise_of_difference(const struct lull_instance *in, int width, int height, double split, struct ggn_meter *w,
-                                  double *gain)
+static double noise_of_difference(const struct question *q, int width, int height, double split, double *gain)
 {
     const size_t pixels = (size_t)width * (size_t)height;
-    const struct ggn_viewing *viewing = in->viewer.viewing;
+    const struct ggn_viewing *viewing = q->in->viewer.viewing;
+    struct ggn_meter *w = q->w;
 
     see_both(w, pixels);
     ggn_visible_texture(w->lightness[0], w->lightness[1], width, height, w->scratch, w->texture);
@@ -119,18 +126,18 @@ static double noise_of_difference(const struct lull_instance *in, int width, int
 
 /* Visible noise that second moments let expect before w's texture; 0: they tell of none. One standard deviation to either
  * side of a mean; two, halved, where one lies beyond white, as after two lucky hits of a lamp smaller than the pixel. */
-static double noise_of_moments(const struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                               struct lull_rect area, struct ggn_meter *w)
+static double noise_of_moments(const struct question *q, struct lull_rect area)
 {
     const int width = area.x1 - area.x0, height = area.y1 - area.y0;
     const size_t pixels = (size_t)width * (size_t)height;
+    struct ggn_meter *w = q->w;
 
-    if (!gp_pair_of_moments(&in->kit, view, b, area, 1, w->rgb))
+    if (!gp_pair_of_moments(&q->of, area, 1, w->rgb))
         return 0;
     see_both(w, pixels);
     for (size_t i = 0; i < pixels; i++)
         w->blurred[i] = 0.5f * (w->lightness[0][i] - w->lightness[1][i]);
-    gp_pair_of_moments(&in->kit, view, b, area, 2, w->rgb);
+    gp_pair_of_moments(&q->of, area, 2, w->rgb);
     see_both(w, pixels);
     for (size_t i = 0; i < pixels; i++) {
         const float d = fmaxf(w->blurred[i], 0.25f * (w->lightness[0][i] - w->lightness[1][i]));
@@ -139,20 +146,23 @@ static double noise_of_moments(const struct lull_instance *in, const struct lull
     return ggn_visible_expected(w->blurred, width, height, w->texture, w->scratch);
 }
 
+static int has_moments(const struct question *q)
+{
+    return lull_kit_plane(q->of.view, LULL_PLANE_MOMENT2) && q->of.block->spp >= 2;
+}
+
 /* The error of an area, whose two pictures are in w; differ: anywhere. Where only second moments tell of noise, as when both
  * halves have hit a small lamp equally often, they decide alone. NaN: neither tells of any. */
-static double error_of(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                       struct lull_rect area, int differ, double split, struct ggn_meter *w)
+static double error_of(const struct question *q, struct lull_rect area, int differ, double split)
 {
-    const int width = area.x1 - area.x0, height = area.y1 - area.y0;
-    const int moments = lull_kit_plane(view, LULL_PLANE_MOMENT2) && b->spp >= 2;
+    const int width = area.x1 - area.x0, height = area.y1 - area.y0, moments = has_moments(q);
     double gain, expected = 0;
 
     if (!differ && !moments)
         return (double)NAN;
-    double noise = noise_of_difference(in, width, height, split, w, &gain);
+    double noise = noise_of_difference(q, width, height, split, &gain);
     if (moments)
-        expected = noise_of_moments(in, view, b, area, w);
+        expected = noise_of_moments(q, area);
     if (!differ && expected == 0)
         return (double)NAN;
     if (moments)
@@ -160,109 +170,82 @@ static double error_of(struct lull_instance *in, const struct lull_view *view, c
     return ggn_observer_error(&ggn_observer_default, gain * noise, (size_t)width * (size_t)height);
 }
 
-/* Its error, or that of a block in which nothing tells of noise; `same` is the warning if something should. */
-static double verdict_on(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b, int differ,
-                         double split, const char *same, struct ggn_meter *w, struct lull_kit_tally *tally)
+/* That of the block, or of one in which nothing tells of noise. */
+static double error_of_block(const struct question *q, struct lull_kit_tally *tally)
 {
-    const int structure = !differ && gp_pair_has_structure(w->rgb[0], (size_t)lull_kit_pixels(b));
-    const double error = error_of(in, view, b, gp_rect_of(b), differ, split, w);
-    return isnan(error) ? gp_error_of_same(&in->kit, structure, &in->frame.warned, same, tally) : error;
-}
+    struct frame *f = &q->in->frame;
+    const struct lull_block *b = q->of.block;
+    const char *same = f->means.count ? "observer: COLOR has not changed since an earlier check of a block that is not of "
+                                        "one colour: it must hold the mean of all samples"
+                                      : "observer: COLOR and HALF are the same in a block that is not of one colour: HALF "
+                                        "must hold a fixed half of the samples";
+    double split;
+    const int differ = gp_pair_of_block(&q->of, &f->means, "observer", &f->warned, q->w->rgb, tally, &split);
 
-static double split_of(const struct lull_block *b) { return 0.5 * seq_half_scale((double)b->spp, (double)b->half_spp); }
-
-static double error_of_halves(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                              struct ggn_meter *w, struct lull_kit_tally *tally)
-{
-    if (!gp_has_halves(b)) {
-        gp_say_once(
-            &in->kit, LULL_LOG_WARNING, &in->frame.warned,
-            "observer: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped "
-            "by it");
+    if (differ < 0) {
         tally->early = 1;
         return (double)NAN;
     }
-    int differ = gp_pair_of_halves(&in->kit, view, b, gp_rect_of(b), w->rgb, tally);
-    return verdict_on(in, view, b, differ, split_of(b),
-                      "observer: COLOR and HALF are the same in a block that is not of one colour: HALF must hold a fixed "
-                      "half of the samples",
-                      w, tally);
+    const int structure = !differ && gp_pair_has_structure(q->w->rgb[0], (size_t)lull_kit_pixels(b));
+    const double error = error_of(q, gp_rect_of(b), differ, split);
+    return isnan(error) ? gp_error_of_same(q->of.kit, structure, &f->warned, same, tally) : error;
 }
 
 /* Whether there is scratch memory for an area; not for those of blocks that are none of the frame's. */
-static int has_room(const struct lull_instance *in, struct lull_rect area)
+static int has_room(const struct ggn_meter_room *room, struct lull_rect area)
 {
     const int32_t width = area.x1 - area.x0, height = area.y1 - area.y0;
-    return width > 0 && height > 0 && width <= in->frame.room.width &&
-           (size_t)width * (size_t)height <= in->frame.room.pixels &&
-           ggn_visible_patches(width, height) <= in->frame.room.patches;
+    return width > 0 && height > 0 && width <= room->width && (size_t)width * (size_t)height <= room->pixels &&
+           ggn_visible_patches(width, height) <= room->patches;
 }
 
 /* The error of an area around a block; 0 where it is the block, or tells of no noise. */
-static double error_of_area(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                            struct lull_rect area, struct ggn_meter *w)
+static double error_of_area(const struct question *q, struct lull_rect area)
 {
-    const struct lull_rect own = gp_rect_of(b);
+    const struct lull_block *b = q->of.block;
     struct lull_kit_tally ignored = {0};
 
-    if (gp_rect_same(own, area) || !has_room(in, area))
+    if (gp_rect_same(gp_rect_of(b), area) || !has_room(&q->in->frame.room, area))
         return 0;
-    const int differ = gp_pair_of_halves(&in->kit, view, b, area, w->rgb, &ignored);
-    const double error = error_of(in, view, b, area, differ, split_of(b), w);
+    const int differ = gp_pair_of_halves(&q->of, area, q->w->rgb, &ignored);
+    const double error = error_of(q, area, differ, 0.5 * seq_half_scale((double)b->spp, (double)b->half_spp));
     return isnan(error) ? 0 : error;
 }
 
 /* What the surroundings of a block let expect of it: whether a few samples of a few pixels have met rare light is luck, and
  * those beside it had other luck. 0 where there are none. */
-static double error_around(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                           struct ggn_meter *w)
+static double error_around(const struct question *q)
 {
-    const struct lull_rect own = gp_rect_of(b);
-    return view->all ? error_of_area(in, view, b, window_of(&in->frame.area, own), w) / AROUND : 0;
+    const struct lull_rect area = window_of(&q->in->frame.area, gp_rect_of(q->of.block));
+    return q->of.view->all ? error_of_area(q, area) / AROUND : 0;
 }
 
 /* What a block shows together with the pixels at its edges, where light of those may reach over them unmet; 0 elsewhere. */
-static double error_at_edges(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                             struct ggn_meter *w)
+static double error_at_edges(const struct question *q)
 {
-    const struct lull_rect own = gp_rect_of(b), area = border_of(&in->frame.area, own);
-    if (!has_room(in, area) || !view->all || !lull_kit_plane(view, LULL_PLANE_MOMENT2) || b->spp < 2)
+    const struct lull_rect own = gp_rect_of(q->of.block), area = border_of(&q->in->frame.area, own);
+    if (!has_room(&q->in->frame.room, area) || !q->of.view->all || !has_moments(q))
         return 0;
-    gp_pair_of_moments(&in->kit, view, b, area, 1, w->rgb);
-    return gp_undersampled_edge(own, area, w->rgb) ? error_of_area(in, view, b, area, w) : 0;
-}
-
-static double error_of_means(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
-                             struct ggn_meter *w, struct lull_kit_tally *tally)
-{
-    int known, differ = gp_pair_of_means(&in->kit, view, b, &in->frame.means, w->rgb, tally, &known);
-
-    if (!known) {
-        tally->early = 1;
-        return (double)NAN;
-    }
-    return verdict_on(in, view, b, differ, 0.5,
-                      "observer: COLOR has not changed since an earlier check of a block that is not of one colour: it "
-                      "must hold the mean of all samples",
-                      w, tally);
+    gp_pair_of_moments(&q->of, area, 1, q->w->rgb);
+    return gp_undersampled_edge(own, area, q->w->rgb) ? error_of_area(q, area) : 0;
 }
 
 static void judge(struct lull_instance *in, const struct lull_view *view, const struct lull_block *b,
                   struct lull_decision *d, uint32_t worker)
 {
-    struct ggn_meter *w = &in->frame.meter[worker < in->frame.workers ? worker : 0];
+    const struct question q = {in, {&in->kit, view, b}, &in->frame.meter[worker < in->frame.workers ? worker : 0]};
     struct lull_kit_tally tally = {0};
     double error = (double)NAN;
 
     if (b->spp < in->kit.need.first_spp)
         tally.early = 1;
     else
-        error = (in->frame.means.count ? error_of_means : error_of_halves)(in, view, b, w, &tally);
+        error = error_of_block(&q, &tally);
     /* What surrounds a block, and what it may not have met, is read where it matters: before a stop, and where the answer is
      * all that is wanted. */
     if (!in->frame.means.count && (error <= in->viewer.stop_error || (b->flags & LULL_BLOCK_FINAL && !isnan(error)))) {
-        const double around = fmax(error_around(in, view, b, w), error_at_edges(in, view, b, w));
-        const double seen = fmax(error, around), unmet = gp_undersampled_error(&in->kit, view, b);
+        const double seen = fmax(error, fmax(error_around(&q), error_at_edges(&q)));
+        const double unmet = gp_undersampled_error(&in->kit, view, b);
         if (seen <= in->viewer.stop_error && unmet > in->viewer.stop_error)
             gp_say_once(&in->kit, LULL_LOG_INFO, &in->frame.held,
                         "blocks below 100x100 pixels go on though no noise is seen: a few samples like their "
@@ -294,7 +277,8 @@ static void frame_release(void *data)
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
 {
     const size_t bytes = 3 * (size_t)lull_kit_pixels(b) * sizeof(float);
-    if (!has_room(in, gp_rect_of(b)) || (in->frame.means.count && bytes != in->frame.means.block[b->id].slot.kept))
+    if (!has_room(&in->frame.room, gp_rect_of(b)) ||
+        (in->frame.means.count && bytes != in->frame.means.block[b->id].slot.kept))
         return lull_kit_fail(err, LULL_E_INVALID, "evaluate: block %u is none of the frame's", b->id);
     return LULL_OK;
 }

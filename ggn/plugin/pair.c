@@ -22,8 +22,7 @@ typedef int (*two_colours)(const struct source *from, const struct lull_kit_span
                            double other[3]);
 
 struct source {
-    const struct lull_kit *kit;
-    const struct lull_view *view;
+    const struct gp_sight *of;
     uint32_t planes;
     two_colours colours;
     double deviations;
@@ -50,7 +49,7 @@ static int both_sides(const struct source *from, const struct lull_kit_span *s, 
 {
     const double n = s->planes & LULL_PLANE_BIT(LULL_PLANE_SPP) ? s->value[LULL_PLANE_SPP][i][0] : (double)s->block->spp;
     const double *m = s->value[LULL_PLANE_COLOR][i], moment2 = s->value[LULL_PLANE_MOMENT2][i][0];
-    const double y = lull_kit_luminance(from->kit, m), spread = moment2 - y * y;
+    const double y = lull_kit_luminance(from->of->kit, m), spread = moment2 - y * y;
     const double share =
         n >= 2 && y > 0 && spread > FLOAT_STEP * moment2 ? from->deviations * sqrt(spread / (n - 1)) / y : 0;
     for (int c = 0; c < 3; c++) {
@@ -70,7 +69,7 @@ static int read_part(const struct source *from, const struct lull_block *b, stru
     int differ = 0;
 
     part.x0 = rect.x0, part.y0 = rect.y0, part.x1 = rect.x1, part.y1 = rect.y1;
-    for (lull_kit_span_begin(&s, from->view, &part, from->planes); lull_kit_span_next(&s);)
+    for (lull_kit_span_begin(&s, from->of->view, &part, from->planes); lull_kit_span_next(&s);)
         for (int32_t i = 0; i < s.count; i++) {
             const size_t at = (size_t)(s.y - to->area.y0) * width + (size_t)(s.x + i - to->area.x0);
             double one[3], other[3];
@@ -79,8 +78,8 @@ static int read_part(const struct source *from, const struct lull_block *b, stru
             tally->bad += !good;
             for (size_t c = 0; c < 3; c++) {
                 float *a = &to->rgb[0][c * plane + at], *z = &to->rgb[1][c * plane + at];
-                *a = good ? gp_shown(from->kit, one[c]) : at ? a[-1] : 0;
-                *z = good ? gp_shown(from->kit, other[c]) : at ? z[-1] : 0;
+                *a = good ? gp_shown(from->of->kit, one[c]) : at ? a[-1] : 0;
+                *z = good ? gp_shown(from->of->kit, other[c]) : at ? z[-1] : 0;
                 differ |= good && one[c] != other[c];
             }
         }
@@ -88,11 +87,11 @@ static int read_part(const struct source *from, const struct lull_block *b, stru
 }
 
 /* All pixels of the area that belong to a block with samples; the rest is black in both pictures. */
-static int read_around(const struct source *from, const struct lull_block *b, const struct target *to,
-                       struct lull_kit_tally *tally)
+static int read_around(const struct source *from, const struct target *to, struct lull_kit_tally *tally)
 {
     const struct lull_rect area = to->area;
-    const struct lull_view *view = from->view;
+    const struct lull_view *view = from->of->view;
+    const struct lull_block *b = from->of->block;
     const size_t values = 3 * (size_t)(area.x1 - area.x0) * (size_t)(area.y1 - area.y0);
     int differ = 0;
 
@@ -108,34 +107,30 @@ static int read_around(const struct source *from, const struct lull_block *b, co
     return differ;
 }
 
-static int read_pair(const struct source *from, const struct lull_block *b, struct lull_rect area, float *const rgb[2],
-                     struct lull_kit_tally *tally)
+static int read_pair(const struct source *from, struct lull_rect area, float *const rgb[2], struct lull_kit_tally *tally)
 {
     const struct target to = {area, rgb};
-    const struct lull_rect own = gp_rect_of(b);
-    if (gp_rect_same(area, own))
-        return read_part(from, b, own, &to, tally);
-    return read_around(from, b, &to, tally);
+    const struct lull_rect own = gp_rect_of(from->of->block);
+    return gp_rect_same(area, own) ? read_part(from, from->of->block, own, &to, tally) : read_around(from, &to, tally);
 }
 
-int gp_pair_of_halves(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
-                      struct lull_rect area, float *const rgb[2], struct lull_kit_tally *tally)
+int gp_pair_of_halves(const struct gp_sight *of, struct lull_rect area, float *const rgb[2], struct lull_kit_tally *tally)
 {
-    const struct source from = {kit, view, COLOR | HALF, both_halves, 0};
-    return read_pair(&from, b, area, rgb, tally);
+    const struct source from = {of, COLOR | HALF, both_halves, 0};
+    return read_pair(&from, area, rgb, tally);
 }
 
-int gp_pair_of_moments(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
-                       struct lull_rect area, double deviations, float *const rgb[2])
+int gp_pair_of_moments(const struct gp_sight *of, struct lull_rect area, double deviations, float *const rgb[2])
 {
-    const struct source from = {kit, view, MOMENTS, both_sides, deviations};
+    const struct source from = {of, MOMENTS, both_sides, deviations};
     struct lull_kit_tally ignored = {0}; /* the same pixels are no numbers in other pairs */
-    return read_pair(&from, b, area, rgb, &ignored);
+    return read_pair(&from, area, rgb, &ignored);
 }
 
-int gp_pair_of_means(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *b,
-                     struct gp_history *means, float *const rgb[2], struct lull_kit_tally *tally, int *known)
+static int pair_of_means(const struct gp_sight *of, struct gp_history *means, float *const rgb[2],
+                         struct lull_kit_tally *tally)
 {
+    const struct lull_block *b = of->block;
     uint64_t spp_base;
     float *keep;
     const float *base = gp_means_begin(means, b->id, b->spp, &keep, &spp_base);
@@ -145,8 +140,7 @@ int gp_pair_of_means(const struct lull_kit *kit, const struct lull_view *view, c
     size_t at = 0;
     int differ = 0;
 
-    *known = base != NULL;
-    for (lull_kit_span_begin(&s, view, b, COLOR); lull_kit_span_next(&s);)
+    for (lull_kit_span_begin(&s, of->view, b, COLOR); lull_kit_span_next(&s);)
         for (int32_t i = 0; i < s.count; i++, at++) {
             const double *m = s.value[LULL_PLANE_COLOR][i];
             double d[3];
@@ -160,12 +154,32 @@ int gp_pair_of_means(const struct lull_kit *kit, const struct lull_view *view, c
             tally->bad += !good;
             for (size_t c = 0; c < 3; c++) {
                 float *one = &rgb[0][c * plane + at], *other = &rgb[1][c * plane + at];
-                *one = good ? gp_shown(kit, m[c] + d[c]) : at ? one[-1] : 0;
-                *other = good ? gp_shown(kit, m[c] - d[c]) : at ? other[-1] : 0;
+                *one = good ? gp_shown(of->kit, m[c] + d[c]) : at ? one[-1] : 0;
+                *other = good ? gp_shown(of->kit, m[c] - d[c]) : at ? other[-1] : 0;
                 differ |= good && fabs(d[c]) > FLOAT_STEP * scale * fabs(m[c]);
             }
         }
-    return differ;
+    return base ? differ : -1;
+}
+
+int gp_pair_of_block(const struct gp_sight *of, struct gp_history *means, const char *who, atomic_flag *warned,
+                     float *const rgb[2], struct lull_kit_tally *tally, double *split)
+{
+    const struct lull_block *b = of->block;
+    char text[160];
+
+    *split = 0.5;
+    if (means->count)
+        return pair_of_means(of, means, rgb, tally);
+    if (!gp_has_halves(b)) {
+        snprintf(text, sizeof text,
+                 "%s: HALF holds none or all of a block's samples, so that noise cannot be told; no block is stopped by it",
+                 who);
+        gp_say_once(of->kit, LULL_LOG_WARNING, warned, text);
+        return -1;
+    }
+    *split *= seq_half_scale((double)b->spp, (double)b->half_spp);
+    return gp_pair_of_halves(of, gp_rect_of(b), rgb, tally);
 }
 
 int gp_pair_has_structure(const float *rgb, size_t pixels)
