@@ -10,34 +10,24 @@ int gd_block_view_create(struct gd_block_view *seen, const struct gd_form *form,
 {
     const size_t pixels = (size_t)form->width * (size_t)form->height;
     struct gd_block_view v = {0};
-    float **const maps[] = {&v.noisy_light[0],
-                            &v.noisy_light[1],
-                            &v.denoised_light[0],
-                            &v.denoised_light[1],
-                            &v.crossed_light[0],
-                            &v.crossed_light[1],
-                            &v.kept_light[0],
-                            &v.kept_light[1],
-                            &v.lightness[0],
-                            &v.lightness[1],
-                            &v.apart_lightness[0],
-                            &v.apart_lightness[1],
-                            &v.slope,
-                            &v.apart,
-                            &v.weight};
+    float **const pairs[] = {v.noisy_light, v.denoised_light, v.crossed_light, v.kept_light, v.lightness, v.apart_lightness};
+    float **const maps[] = {&v.slope, &v.apart, &v.weight};
     float **const pictures[] = {&v.rgb, &v.crossed[0], &v.crossed[1], &v.kept[0], &v.kept[1]};
-    enum { MAPS = sizeof maps / sizeof maps[0], PICTURES = sizeof pictures / sizeof pictures[0], AROUND = 2 };
+    enum { PAIRS = sizeof pairs / sizeof pairs[0], MAPS = sizeof maps / sizeof maps[0] };
+    enum { PICTURES = sizeof pictures / sizeof pictures[0], AROUND = 2 };
     int rc = lull_denoised_part_open(&v.part, pixels, NULL, err);
     if (rc) /* after it P is known to be small enough for sums below */
         return rc;
     const size_t doubles = ggn_kept_scratch(form->width, form->height);
-    v.memory = malloc(doubles * sizeof(double) + (MAPS + 3 * PICTURES + AROUND) * pixels * sizeof(float));
+    v.memory = malloc(doubles * sizeof(double) + (2 * PAIRS + MAPS + 3 * PICTURES + AROUND) * pixels * sizeof(float));
     if (!v.memory) {
         gd_block_view_release(&v);
         return base_fail_nomem(err, "the pictures of a block");
     }
     v.judging = v.memory;
     float *next = (float *)(v.judging + doubles);
+    for (size_t i = 0; i < 2 * PAIRS; i++, next += pixels)
+        pairs[i / 2][i % 2] = next;
     for (size_t i = 0; i < MAPS; i++, next += pixels)
         *maps[i] = next;
     for (size_t i = 0; i < PICTURES; i++, next += 3 * pixels)

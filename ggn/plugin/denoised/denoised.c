@@ -52,7 +52,10 @@ struct past {     /* what is remembered of a block; saved as it is, without padd
     uint32_t flags;
 };
 
-struct sight { /* of a block that is asked about */
+struct block {
+    struct lull_rect rect;
+    struct past past, pending;
+    /* of one question */
     enum gd_halves halves;
     struct lull_kit_tally tally;
 };
@@ -63,12 +66,10 @@ struct frame {          /* what an open one needs; owns what it points to */
     struct gd_look look;
     struct gd_block_view *seen; /* [workers] */
     uint32_t workers;
-    struct lull_rect *rect;      /* [blocks] */
-    struct past *past, *pending; /* [blocks] */
-    struct sight *sight;         /* [blocks] */
-    uint8_t *asked;              /* [blocks]: in the rectangle that is looked at; 0 between looks */
-    struct gd_group *groups;     /* [blocks]: of one question, as these: */
-    uint32_t *next, *members;    /* [blocks]: links of groups, the blocks of one */
+    struct block *block;      /* [blocks] */
+    uint8_t *asked;           /* [blocks]: in the rectangle that is looked at; 0 between looks */
+    struct gd_group *groups;  /* [blocks]: of one question, as these: */
+    uint32_t *next, *members; /* [blocks]: links of groups, the blocks of one */
 };
 
 struct lull_instance {
@@ -83,11 +84,11 @@ static double error_of(struct lull_instance *in, struct gd_block_view *seen, con
                        struct lull_kit_tally *tally, struct past *now)
 {
     const size_t pixels = (size_t)lull_kit_pixels(b);
-    const struct sight *sight = &in->frame.sight[b->id];
-    *tally = sight->tally;
-    if (sight->halves != GD_HALVES_DIFFER)
+    const struct block *of = &in->frame.block[b->id];
+    *tally = of->tally;
+    if (of->halves != GD_HALVES_DIFFER)
         return now->halves = now->crossed =
-                   gp_error_of_same(&in->kit, sight->halves == GD_HALVES_STRUCTURED, &in->frame.warned,
+                   gp_error_of_same(&in->kit, of->halves == GD_HALVES_STRUCTURED, &in->frame.warned,
                                     "denoised: COLOR and HALF are the same in a block that is not of one colour: HALF must "
                                     "hold a fixed half of the samples",
                                     tally);
@@ -123,7 +124,7 @@ static void decide(const struct lull_instance *in, const struct lull_block *b, c
 /* Whether this block's samples are to be judged, which they have not been before. */
 static int is_new(const struct lull_instance *in, const struct lull_block *b)
 {
-    return in->frame.past[b->id].spp != b->spp || b->spp == 0;
+    return in->frame.block[b->id].past.spp != b->spp || b->spp == 0;
 }
 
 static int can_be_judged(const struct lull_instance *in, const struct lull_block *b)
@@ -135,12 +136,12 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
                   struct lull_decision *d, uint32_t worker)
 {
     struct gd_block_view *seen = &in->frame.seen[worker < in->frame.workers ? worker : 0];
-    struct past *now = &in->frame.pending[b->id];
+    struct past *now = &in->frame.block[b->id].pending;
     struct lull_kit_tally tally = {0};
     double error = (double)NAN;
 
     (void)view;
-    *now = in->frame.past[b->id];
+    *now = in->frame.block[b->id].past;
     if (is_new(in, b)) {
         now->halves = now->crossed = (double)NAN;
         if (can_be_judged(in, b))
@@ -182,7 +183,7 @@ static const struct lull_block *block_at(const struct lull_kit_batch *batch, uin
 static int32_t look_at(struct lull_instance *in, const struct lull_kit_batch *batch, const struct gd_group *group,
                        struct lull_error *err)
 {
-    const struct lull_rect *core = &in->frame.rect[block_at(batch, group->first)->id];
+    const struct lull_rect *core = &in->frame.block[block_at(batch, group->first)->id].rect;
     struct base_err why = {0};
     uint32_t count = 0;
     for (uint32_t i = group->first;; i = in->frame.next[i]) {
@@ -194,7 +195,7 @@ static int32_t look_at(struct lull_instance *in, const struct lull_kit_batch *ba
     gd_look_begin(&in->frame.look, &in->frame.form, batch->view, &group->box, core, in->frame.asked);
     for (uint32_t k = 0; k < count; k++) {
         const struct lull_block *b = block_at(batch, in->frame.members[k]);
-        gd_look_put(&in->frame.look, batch->view, b, &in->frame.sight[b->id].tally);
+        gd_look_put(&in->frame.look, batch->view, b, &in->frame.block[b->id].tally);
         in->frame.asked[b->id] = 0;
     }
     if (gd_look_run(&in->frame.look, in->kit.host, &why))
@@ -209,14 +210,13 @@ static uint32_t sort_out(struct lull_instance *in, const struct lull_kit_batch *
     *others = 0;
     for (uint32_t i = 0; i < batch->count; i++) {
         const struct lull_block *b = block_at(batch, i);
-        struct sight *sight = &in->frame.sight[b->id];
-        *sight = (struct sight){0};
+        struct block *of = &in->frame.block[b->id];
         const int look = is_new(in, b) && can_be_judged(in, b);
+        of->tally = (struct lull_kit_tally){0};
         if (look)
-            sight->halves = gd_halves_of(batch->view, b, &sight->tally);
-        if (look && sight->halves == GD_HALVES_DIFFER)
-            in->frame.groups[groups++] =
-                (struct gd_group){gd_box_around(&in->frame.rect[b->id], &in->frame.form.area), i, i};
+            of->halves = gd_halves_of(batch->view, b, &of->tally);
+        if (look && of->halves == GD_HALVES_DIFFER)
+            in->frame.groups[groups++] = (struct gd_group){gd_box_around(&of->rect, &in->frame.form.area), i, i};
         else
             in->frame.members[(*others)++] = i;
     }
@@ -241,10 +241,10 @@ static int32_t answer(const struct lull_kit_batch *batch, struct lull_error *err
 
 static void keep(struct lull_instance *in, const struct lull_block *b)
 {
-    const int again = in->frame.past[b->id].spp == b->spp;
-    in->frame.past[b->id] = in->frame.pending[b->id];
-    if (!again)
-        log_response(in, b, &in->frame.past[b->id]);
+    struct block *of = &in->frame.block[b->id];
+    if (of->past.spp != b->spp)
+        log_response(in, b, &of->pending);
+    of->past = of->pending;
 }
 
 static void frame_release(void *data)
@@ -254,9 +254,7 @@ static void frame_release(void *data)
         gd_block_view_release(&f->seen[i]);
     free(f->seen);
     gd_look_close(&f->look);
-    free(f->rect);
-    free(f->past);
-    free(f->sight);
+    free(f->block);
     free(f->asked);
     free(f->groups);
     free(f->next);
@@ -266,18 +264,15 @@ static int blocks_create(struct frame *f, const struct lull_frame *frame, uint32
 {
     const size_t n = frame->block_count;
     f->seen = calloc(workers, sizeof *f->seen);
-    f->rect = malloc(n * sizeof *f->rect);
-    f->past = calloc(2 * n, sizeof *f->past);
-    f->sight = calloc(n, sizeof *f->sight);
+    f->block = calloc(n, sizeof *f->block);
     f->asked = calloc(n, sizeof *f->asked);
     f->groups = malloc(n * sizeof *f->groups);
     f->next = malloc(2 * n * sizeof *f->next);
-    if (!f->seen || !f->rect || !f->past || !f->sight || !f->asked || !f->groups || !f->next)
+    if (!f->seen || !f->block || !f->asked || !f->groups || !f->next)
         return base_fail_nomem(why, "the blocks");
-    f->pending = f->past + n;
     f->members = f->next + n;
     for (uint32_t i = 0; i < n; i++)
-        f->rect[i] = *lull_kit_rect(frame, i);
+        f->block[i].rect = *lull_kit_rect(frame, i);
     return 0;
 }
 
@@ -309,7 +304,7 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
 
 static int32_t check_block(const struct lull_instance *in, const struct lull_block *b, struct lull_error *err)
 {
-    return gp_check_block(b, &in->frame.rect[b->id], in->frame.past[b->id].spp, err);
+    return gp_check_block(b, &in->frame.block[b->id].rect, in->frame.block[b->id].past.spp, err);
 }
 
 /* Drafts are good enough earlier. With these first looks stops are no more often off than with 64 samples for all
@@ -335,8 +330,7 @@ static int32_t init(struct lull_instance *in, const void *own, const char *const
     in->kit.need.first_spp = first_spp(in);
     in->kit.need.halo = GD_REACH;
     in->kit.need.checks_hint = 5;
-    in->kit.need.bytes_per_block = 2 * sizeof(struct past) + sizeof(struct lull_rect) + sizeof(struct sight) +
-                                   sizeof(struct gd_group) + 2 * sizeof(uint32_t) + sizeof(uint8_t);
+    in->kit.need.bytes_per_block = sizeof(struct block) + sizeof(struct gd_group) + 2 * sizeof(uint32_t) + sizeof(uint8_t);
     return LULL_OK;
 }
 
@@ -356,8 +350,8 @@ static int32_t save(const struct lull_instance *in, const struct lull_writer *wr
 {
     const struct state_header header = header_of(in);
     int32_t status = writer->write(writer, &header, sizeof header);
-    if (!status)
-        status = writer->write(writer, in->frame.past, in->kit.block_count * sizeof *in->frame.past);
+    for (uint32_t i = 0; i < in->kit.block_count && !status; i++)
+        status = writer->write(writer, &in->frame.block[i].past, sizeof(struct past));
     return status ? lull_kit_fail(err, status, "save: the host could not write it") : LULL_OK;
 }
 
@@ -377,12 +371,14 @@ static int32_t load(struct lull_instance *in, const struct lull_reader *reader, 
     struct state_header header, wanted = header_of(in);
     if (reader->read(reader, &header, sizeof header) != LULL_OK || memcmp(&header, &wanted, sizeof header) != 0)
         return lull_kit_fail(err, LULL_E_IO, "load: the state is that of another criterion or frame");
-    if (reader->read(reader, in->frame.pending, in->kit.block_count * sizeof *in->frame.pending) != LULL_OK)
-        return lull_kit_fail(err, LULL_E_IO, "load: the state ends early");
     for (uint32_t i = 0; i < in->kit.block_count; i++)
-        if (!plausible(&in->frame.pending[i]))
+        if (reader->read(reader, &in->frame.block[i].pending, sizeof(struct past)) != LULL_OK)
+            return lull_kit_fail(err, LULL_E_IO, "load: the state ends early");
+    for (uint32_t i = 0; i < in->kit.block_count; i++)
+        if (!plausible(&in->frame.block[i].pending))
             return lull_kit_fail(err, LULL_E_IO, "load: the state of block %u is none", i);
-    memcpy(in->frame.past, in->frame.pending, in->kit.block_count * sizeof *in->frame.past);
+    for (uint32_t i = 0; i < in->kit.block_count; i++)
+        in->frame.block[i].past = in->frame.block[i].pending;
     return LULL_OK;
 }
 
