@@ -189,19 +189,10 @@ static int label_task(void *data, struct job_task *task, uint32_t k, uint32_t n,
     return label_views(data, task->first + k, n, thread, err);
 }
 
-static int apply_nothing(void *data, uint32_t i, const void *answer)
-{
-    (void)data;
-    (void)i;
-    (void)answer;
-    return 0;
-}
-
 static int share_views(struct labelling *l, struct base_err *err)
 {
     const struct job_service service = {label_task, l};
-    const struct job_farm farm = {
-        .whole = 1, .count = (uint32_t)l->d->n, .here = label_views, .apply = apply_nothing, .data = l};
+    const struct job_farm farm = {.whole = 1, .count = (uint32_t)l->d->n, .here = label_views, .data = l};
     int rc = job_share(ggn_cmd_job, l->threads, &farm, &service, err);
     return rc == JOB_STOPPED ? 0 : rc;
 }

@@ -109,7 +109,7 @@ static int apply(struct farming *f, int rank, const struct job_message *message,
         return 0;
     if (size != sizeof *answer + answer->count * f->farm->answer_bytes)
         return job_nonsense(f->job, rank);
-    for (uint32_t k = 0; k < answer->count; k++)
+    for (uint32_t k = 0; k < answer->count && f->farm->apply; k++)
         if (f->farm->apply(f->farm->data, held.first + k, answer->bytes + k * f->farm->answer_bytes))
             return job_nonsense(f->job, rank);
     f->away -= answer->count;

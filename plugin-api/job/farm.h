@@ -28,7 +28,7 @@ struct job_farm {
     size_t common_bytes, item_bytes, answer_bytes;
     const void *common;
     /* pack: item i into a task; may be NULL if item_bytes is 0. here: items [first, first + n) at rank 0, not 0 if they
-     * cannot be done. apply: the answer about item i, not 0 if it makes no sense. */
+     * cannot be done. apply: the answer about item i, not 0 if it makes no sense; may be NULL. */
     void (*pack)(void *data, uint32_t i, void *item);
     int (*here)(void *data, uint32_t first, uint32_t n, int thread, struct base_err *err);
     int (*apply)(void *data, uint32_t i, const void *answer);
