@@ -1,5 +1,4 @@
 /* `ggn stimuli VIEW...`: the pictures of recordings and renders that people are shown. */
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/json.h"
@@ -112,19 +111,14 @@ int ggn_cmd_stimuli(int argc, char **argv, struct base_err *err)
         .doc =
             "Writes what people are shown of recorded sequences or folders of pictures, each picture of a block a PNG, and "
             "prints as JSON which views, blocks and levels there are. `lull-study init` runs it."};
-    struct options *o = calloc(1, sizeof *o);
+    static struct options o = {.task = GGN_SHOWN_TWO_INTERVAL,
+                               .request = {.block = 200, .spp_min = 1, .spp_max = 1000000, .spacing = 0.15}};
     struct ggn_shown shown = {0};
-    int rc = o ? 0 : base_fail_nomem(err, "options");
-    if (!rc) {
-        *o = (struct options){.task = GGN_SHOWN_TWO_INTERVAL,
-                              .request = {.block = 200, .spp_min = 1, .spp_max = 1000000, .spacing = 0.15}};
-        rc = base_options_parse(&options, argc, argv, o, err);
-    }
+    int rc = base_options_parse(&options, argc, argv, &o, err);
     if (!rc)
-        rc = make(o, &shown, err);
+        rc = make(&o, &shown, err);
     if (!rc)
-        rc = print_shown(&shown, (enum ggn_shown_task)o->task, err);
+        rc = print_shown(&shown, (enum ggn_shown_task)o.task, err);
     ggn_shown_release(&shown);
-    free(o);
     return rc;
 }
