@@ -89,26 +89,16 @@ static void blend_halves(struct gd_block_view *seen, double share)
     lull_denoised_blend(part, part->weight, seen->kept);
 }
 
-/* The denoised picture alone is both, specks and all. */
-static void keep_denoised(struct gd_block_view *seen)
-{
-    const struct lull_denoised_part *part = &seen->part;
-    for (int k = 0; k < 2; k++) {
-        memcpy(seen->crossed[k], part->denoised[k], 3 * part->pixels * sizeof(float));
-        memcpy(seen->kept[k], part->denoised[k], 3 * part->pixels * sizeof(float));
-    }
-}
-
 /* How far apart the kept halves are, at the strength of the mean: L* of the mean less that of the darker half. A speck that
  * one sample made is in one half alone; half the difference of L* of the halves would be too little, L* being concave.
  * split: what makes a difference of halves as strong as the mean's noise. */
-static void show_apart(struct gd_block_view *seen, const struct lull_kit *kit, double split)
+static void show_apart(struct gd_block_view *seen, const struct lull_kit *kit, float *const kept[2], double split)
 {
     const size_t pixels = seen->part.pixels;
     for (int k = 0; k < 2; k++) {
         for (size_t i = 0; i < pixels; i++) {
             const int darker = seen->kept_light[0][i] > seen->kept_light[1][i];
-            const float *low = seen->kept[darker] + 3 * i, *high = seen->kept[!darker] + 3 * i;
+            const float *low = kept[darker] + 3 * i, *high = kept[!darker] + 3 * i;
             for (size_t c = 0; c < 3; c++) {
                 const float mean = (float)((1.0 - split) * (double)low[c] + split * (double)high[c]);
                 seen->rgb[c * pixels + i] = gp_shown(kit, (double)(k == darker ? low[c] : mean));
@@ -129,19 +119,19 @@ struct ggn_kept_errors gd_block_view_errors(struct gd_block_view *seen, const st
     show_halves(seen, kit);
     if (blend)
         blend_halves(seen, h / n);
-    else
-        keep_denoised(seen);
+    /* The denoised picture alone is both, specks and all. */
+    float *const *crossed = blend ? seen->crossed : seen->part.denoised, *const *kept = blend ? seen->kept : crossed;
     for (int k = 0; k < 2; k++) {
-        show(seen, kit, seen->crossed[k], seen->crossed_light[k], NULL);
-        show(seen, kit, seen->kept[k], seen->kept_light[k], NULL);
+        show(seen, kit, crossed[k], seen->crossed_light[k], NULL);
+        show(seen, kit, kept[k], seen->kept_light[k], NULL);
     }
-    show_apart(seen, kit, 0.5 * seq_half_scale(n, h));
-    const struct ggn_kept kept = {.width = seen->part.width,
-                                  .height = seen->part.height,
-                                  .lightness = {seen->lightness[0], seen->lightness[1]},
-                                  .slope = seen->slope,
-                                  .noisy = {seen->noisy_light[0], seen->noisy_light[1]},
-                                  .crossed = {seen->crossed_light[0], seen->crossed_light[1]},
-                                  .apart = seen->apart};
-    return ggn_kept_judge(&kept, viewing, seen->judging);
+    show_apart(seen, kit, kept, 0.5 * seq_half_scale(n, h));
+    const struct ggn_kept judged = {.width = seen->part.width,
+                                    .height = seen->part.height,
+                                    .lightness = {seen->lightness[0], seen->lightness[1]},
+                                    .slope = seen->slope,
+                                    .noisy = {seen->noisy_light[0], seen->noisy_light[1]},
+                                    .crossed = {seen->crossed_light[0], seen->crossed_light[1]},
+                                    .apart = seen->apart};
+    return ggn_kept_judge(&judged, viewing, seen->judging);
 }
