@@ -55,9 +55,7 @@ struct past {     /* what is remembered of a block; saved as it is, without padd
 struct block {
     struct lull_rect rect;
     struct past past, pending;
-    /* of one question */
-    enum gd_halves halves;
-    struct lull_kit_tally tally;
+    enum gd_halves halves; /* of one question */
 };
 
 struct frame {          /* what an open one needs; owns what it points to */
@@ -66,10 +64,10 @@ struct frame {          /* what an open one needs; owns what it points to */
     struct gd_look look;
     struct gd_block_view *seen; /* [workers] */
     uint32_t workers;
-    struct block *block;      /* [blocks] */
-    uint8_t *asked;           /* [blocks]: in the rectangle that is looked at; 0 between looks */
-    struct gd_group *groups;  /* [blocks]: of one question, as these: */
-    uint32_t *next, *members; /* [blocks]: links of groups, the blocks of one */
+    struct block *block;          /* [blocks] */
+    struct lull_kit_tally *tally; /* [blocks]: of one question, as all of these: */
+    struct gd_group *groups;      /* [blocks] */
+    uint32_t *next, *members;     /* [blocks]: links of groups, the blocks of one */
 };
 
 struct lull_instance {
@@ -85,7 +83,7 @@ static double error_of(struct lull_instance *in, struct gd_block_view *seen, con
 {
     const size_t pixels = (size_t)lull_kit_pixels(b);
     const struct block *of = &in->frame.block[b->id];
-    *tally = of->tally;
+    *tally = in->frame.tally[b->id];
     if (of->halves != GD_HALVES_DIFFER)
         return now->halves = now->crossed =
                    gp_error_of_same(&in->kit, of->halves == GD_HALVES_STRUCTURED, &in->frame.warned,
@@ -174,33 +172,19 @@ static void log_response(const struct lull_instance *in, const struct lull_block
     gp_log(&in->kit, LULL_LOG_DEBUG, line);
 }
 
-static const struct lull_block *block_at(const struct lull_kit_batch *batch, uint32_t i)
-{
-    return lull_kit_at(batch->blocks, batch->block_stride, i);
-}
-
 /* Denoises a group's blocks together, then judges each. */
 static int32_t look_at(struct lull_instance *in, const struct lull_kit_batch *batch, const struct gd_group *group,
                        struct lull_error *err)
 {
-    const struct lull_rect *core = &in->frame.block[block_at(batch, group->first)->id].rect;
+    struct frame *f = &in->frame;
     struct base_err why = {0};
     uint32_t count = 0;
-    for (uint32_t i = group->first;; i = in->frame.next[i]) {
-        in->frame.members[count++] = i;
-        in->frame.asked[block_at(batch, i)->id] = 1;
-        if (i == group->last)
-            break;
-    }
-    gd_look_begin(&in->frame.look, &in->frame.form, batch->view, &group->box, core, in->frame.asked);
-    for (uint32_t k = 0; k < count; k++) {
-        const struct lull_block *b = block_at(batch, in->frame.members[k]);
-        gd_look_put(&in->frame.look, batch->view, b, &in->frame.block[b->id].tally);
-        in->frame.asked[b->id] = 0;
-    }
-    if (gd_look_run(&in->frame.look, in->kit.host, &why))
+    f->members[count++] = group->first;
+    for (uint32_t i = group->first; i != group->last; i = f->next[i])
+        f->members[count++] = f->next[i];
+    if (gd_look_run(&f->look, &f->form, batch, &group->box, f->members, count, f->tally, &why))
         return gp_fail_from(err, LULL_E_INTERNAL, "evaluate", &why);
-    return gp_judge(batch, in->frame.members, count, err);
+    return gp_judge(batch, f->members, count, err);
 }
 
 /* Finds the blocks that must be denoised, each a group of its own, and in members[] the others. Returns how many of each. */
@@ -209,12 +193,12 @@ static uint32_t sort_out(struct lull_instance *in, const struct lull_kit_batch *
     uint32_t groups = 0;
     *others = 0;
     for (uint32_t i = 0; i < batch->count; i++) {
-        const struct lull_block *b = block_at(batch, i);
+        const struct lull_block *b = lull_kit_at(batch->blocks, batch->block_stride, i);
         struct block *of = &in->frame.block[b->id];
         const int look = is_new(in, b) && can_be_judged(in, b);
-        of->tally = (struct lull_kit_tally){0};
+        in->frame.tally[b->id] = (struct lull_kit_tally){0};
         if (look)
-            of->halves = gd_halves_of(batch->view, b, &of->tally);
+            of->halves = gd_halves_of(batch->view, b, &in->frame.tally[b->id]);
         if (look && of->halves == GD_HALVES_DIFFER)
             in->frame.groups[groups++] = (struct gd_group){gd_box_around(&of->rect, &in->frame.form.area), i, i};
         else
@@ -255,7 +239,7 @@ static void frame_release(void *data)
     free(f->seen);
     gd_look_close(&f->look);
     free(f->block);
-    free(f->asked);
+    free(f->tally);
     free(f->groups);
     free(f->next);
 }
@@ -265,10 +249,10 @@ static int blocks_create(struct frame *f, const struct lull_frame *frame, uint32
     const size_t n = frame->block_count;
     f->seen = calloc(workers, sizeof *f->seen);
     f->block = calloc(n, sizeof *f->block);
-    f->asked = calloc(n, sizeof *f->asked);
+    f->tally = malloc(n * sizeof *f->tally);
     f->groups = malloc(n * sizeof *f->groups);
     f->next = malloc(2 * n * sizeof *f->next);
-    if (!f->seen || !f->block || !f->asked || !f->groups || !f->next)
+    if (!f->seen || !f->block || !f->tally || !f->groups || !f->next)
         return base_fail_nomem(why, "the blocks");
     f->members = f->next + n;
     for (uint32_t i = 0; i < n; i++)
@@ -330,7 +314,8 @@ static int32_t init(struct lull_instance *in, const void *own, const char *const
     in->kit.need.first_spp = first_spp(in);
     in->kit.need.halo = GD_REACH;
     in->kit.need.checks_hint = 5;
-    in->kit.need.bytes_per_block = sizeof(struct block) + sizeof(struct gd_group) + 2 * sizeof(uint32_t) + sizeof(uint8_t);
+    in->kit.need.bytes_per_block = sizeof(struct block) + sizeof(struct lull_kit_tally) + sizeof(struct gd_group) +
+                                   2 * sizeof(uint32_t) + sizeof(uint8_t);
     return LULL_OK;
 }
 

@@ -42,10 +42,17 @@ int gd_look_open(struct gd_look *look, const struct gd_form *form, const char *l
     *look = (struct gd_look){0};
     if (form->area.x1 > INT32_MAX / 2 || form->area.y1 > INT32_MAX / 2)
         return base_fail_nomem(err, "the pictures of blocks");
+    look->asked = calloc(form->blocks, sizeof *look->asked);
+    if (!look->asked)
+        return base_fail_nomem(err, "the blocks");
     return lull_denoised_open(&look->pair, library, &form->room, err);
 }
 
-void gd_look_close(struct gd_look *look) { lull_denoised_close(&look->pair); }
+void gd_look_close(struct gd_look *look)
+{
+    lull_denoised_close(&look->pair);
+    free(look->asked);
+}
 
 /* Whether the halves of a pixel are numbers; if so, whether they differ. */
 static int is_good(const double mean[3], const double half[3], int *differ)
@@ -128,27 +135,9 @@ static void read_part(struct gd_look *look, struct lull_rect rect, const struct 
         }
 }
 
-void gd_look_begin(struct gd_look *look, const struct gd_form *form, const struct lull_view *view,
-                   const struct lull_rect *box, const struct lull_rect *core, const uint8_t *asked)
+static const struct lull_block *block_at(const struct lull_kit_batch *batch, uint32_t i)
 {
-    struct lull_kit_tally around = {0};
-    look->box = *box;
-    look->known = view->all ? gp_rect_common(gp_rect_common(*box, form->area),
-                                             (struct lull_rect){view->x0, view->y0, view->x1, view->y1})
-                            : *core;
-    lull_denoised_begin(&look->pair, box->x1 - box->x0, box->y1 - box->y0);
-    for (uint32_t i = 0; view->all && i < view->all_count; i++) {
-        const struct lull_block *other = lull_kit_at(view->all, view->all_stride, i);
-        const int read = other->id < form->blocks && !asked[other->id] && other->spp > 0;
-        if (read)
-            read_part(look, gp_rect_common(gp_rect_of(other), look->known), view, other, &around);
-    }
-}
-
-void gd_look_put(struct gd_look *look, const struct lull_view *view, const struct lull_block *block,
-                 struct lull_kit_tally *tally)
-{
-    read_part(look, gp_rect_of(block), view, block, tally);
+    return lull_kit_at(batch->blocks, batch->block_stride, i);
 }
 
 static int cancelled(void *data)
@@ -157,8 +146,30 @@ static int cancelled(void *data)
     return host->cancelled(host);
 }
 
-int gd_look_run(struct gd_look *look, const struct lull_host *host, struct base_err *err)
+int gd_look_run(struct gd_look *look, const struct gd_form *form, const struct lull_kit_batch *batch,
+                const struct lull_rect *box, const uint32_t *members, uint32_t count, struct lull_kit_tally *tally,
+                struct base_err *err)
 {
+    const struct lull_host *host = lull_kit_read_of(batch->in)->host;
+    const struct lull_view *view = batch->view;
+    const struct lull_rect seen = {view->x0, view->y0, view->x1, view->y1};
+    struct lull_kit_tally around = {0};
+    look->box = *box;
+    look->known =
+        view->all ? gp_rect_common(gp_rect_common(*box, form->area), seen) : gp_rect_of(block_at(batch, members[0]));
+    lull_denoised_begin(&look->pair, box->x1 - box->x0, box->y1 - box->y0);
+    for (uint32_t k = 0; k < count; k++)
+        look->asked[block_at(batch, members[k])->id] = 1;
+    for (uint32_t i = 0; view->all && i < view->all_count; i++) {
+        const struct lull_block *other = lull_kit_at(view->all, view->all_stride, i);
+        if (other->id < form->blocks && !look->asked[other->id] && other->spp > 0)
+            read_part(look, gp_rect_common(gp_rect_of(other), look->known), view, other, &around);
+    }
+    for (uint32_t k = 0; k < count; k++) {
+        const struct lull_block *b = block_at(batch, members[k]);
+        read_part(look, gp_rect_of(b), view, b, &tally[b->id]);
+        look->asked[b->id] = 0;
+    }
     lull_denoised_mirror(&look->pair, in_box(look, look->known));
     return lull_denoised_run(&look->pair, host && host->cancelled ? cancelled : NULL, &host, err);
 }

@@ -2,10 +2,6 @@
  * A look: one rectangle of the frame, with blocks that are due and what lies around them, is read from the host's view and
  * both halves of it are denoised (denoise/pair.h). The same pixels come out for a block whatever rectangle it is in.
  *
- *     gd_look_begin   the rectangle, and the blocks in it that are not asked about
- *     gd_look_put     each of those that are
- *     gd_look_run     denoises
- *
  * One thread; nothing is allocated after gd_look_open.
  */
 #ifndef GGN_PLUGIN_DENOISED_LOOK_H
@@ -26,16 +22,17 @@ struct gd_form {           /* of a frame */
     struct lull_oidn_form room; /* as many pixels, of any shape */
 };
 
-struct gd_look {
-    struct lull_denoised_pair pair;
-    struct lull_rect box, known; /* the rectangle, which may reach beyond the frame, and what is read of it */
-};
-
 /* What the samples of a block are. */
 enum gd_halves {
     GD_HALVES_DIFFER,
     GD_HALVES_PLAIN,     /* both halves are the same, of one colour, */
     GD_HALVES_STRUCTURED /* or of more */
+};
+
+struct gd_look {
+    struct lull_denoised_pair pair;
+    struct lull_rect box, known; /* the rectangle, which may reach beyond the frame, and what is read of it */
+    uint8_t *asked;              /* [blocks]: asked about, and in the rectangle; 0 between looks */
 };
 
 /* frame: checked. quality: of struct lull_oidn_form. threads: that the denoiser may use. */
@@ -48,14 +45,11 @@ void gd_look_close(struct gd_look *look);
 /* Of pixels that are numbers; *tally counts pixels if the halves are the same. */
 enum gd_halves gd_halves_of(const struct lull_view *view, const struct lull_block *block, struct lull_kit_tally *tally);
 
-/* asked: [all blocks], whether gd_look_put reads it. With no view->all nothing is known but `core`, the only block asked. */
-void gd_look_begin(struct gd_look *look, const struct gd_form *form, const struct lull_view *view,
-                   const struct lull_rect *box, const struct lull_rect *core, const uint8_t *asked);
-/* A block of 0 < half_spp < spp; *tally counts its pixels. */
-void gd_look_put(struct gd_look *look, const struct lull_view *view, const struct lull_block *block,
-                 struct lull_kit_tally *tally);
-/* 0, or a negative code and *err. host: whose cancelled is asked; may be NULL. */
-int gd_look_run(struct gd_look *look, const struct lull_host *host, struct base_err *err);
+/* Some blocks of a question, of 0 < half_spp < spp, are read and all in the box denoised; tally: [all blocks], counts the
+ * pixels of each. With no view->all nothing else is known, and there is one. 0, or a negative code and *err. */
+int gd_look_run(struct gd_look *look, const struct gd_form *form, const struct lull_kit_batch *batch,
+                const struct lull_rect *box, const uint32_t *members, uint32_t count, struct lull_kit_tally *tally,
+                struct base_err *err);
 
 /* Where the block lies in the rectangle. */
 struct lull_denoised_rect gd_look_place(const struct gd_look *look, const struct lull_block *block);
