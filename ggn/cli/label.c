@@ -334,7 +334,7 @@ int ggn_cmd_label(int argc, char **argv, struct base_err *err)
     base_interrupt_catch();
     if (job_rank(ggn_cmd_job) > 0) /* rank 0 ends the job */
         base_interrupt_ignore();
-    if ((o.trials || o.calibrate || o.check) && job_rank(ggn_cmd_job) > 0)
+    if ((o.trials || o.calibrate || o.check) && job_rank(ggn_cmd_job) > 0) /* nothing is shared out */
         return 0;
     if (o.trials) {
         rc = fit_trials(&o, err);

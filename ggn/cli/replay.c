@@ -148,6 +148,7 @@ static int load(struct replay *r, struct base_err *err)
     eo.data.split.n_learned = r->o->n_models;
     r->threads = base_threads_create(r->o->threads, err);
     int rc = r->threads ? 0 : err->code;
+    /* One set is read for all models: windows of the longest, and what any of them measures. */
     for (int i = 0; i < r->o->n_models && !rc; i++) {
         rc = ggn_model_load(r->o->models[i], &r->model[i], err);
         if (rc)

@@ -139,7 +139,7 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
     double error = (double)NAN;
 
     (void)view;
-    *now = in->frame.block[b->id].past;
+    *now = in->frame.block[b->id].past; /* the answer, if it is asked for again */
     if (is_new(in, b)) {
         now->halves = now->crossed = (double)NAN;
         if (can_be_judged(in, b))

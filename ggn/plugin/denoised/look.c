@@ -21,6 +21,7 @@ struct gd_form gd_form_of(const struct lull_frame *frame, enum lull_oidn_quality
         form.width = gp_most(form.width, r->x1 - r->x0);
         form.height = gp_most(form.height, r->y1 - r->y0);
     }
+    /* The largest block must fit with what is around it, wherever it lies; more blocks share a rectangle up to a limit. */
     const int32_t area_width = form.area.x1 - form.area.x0, area_height = form.area.y1 - form.area.y0;
     const int64_t width = widened(area_width, area_width), height = widened(area_height, area_height);
     const int64_t alone = widened(form.width, area_width) * widened(form.height, area_height);
@@ -158,6 +159,7 @@ int gd_look_run(struct gd_look *look, const struct gd_form *form, const struct l
     look->known =
         view->all ? gp_rect_common(gp_rect_common(*box, form->area), seen) : gp_rect_of(block_at(batch, members[0]));
     lull_denoised_begin(&look->pair, box->x1 - box->x0, box->y1 - box->y0);
+    /* Blocks are read as the question has them, what is around them as view->all has it. */
     for (uint32_t k = 0; k < count; k++)
         look->asked[block_at(batch, members[k])->id] = 1;
     for (uint32_t i = 0; view->all && i < view->all_count; i++) {
