@@ -73,10 +73,4 @@ void *gp_history_kept(const struct gp_history *h, uint32_t id, uint32_t slot);
  * window until then. */
 uint32_t gp_head_push(struct gp_head *head, int window, uint32_t before);
 
-/* lull.state/1: everything above, checked on the way in, into a history of the same blocks that *fresh becomes. `key`
- * identifies model and parameters. */
-int32_t gp_history_save(const struct gp_history *h, uint32_t key, const struct lull_writer *writer, struct lull_error *err);
-int32_t gp_history_load(struct gp_history *fresh, const struct gp_history *h, const struct ggn_stop_rule *rule, uint32_t key,
-                        const struct lull_reader *reader, struct lull_error *err);
-
 #endif

@@ -246,17 +246,88 @@ static void keep(struct lull_instance *in, const struct lull_block *b)
     of->head = of->pending;
 }
 
+/* lull.state/1: a header, then of each block its rectangle, its head and what is kept of its images. */
+static const char MAGIC[8] = {'G', 'G', 'N', 'S', 'T', 'A', 'T', '3'};
+
+struct state_header {
+    char magic[8];
+    uint32_t key, count, window, head_bytes;
+};
+
+static struct state_header header_of(const struct lull_instance *in)
+{
+    const struct gp_history *h = &in->frame.history;
+    struct state_header header = {{0}, in->key, h->count, (uint32_t)h->form.window, (uint32_t)sizeof(struct gp_head)};
+
+    memcpy(header.magic, MAGIC, sizeof MAGIC);
+    return header;
+}
+
 static int32_t save(const struct lull_instance *in, const struct lull_writer *writer, struct lull_error *err)
 {
-    int32_t status = gp_history_save(&in->frame.history, in->key, writer, err);
-    return status ? status : gp_means_save(&in->frame.means, writer, err);
+    const struct gp_history *h = &in->frame.history;
+    const struct state_header header = header_of(in);
+    int32_t status = writer->write(writer, &header, sizeof header);
+
+    for (uint32_t id = 0; !status && id < h->count; id++) {
+        struct gp_head head = h->block[id].head;
+
+        head.made = 0; /* computed again on demand: the same bytes, and a smaller file */
+        status = writer->write(writer, &h->block[id].rect, sizeof h->block[id].rect);
+        if (!status)
+            status = writer->write(writer, &head, sizeof head);
+        for (uint32_t i = 0; !status && i < head.stopper.used; i++)
+            status = writer->write(writer, gp_history_kept(h, id, head.order[i]), h->block[id].slot.kept);
+    }
+    if (status)
+        return lull_kit_fail(err, status, "state: the host could not write it");
+    return gp_means_save(&in->frame.means, writer, err);
+}
+
+/* Whether a head from a file may be trusted as an index into memory. */
+static int head_valid(const struct gp_head *head, const struct ggn_stop_rule *rule)
+{
+    uint32_t seen = 0;
+
+    for (int i = 0; i <= rule->window; i++) {
+        if (head->order[i] > (uint32_t)rule->window || (seen >> head->order[i] & 1))
+            return 0;
+        seen |= UINT32_C(1) << head->order[i];
+    }
+    return !head->made && head->bad <= 1 && head->measured <= 1 && ggn_stopper_valid(rule, &head->stopper);
+}
+
+static int32_t load_blocks(struct gp_history *h, const struct ggn_stop_rule *rule, const struct lull_reader *reader,
+                           struct lull_error *err)
+{
+    for (uint32_t id = 0; id < h->count; id++) {
+        struct lull_rect rect;
+        struct gp_head head;
+
+        if (reader->read(reader, &rect, sizeof rect) || reader->read(reader, &head, sizeof head))
+            return lull_kit_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
+        if (memcmp(&rect, &h->block[id].rect, sizeof rect) || !head_valid(&head, rule))
+            return lull_kit_fail(err, LULL_E_IO, "state: block %u does not fit the frame", id);
+        for (uint32_t i = 0; i < head.stopper.used; i++)
+            if (reader->read(reader, gp_history_kept(h, id, head.order[i]), h->block[id].slot.kept))
+                return lull_kit_fail(err, LULL_E_IO, "state: it ends early, at block %u", id);
+        h->block[id].head = head;
+    }
+    return LULL_OK;
 }
 
 static int32_t load(struct lull_instance *in, const struct lull_reader *reader, struct lull_error *err)
 {
+    struct state_header header, wanted = header_of(in);
     struct gp_history fresh;
-    int32_t status = gp_history_load(&fresh, &in->frame.history, &in->rule, in->key, reader, err);
+    int32_t status = gp_history_like(&fresh, &in->frame.history, err);
 
+    if (!status && reader->read(reader, &header, sizeof header))
+        status = lull_kit_fail(err, LULL_E_IO, "state: it ends early");
+    else if (!status && memcmp(&header, &wanted, sizeof header))
+        status = lull_kit_fail(err, LULL_E_IO, "state: saved by another criterion, model, parameter set or frame");
+    if (!status)
+        status = load_blocks(&fresh, &in->rule, reader, err);
     if (!status)
         status = gp_means_load(&in->frame.means, reader, err);
     return gp_history_take(&in->frame.history, &fresh, status);

@@ -27,8 +27,8 @@ struct gp_block_view {
     void *worker;
 };
 
-/* What such a criterion keeps of a block and computes from it; static. Its GP_CRITERION: gp_windowed_rule and this; the first
- * parameter is the file of the model. */
+/* What such a criterion keeps of a block and computes from it; static. Its GP_CRITERION has gp_windowed_rule and this, its
+ * first parameter is the file of the model. */
 struct gp_block_view_ops {
     const char *model, *variable; /* MODEL.ggn by default, or what this variable names (NULL: none) */
     int kind;                     /* for load */
@@ -80,8 +80,8 @@ long gp_windowed_read(const struct gp_block_view *seen, uint8_t *out);
 
 /* Where the criterion finds its model when no parameter names one: the first of these that exists goes into path: the one
  * that the environment variable names (NULL: none); a file of this name beside the shared object; share/lull of the prefix
- * that it is installed in; ggn/models of the source tree that it was built in. Without any, returns 0 and path holds the list
- * of places for the message. */
+ * that it is installed in; ggn/models of the source tree that it was built in. Without any, returns 0 and path holds the
+ * list of places for the message. */
 int gp_model_find(const char *name, const char *variable, char *path, size_t room);
 
 #endif
