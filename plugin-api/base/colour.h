@@ -1,6 +1,6 @@
 /*
  * Linear light with the primaries and the white of sRGB (IEC 61966-2-1), its luminance, and the codes that a display shows.
- * Pure functions and constants, thread-safe.
+ * Pure functions, thread-safe.
  */
 #ifndef BASE_COLOUR_H
 #define BASE_COLOUR_H
@@ -33,12 +33,14 @@ static inline double base_luminance(double r, double g, double b)
 double base_srgb_oetf(double linear);
 double base_srgb_eotf(double encoded);
 
+/* Tables that are filled before main, and that nobody writes to. */
+
 /* [code]: eotf(code / 255), rounded to the nearest. */
-extern const double base_srgb_linear[256];
-extern const float base_srgb_linear_f32[256];
-/* [code]: the smallest double whose 8-bit code is `code`, where 255 oetf(x) reaches code - 1/2: exact, from integers.
- * [0] is 0, [256] is infinite. */
-extern const double base_srgb_limit[257];
+extern double base_srgb_linear[256];
+extern float base_srgb_linear_f32[256];
+/* [code]: the smallest double whose 8-bit code is `code`, where 255 oetf(x) reaches code - 1/2, to the last bit. [0] is 0,
+ * [256] is infinite. */
+extern double base_srgb_limit[257];
 
 /* The code at the start of each bin: the top bits of a double, from those of the first limit up to those of 1. A bin is so
  * narrow that the code grows by at most one inside it. */
