@@ -1,3 +1,4 @@
+#define _GNU_SOURCE /* vasprintf */
 #include "base/identity.h"
 
 #include <stdarg.h>
@@ -14,41 +15,38 @@ static int is_text(char of)
     return c >= ' ' && c != 0x7f && c != 0xc0 && c != 0xc1 && c <= 0xf4;
 }
 
-/* Room for n more bytes and a NUL. */
-static char *grow(struct base_identity *id, size_t n)
+/* Appends n bytes and, behind them, a NUL. */
+static void append(struct base_identity *id, const char *bytes, size_t n)
 {
-    if (id->size + n + 1 > id->room) {
-        const size_t room = 2 * (id->size + n + 1);
-        char *text = realloc(id->text, room);
-        if (!text)
-            return NULL;
-        id->text = text;
-        id->room = room;
-    }
-    return id->text + id->size;
+    char *text = realloc(id->text, id->size + n + 1);
+    id->failed |= !text;
+    if (!text)
+        return;
+    if (n > 0)
+        memcpy(text + id->size, bytes, n);
+    id->text = text;
+    id->size += n;
+    text[id->size] = '\0';
 }
 
 void base_identity_add(struct base_identity *id, const char *key, const char *format, ...)
 {
-    va_list args, again;
-    const size_t n = strlen(key);
+    va_list args;
+    char *value;
     va_start(args, format);
-    va_copy(again, args);
-    const int length = vsnprintf(NULL, 0, format, args);
-    char *to = length < 0 ? NULL : grow(id, n + (size_t)length + 2);
-    if (to) {
-        memcpy(to, key, n);
-        to[n] = '=';
-        vsnprintf(to + n + 1, (size_t)length + 1, format, again);
-        for (char *c = to + n + 1; *c; c++)
-            if (!is_text(*c))
-                *c = '?';
-        memcpy(to + n + 1 + length, "\n", 2);
-        id->size += n + (size_t)length + 2;
-    }
-    id->failed |= !to;
+    const int length = vasprintf(&value, format, args);
     va_end(args);
-    va_end(again);
+    id->failed |= length < 0;
+    if (length < 0)
+        return;
+    for (char *c = value; *c; c++)
+        if (!is_text(*c))
+            *c = '?';
+    append(id, key, strlen(key));
+    append(id, "=", 1);
+    append(id, value, (size_t)length);
+    append(id, "\n", 1);
+    free(value);
 }
 
 void base_identity_add_reals(struct base_identity *id, const char *key, const double *values, int count)
@@ -71,12 +69,8 @@ void base_identity_role(struct base_identity *id, const char *key, int role)
 
 void base_identity_append(struct base_identity *id, const struct base_identity *other)
 {
-    char *to = grow(id, other->size);
-    if (to && other->size > 0) {
-        memcpy(to, other->text, other->size + 1);
-        id->size += other->size;
-    }
-    id->failed |= !to || other->failed;
+    append(id, other->text, other->size);
+    id->failed |= other->failed;
 }
 
 int base_identity_check(const struct base_identity *id, struct base_err *err)

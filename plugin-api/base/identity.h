@@ -23,7 +23,7 @@ struct base_identity_role {
 
 struct base_identity {
     char *text; /* owns; [size] and a NUL; NULL: nothing yet */
-    size_t size, room;
+    size_t size;
     struct base_identity_role roles[BASE_IDENTITY_ROLES]; /* until the first without a key; every other key decides */
     int failed;                                           /* memory ran out: lines are missing */
 };
