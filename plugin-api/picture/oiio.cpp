@@ -1,5 +1,6 @@
 /* OpenImageIO behind picture/oiio.h: the only C++ of the programs. Exceptions end here. */
 extern "C" {
+#include "base/bytes.h"
 #include "base/files.h"
 }
 
@@ -56,22 +57,19 @@ int complain(const char *name, std::string why, base_err *err)
                      why.empty() ? "unknown reason" : why.c_str());
 }
 
-std::vector<ImageSpec> list_parts(ImageInput &input)
+/* Of an EXR all, of other formats the first. Channels are called as in the file: of luminance and chroma OpenImageIO 2.5
+ * makes R, G and B. */
+std::vector<ImageSpec> list_parts(ImageInput &input, bool is_exr)
 {
     std::vector<ImageSpec> parts{input.spec()};
-    for (int part = 1; part < max_channels && input.seek_subimage(part, 0); part++)
+    for (int part = 1; is_exr && part < max_channels && input.seek_subimage(part, 0); part++)
         parts.push_back(input.spec());
     input.seek_subimage(0, 0);
     input.geterror(); /* there is no such part */
+    for (ImageSpec &part : parts)
+        if (part.get_int_attribute("openexr:luminancechroma") != 0)
+            part.channelnames = {"Y", "RY", "BY"};
     return parts;
-}
-
-/* As they stand in the file: OpenImageIO 2.5 shows luminance and chroma of an EXR as R, G and B. */
-std::vector<std::string> channel_names(const ImageSpec &spec)
-{
-    if (spec.get_int_attribute("openexr:luminancechroma") != 0)
-        return {"Y", "RY", "BY"};
-    return spec.channelnames;
 }
 
 /* The first three, else the first one, and alpha: of other formats than EXR, whose names may say nothing. */
@@ -86,18 +84,15 @@ pic_choice choose_by_place(const ImageSpec &spec)
 int choose_picture(ImageInput &input, const char *name, pic_choice *out, base_err *err)
 {
     const bool is_exr = std::strcmp(input.format_name(), "openexr") == 0;
-    const std::vector<ImageSpec> parts = is_exr ? list_parts(input) : std::vector<ImageSpec>{input.spec()};
-    std::vector<std::string> part_names;
-    std::vector<std::vector<std::string>> names;
+    const std::vector<ImageSpec> parts = list_parts(input, is_exr);
     std::vector<pic_channel> list;
-    for (const ImageSpec &spec : parts) {
-        part_names.push_back(parts.size() > 1 ? spec.get_string_attribute("oiio:subimagename").c_str() : "");
-        names.push_back(channel_names(spec));
+    for (size_t part = 0; part < parts.size(); part++) {
+        const auto part_name = parts[part].get_string_attribute("oiio:subimagename");
+        for (size_t c = 0; c < parts[part].channelnames.size(); c++)
+            list.push_back({parts[part].channelnames[c].c_str(),
+                            parts.size() == 1 || part_name.empty() ? nullptr : part_name.data(), static_cast<int>(part),
+                            static_cast<int>(c)});
     }
-    for (size_t part = 0; part < parts.size(); part++)
-        for (size_t c = 0; c < names[part].size(); c++)
-            list.push_back({names[part][c].c_str(), part_names[part].empty() ? nullptr : part_names[part].c_str(),
-                            static_cast<int>(part), static_cast<int>(c)});
     if (list.size() > PIC_MAX_CHANNELS)
         return base_fail(err, BASE_EINVAL, "%s: %zu channels (expected at most %d)", name, list.size(), PIC_MAX_CHANNELS);
     base_err why = {};
@@ -353,10 +348,7 @@ int check_png(const char *name, const unsigned char *data, size_t size, base_err
     static const unsigned char signature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
     if (size < sizeof signature || std::memcmp(data, signature, sizeof signature) != 0)
         return base_fail(err, BASE_EINVAL, "%s: not a PNG file", name);
-    const auto be32 = [data](size_t at) {
-        return static_cast<uint32_t>(data[at]) << 24 | static_cast<uint32_t>(data[at + 1]) << 16 |
-               static_cast<uint32_t>(data[at + 2]) << 8 | static_cast<uint32_t>(data[at + 3]);
-    };
+    const auto be32 = [data](size_t at) { return __builtin_bswap32(base_get_u32(data + at)); };
     for (size_t at = sizeof signature; at < size;) {
         if (size - at < 12 || be32(at) > size - at - 12)
             return base_fail(err, BASE_EINVAL, "%s: truncated PNG file", name);
@@ -408,17 +400,13 @@ int find_bmp_order(const pic_request &q, header *out, base_err *err)
     enum { BITS = 28, COMPRESSION = 30, MASKS = 54, END = MASKS + 12 };
     static const int channel_of_byte[4] = {2, 1, 0, 3};
     const std::vector<unsigned char> head = head_of(q, END);
-    const auto le32 = [&head](size_t at) {
-        return static_cast<uint32_t>(head[at]) | static_cast<uint32_t>(head[at + 1]) << 8 |
-               static_cast<uint32_t>(head[at + 2]) << 16 | static_cast<uint32_t>(head[at + 3]) << 24;
-    };
     if (head.size() < END || head[0] != 'B' || head[1] != 'M' || head[BITS] != 32 ||
         (head[COMPRESSION] != 3 && head[COMPRESSION] != 6))
         return 0;
     int left = 0 + 1 + 2 + 3;
     for (int c = 0; c < 3; c++) {
         int byte = 0;
-        while (byte < 4 && le32(static_cast<size_t>(MASKS + 4 * c)) != 0xffu << 8 * byte)
+        while (byte < 4 && base_get_u32(&head[static_cast<size_t>(MASKS + 4 * c)]) != 0xffu << 8 * byte)
             byte++;
         if (byte == 4)
             return base_fail(err, BASE_EINVAL, "%s: a BMP whose colours are no bytes (expected masks of 8 bits)", q.name);
@@ -428,17 +416,6 @@ int find_bmp_order(const pic_request &q, header *out, base_err *err)
     out->order[3] = channel_of_byte[left >= 0 && left < 4 ? left : 3];
     out->is_ordered = true;
     return 0;
-}
-
-/* The name of a file's format, which is in small letters whatever the file's own name has. */
-std::string format_of(const char *name)
-{
-    const char *dot = std::strrchr(name, '.');
-    std::string format = dot != nullptr ? dot + 1 : name;
-    for (char &c : format)
-        if (c >= 'A' && c <= 'Z')
-            c = static_cast<char>(c - 'A' + 'a');
-    return format;
 }
 
 /* An image whose pixels can be asked for, and what it stands on; gone in the reverse order. */
@@ -460,7 +437,8 @@ int open_memory(const char *name, const void *data, size_t size, opened *out, ba
         out->first_bytes.without_alpha = (png[25] & 4) == 0;
     }
     out->reader = std::make_unique<OIIO::Filesystem::IOMemReader>(data, size);
-    out->input = ImageInput::create(format_of(name), false);
+    const char *dot = std::strrchr(name, '.');
+    out->input = ImageInput::create(OIIO::Strutil::lower(dot != nullptr ? dot + 1 : name), false);
     if (!out->input || out->input->supports("ioproxy") == 0) {
         OIIO::geterror();
         return base_fail(err, BASE_EINVAL, "%s: this format cannot be read from memory", name);
