@@ -10,7 +10,7 @@
 
 #include "base/files.h"
 #include "base/json.h"
-#include "base/unique.h"
+#include "base/list.h"
 
 enum { MAX_TEXT = 1 << 26, MAX_LABELS = 1 << 20 };
 

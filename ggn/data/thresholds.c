@@ -8,7 +8,7 @@
 
 #include "base/files.h"
 #include "base/text.h"
-#include "base/unique.h"
+#include "base/list.h"
 #include "picture/read.h"
 
 enum { MAX_TEXT = 1 << 26, MAX_VIEWS = 1 << 20 };

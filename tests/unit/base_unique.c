@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "base/unique.h"
+#include "base/list.h"
 
 enum { COUNT = 300 };
 
