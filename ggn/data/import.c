@@ -19,7 +19,7 @@
 #include "picture/read.h"
 #include "sequence/builder.h"
 #include "sequence/manifest.h"
-#include "sequence/statistics.h"
+#include "sequence/tail.h"
 
 struct level {
     uint32_t spp;

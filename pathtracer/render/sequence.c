@@ -15,7 +15,7 @@
 #include "sequence/builder.h"
 #include "sequence/manifest.h"
 #include "sequence/simulate.h"
-#include "sequence/statistics.h"
+#include "sequence/tail.h"
 #include "scene/scene.h"
 
 /* Seeds of levels and reference differ in these bits: no sample is shared, and the reference of one seed is not the input of

@@ -1,6 +1,7 @@
 /*
- * Noise that sits in few pixels: the *tail* of a block's noise. Rare bright paths, each met by one sample or none, make it;
- * a mean over all pixels hides it. Pure functions, any thread, allocate nothing.
+ * Statistics of one block's film that the cheap criteria need, defined in FORMAT.md, and above all the *tail* of a block's
+ * noise: what sits in few pixels. Rare bright paths, each met by one sample or none, make it; a mean over all pixels hides
+ * it. Pure functions, any thread, allocate nothing.
  *
  * - The criteria halfbuf and variance are held back by the share of unsettled pixels.
  * - A quote takes top_share for light that was not met yet (plugin-api/host/quote.c).
@@ -11,6 +12,9 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <stdint.h>
+
+#include "sequence/block.h"
 
 struct seq_tail {
     /* 99.9th percentile of the noise, element ceil(0.999 n) of the sorted values, over max(mean luminance, 1e-4) */
@@ -32,5 +36,12 @@ static inline int seq_is_unsettled(double difference, double y)
 {
     return difference > SEQ_UNSETTLED_ERROR * fmax(fabs(y), SEQ_UNSETTLED_FLOOR);
 }
+
+enum { SEQ_DAMMERTZ, SEQ_HALF_UNSETTLED, SEQ_RSE, SEQ_RSE_UNSETTLED, SEQ_TAIL999, SEQ_GINI, SEQ_STATISTICS };
+
+/* mean, half_mean (of half A), half (the difference D): [3, pixels], linear; moment2: [pixels] mean squared luminance;
+ * scratch: [pixels], overwritten. pixels >= 1, spp >= 1. out has the names of FORMAT.md. */
+void seq_statistics(const double *mean, const double *half_mean, const double *half, const double *moment2, size_t pixels,
+                    uint64_t spp, double *scratch, struct seq_stat out[SEQ_STATISTICS]);
 
 #endif

@@ -8,7 +8,7 @@
 
 #include "base/colour.h"
 #include "base/half.h"
-#include "sequence/statistics.h"
+#include "sequence/tail.h"
 #include "support/ggn_near.h"
 #include "support/lseq_oracle.h"
 

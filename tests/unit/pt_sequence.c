@@ -20,7 +20,7 @@
 #include "render/sequence.h"
 #include "scene/scene.h"
 #include "sequence/manifest.h"
-#include "sequence/statistics.h"
+#include "sequence/tail.h"
 #include "support/lseq_oracle.h"
 #include "support/pt_fake.h"
 #include "support/pt_captured.h"
