@@ -9,7 +9,6 @@
 #include "base/clock.h"
 #include "base/files.h"
 #include "base/list.h"
-#include "base/lock.h"
 #include "base/text.h"
 #include "base/version.h"
 #include "sequence/builder.h"

@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 enum { PATH_ROOM = 4096, LINKS_MAX = 40, TRIES_MAX = 100, NAME_KEPT = 180 };
-static const char TMP_PREFIX[] = ".tmp-lull"; /* .tmp-lullPID-N.NAME */
+#define TMP_PREFIX ".tmp-lull" /* .tmp-lullPID-N.NAME */
 
 int base_file_open(const char *path, FILE **file, struct base_err *err)
 {
@@ -116,12 +116,9 @@ static void folder_of(const char *path, char *folder)
 /* Whose temporary `name` is: a process, or 0 if it is none. */
 static long owner_of(const char *name)
 {
-    size_t n = sizeof TMP_PREFIX - 1;
-    char *end;
-    if (strncmp(name, TMP_PREFIX, n) != 0)
-        return 0;
-    long pid = strtol(name + n, &end, 10);
-    return pid > 0 && *end == '-' ? pid : 0;
+    long pid;
+    char dash;
+    return sscanf(name, TMP_PREFIX "%ld%c", &pid, &dash) == 2 && dash == '-' && pid > 0 ? pid : 0;
 }
 
 /* Removes the temporaries of processes that are gone. One on another machine, or in another container, holds its lock. */
@@ -220,16 +217,6 @@ int base_file_is_inside(const char *path, const char *folder)
     return 0;
 }
 
-/* The n-th name for a temporary beside `target`. A long name is cut at the front: the temporary's fits where it does. */
-static int name_tmp(const char *target, int n, char *tmp_path, size_t room, struct base_err *err)
-{
-    const char *base = base_file_name(target);
-    size_t length = strlen(base);
-    int used = snprintf(tmp_path, room, "%.*s%s%ld-%d.%s", (int)(base - target), target, TMP_PREFIX, (long)getpid(), n,
-                        length > NAME_KEPT ? base + length - NAME_KEPT : base);
-    return used > 0 && (size_t)used < room ? 0 : too_long(target, err);
-}
-
 int base_make_folder(const char *path, int *made, struct base_err *err)
 {
     const int is_new = mkdir(path, 0777) == 0;
@@ -244,13 +231,18 @@ int base_file_join(char *path, const char *dir, const char *name, struct base_er
     return n > 0 && n < 4096 ? 0 : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
 }
 
-/* Makes the temporary and locks it; one that somebody swept away in between is made again under the next name. */
+/* Makes the temporary beside the file and locks it; one that somebody swept away in between is made again under the next
+ * name. A long name is cut at the front: the temporary's fits where it does. */
 static int create_tmp(struct base_file_out *out, int *fd, struct base_err *err)
 {
+    const char *name = base_file_name(out->path);
+    const size_t length = strlen(name);
     struct stat st;
-    for (int n = 0, rc; n < TRIES_MAX; n++) {
-        if ((rc = name_tmp(out->path, n, out->tmp_path, sizeof out->tmp_path, err)) != 0)
-            return rc;
+    for (int n = 0; n < TRIES_MAX; n++) {
+        int used = snprintf(out->tmp_path, sizeof out->tmp_path, "%.*s%s%ld-%d.%s", (int)(name - out->path), out->path,
+                            TMP_PREFIX, (long)getpid(), n, length > NAME_KEPT ? name + length - NAME_KEPT : name);
+        if (used < 0 || (size_t)used >= sizeof out->tmp_path)
+            return too_long(out->path, err);
         *fd = open(out->tmp_path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
         if (*fd < 0 && errno != EEXIST)
             break;
@@ -351,4 +343,44 @@ void base_file_abort(struct base_file_out *out)
     fclose(out->file);
     out->file = NULL;
     unlink(out->tmp_path);
+}
+
+static int refuse_lock(const char *dir, int fd, struct base_err *err)
+{
+    struct flock holder = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
+    if (errno != EACCES && errno != EAGAIN)
+        return base_fail(err, BASE_EIO, "%s: cannot be locked: %s", dir, strerror(errno));
+    if (fcntl(fd, F_GETLK, &holder) != 0 || holder.l_type == F_UNLCK)
+        holder.l_pid = 0;
+    return base_fail(err, BASE_EINVAL, "%s: process %ld is writing there", dir, (long)holder.l_pid);
+}
+
+int base_lock_folder(struct base_lock *lock, const char *dir, struct base_err *err)
+{
+    struct flock whole = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
+    struct stat st = {0};
+    lock->fd = 0;
+    int rc = base_file_join(lock->path, dir, ".lock", err);
+    while (!rc) {
+        int fd = open(lock->path, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0666);
+        if (fd < 0)
+            return base_fail(err, BASE_EIO, "%s: %s", lock->path, strerror(errno));
+        if (fcntl(fd, F_SETLK, &whole) != 0)
+            rc = refuse_lock(dir, fd, err);
+        else if (fstat(fd, &st) == 0 && st.st_nlink > 0) {
+            lock->fd = fd;
+            break;
+        }
+        close(fd); /* its holder removed the file between the two calls: again */
+    }
+    return rc;
+}
+
+void base_lock_release(struct base_lock *lock)
+{
+    if (lock->fd <= 0)
+        return;
+    unlink(lock->path);
+    close(lock->fd);
+    lock->fd = 0;
 }

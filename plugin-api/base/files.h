@@ -68,4 +68,16 @@ int base_file_write_line(const char *path, const char *text, struct base_err *er
 /* Closes and removes the temporary. Safe after commit and on a zeroed object. */
 void base_file_abort(struct base_file_out *out);
 
+/* A folder that one process at a time may write to. The lock is a record lock on DIR/.lock: it ends with its process,
+ * however that ends, and holds between machines where the file system does. Of no use within one process. */
+struct base_lock {
+    int fd; /* 0: not held */
+    char path[4096];
+};
+
+/* BASE_EINVAL, with the number of the process that holds it, when the folder is taken. */
+int base_lock_folder(struct base_lock *lock, const char *dir, struct base_err *err);
+/* Safe on a zeroed object. */
+void base_lock_release(struct base_lock *lock);
+
 #endif

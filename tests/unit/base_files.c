@@ -26,7 +26,6 @@
 #include "base/half.h"
 #include "base/inputs.h"
 #include "base/json.h"
-#include "base/lock.h"
 #include "base/outputs.h"
 #include "picture/png.h"
 #include "base/threads.h"
