@@ -3,7 +3,7 @@
  * estimates are of what the eye is left with after the observer's blur, over what texture hides (model/visibility.h):
  *
  * - halves: how far the kept halves are apart. Bias, which they share, is not in it.
- * - crossed: how far each is from the other, noisy half (denoise/estimate.h's formula, what is kept in the place of F). Bias
+ * - crossed: how far each is from the other, noisy half (denoise/blend.h's formula, what is kept in the place of F). Bias
  *   is in it. The observer asks for the mean of sixth powers over each of its patches; the largest of three counts:
  *   - the mean square with half a standard error more, so that luck stops little, and never below that of the halves; errors
  *     as uneven as the halves' difference, and at least Gaussian (15 cubes of the mean square);

@@ -5,8 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "denoise/blend.h"
-
 /* Points each of `count` buffers to `size` floats of the memory at *next. */
 static void lay_out(float **const buffers[], size_t count, size_t size, float **next)
 {

@@ -23,7 +23,7 @@
 
 #include <stddef.h>
 
-#include "denoise/estimate.h"
+#include "denoise/blend.h"
 #include "denoise/oidn.h"
 
 /* Pixels [x0, x1) x [y0, y1) of a rectangle, which begins at 0, 0. */

@@ -139,7 +139,7 @@ static void a_part_is_a_picture_of_its_own(void **unused)
             assert_true(fabsf(p.denoised[k][from] - 0.25f) < fabsf(p.half[k][from] - 0.25f) + 0.05f); /* it was denoised */
         }
 
-    /* what estimate.h and blend.h say of these arrays */
+    /* what blend.h says of these arrays */
     static float fa[3 * PART], fb[3 * PART], maps[5][PART], scratch[PART], weight[PART], apart[PART], light[4][PART];
     static float kept[2][3 * PART], wanted[3 * PART];
     memcpy(fa, part.denoised[0], sizeof fa);
