@@ -1,6 +1,6 @@
 /* `ggn train`: from a data set to a model file. */
 #include "base/files.h"
-#include "base/inputs.h"
+#include "base/paths.h"
 #include "base/interrupt.h"
 #include "base/options.h"
 #include "cli/commands.h"

@@ -6,7 +6,7 @@
 
 #include "base/err.h"
 #include "base/options.h"
-#include "base/outputs.h"
+#include "base/paths.h"
 #include "pbrt/load.h"
 #include "render/output.h"
 #include "render/render.h"

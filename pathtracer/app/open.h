@@ -6,7 +6,7 @@
 #ifndef PT_OPEN_H
 #define PT_OPEN_H
 
-#include "base/inputs.h"
+#include "base/paths.h"
 #include "base/log.h"
 #include "frame.h"
 #include "integ/integrator.h"

@@ -5,7 +5,7 @@
 #include <stddef.h>
 
 #include "base/err.h"
-#include "base/inputs.h"
+#include "base/paths.h"
 
 struct pt_source {
     /* Reads all of `path`; *bytes is malloc'ed (caller frees) and NUL-terminated one past *size. Must be thread-safe. */

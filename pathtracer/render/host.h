@@ -10,7 +10,7 @@
 #include <lull/host_draft.h>
 
 #include "base/err.h"
-#include "base/inputs.h"
+#include "base/paths.h"
 #include "base/log.h"
 #include "base/threads.h"
 #include "render/film.h"

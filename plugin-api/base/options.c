@@ -10,8 +10,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "base/inputs.h"
-#include "base/outputs.h"
+#include "base/paths.h"
 #include "base/version.h"
 
 enum { EXIT_UNWRITTEN = 2, MAX_OPTIONS = 96, KEY_LONG = 256, KEY_USAGE = KEY_LONG + MAX_OPTIONS, KEY_HELP, KEY_VERSION };

@@ -4,7 +4,7 @@
 
 #include "base/colour.h"
 #include "base/files.h"
-#include "base/outputs.h"
+#include "base/paths.h"
 #include "picture/png.h"
 
 int32_t lull_host_check_outputs(const struct lull_host_output *outputs, uint32_t output_count, const char *const *inputs,

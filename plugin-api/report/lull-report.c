@@ -7,7 +7,7 @@
 #include "base/files.h"
 #include "base/interrupt.h"
 #include "base/options.h"
-#include "base/outputs.h"
+#include "base/paths.h"
 #include "picture/read.h"
 #include "report/report.h"
 

@@ -26,7 +26,7 @@ struct seq_manifest {
     char scene[SEQ_MANIFEST_NAME], camera[SEQ_MANIFEST_NAME], renderer[SEQ_MANIFEST_NAME];
     char source[SEQ_MANIFEST_PATH];
     uint32_t source_crc32; /* 0: not known */
-    uint32_t inputs_crc32; /* of the source and every file it named (base/inputs.h); 0: not known */
+    uint32_t inputs_crc32; /* of the source and every file it named (base/paths.h); 0: not known */
     int has_look_at;
     double look_at[9];             /* eye, point looked at, up: instead of the source's camera, with has_look_at */
     double fov_deg;                /* 0: the source's */

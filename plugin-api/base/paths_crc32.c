@@ -1,4 +1,4 @@
-#include "base/inputs.h" /* apart from inputs.c: not everybody who names inputs links zlib */
+#include "base/paths.h" /* apart from paths.c: not everybody who names inputs links zlib */
 
 #include <stdio.h>
 #include <stdlib.h>
