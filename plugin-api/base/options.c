@@ -331,7 +331,7 @@ static int check_files(const struct base_options *options, void *into, struct fi
         rc = base_outputs_protect(&files->outputs, &files->inputs, err);
     for (const struct base_option *o = options->list; !rc && (o->name || o->help); o++)
         if (o->output == BASE_FOLDER && text_of(o, into))
-            rc = base_outputs_protect_folder(text_of(o, into), o->files, &files->inputs, err);
+            rc = base_outputs_protect_folder(text_of(o, into), &files->inputs, err);
         else if (o->kind)
             rc = base_file_check_kind(text_of(o, into), o->kind, err);
     if (!rc && options->outputs)

@@ -69,7 +69,6 @@ struct base_option {
     enum base_path input;  /* the value is read, if it is there: no output may take its place or go into its folder */
     enum base_path output; /* the value is written: refused when it cannot be, is an input, or is written twice */
     const struct base_file_kind *kind; /* of a file: refused when one of another kind is there; NULL: any is replaced */
-    const char *const *files;          /* of a folder: names written there that an input might have; ends with NULL */
     int role; /* in the identity of the result (base/identity.h): does another value make another one? */
     /* For a value of several parts, or a key of another name: appends its lines to the identity. */
     void (*identify)(const void *from, struct base_identity *to);

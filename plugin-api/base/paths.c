@@ -98,8 +98,7 @@ int base_outputs_protect(const struct base_outputs *o, const struct base_inputs 
     return rc;
 }
 
-int base_outputs_protect_folder(const char *folder, const char *const *names, const struct base_inputs *inputs,
-                                struct base_err *err)
+int base_outputs_protect_folder(const char *folder, const struct base_inputs *inputs, struct base_err *err)
 {
     char path[4096], bare[4096];
     int rc = base_file_join(path, folder, ".", err); /* is the folder one of theirs, if it is there? */
@@ -109,12 +108,5 @@ int base_outputs_protect_folder(const char *folder, const char *const *names, co
     strcpy(bare, folder);
     for (size_t n = strlen(bare); n > 1 && bare[n - 1] == '/';)
         bare[--n] = '\0';
-    if (!rc) /* and would it be made in one of theirs? */
-        rc = base_inputs_protect(inputs, bare, err);
-    for (int i = 0; names && names[i] && !rc; i++) {
-        rc = base_file_join(path, folder, names[i], err);
-        if (!rc)
-            rc = base_inputs_protect(inputs, path, err);
-    }
-    return rc;
+    return rc ? rc : base_inputs_protect(inputs, bare, err); /* and would it be made in one of theirs? */
 }

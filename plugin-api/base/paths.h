@@ -50,8 +50,7 @@ struct base_outputs {
 int base_outputs_add(struct base_outputs *outputs, const char *option, const char *path, struct base_err *err);
 /* BASE_EINVAL when one of them is an input or in a folder that is one. */
 int base_outputs_protect(const struct base_outputs *outputs, const struct base_inputs *inputs, struct base_err *err);
-/* The same for a folder in which files of these names (ends with NULL; may be NULL) will be written, among others. */
-int base_outputs_protect_folder(const char *folder, const char *const *names, const struct base_inputs *inputs,
-                                struct base_err *err);
+/* The same for a folder in which files will be written. */
+int base_outputs_protect_folder(const char *folder, const struct base_inputs *inputs, struct base_err *err);
 
 #endif
