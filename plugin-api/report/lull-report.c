@@ -68,9 +68,7 @@ static int write_page(const struct settings *s, const char *report, const char *
     struct pic_image picture = {0};
     struct lull_error e = {.struct_size = sizeof e};
     uint32_t count = 0;
-    int rc = s->args[1] ? report_view_read(s->args[1], &view, err) : 0;
-    if (!rc && s->args[1])
-        rc = report_view_picture(s->args[1], &view, &picture, err);
+    int rc = s->args[1] ? report_view_picture(s->args[1], &view, &picture, err) : 0;
     for (int i = 1; i < LAYERS && !rc && s->args[1]; i++)
         codes[i] = report_view_layer(s->args[1], names[i], &view, &picture);
     for (int i = 0; i < LAYERS && !rc && s->args[1]; i++)

@@ -27,11 +27,9 @@ struct report_view {
     double black, codes[REPORT_MOST_GREYS];
 };
 
-/* Of the picture in this file; that of a file without such an attribute is the sRGB transfer. BASE_EINVAL for any other
- * attribute. */
-int report_view_read(const char *path, struct report_view *out, struct base_err *err);
-/* pic_read_display (picture/read.h), as the view shows it. */
-int report_view_picture(const char *path, const struct report_view *view, struct pic_image *out, struct base_err *err);
+/* The view of the picture in this file, and pic_read_display (picture/read.h) as it shows it. The view of a file without
+ * such an attribute is the sRGB transfer; BASE_EINVAL for any other attribute. */
+int report_view_picture(const char *path, struct report_view *view, struct pic_image *out, struct base_err *err);
 /* Codes of a layer (pic_read_layer), [height][width][3], the caller's; NULL: the file does not have it in this size, or no
  * memory. */
 uint8_t *report_view_layer(const char *path, const char *layer, const struct report_view *view,

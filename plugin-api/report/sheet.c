@@ -6,6 +6,7 @@
 #include <string.h>
 #include <zlib.h>
 
+#include "base/bytes.h"
 #include "base/files.h"
 #include "picture/draw.h"
 #include "picture/png.h"
@@ -29,16 +30,7 @@ struct sheet {
 
 enum { SIGNATURE = 8, AROUND = 12, WORD = 4 }; /* bytes: of a file's head, of a chunk's length, name and checksum */
 
-static void put_word(uint8_t *at, uint32_t v)
-{
-    for (int i = 0; i < WORD; i++)
-        at[i] = (uint8_t)(v >> (24 - 8 * i));
-}
-
-static uint32_t word_at(const uint8_t *at)
-{
-    return (uint32_t)at[0] << 24 | (uint32_t)at[1] << 16 | (uint32_t)at[2] << 8 | at[3];
-}
+static void put_word(uint8_t *at, uint32_t v) { base_put_u32(at, __builtin_bswap32(v)); }
 
 /* A chunk of up to two parts. Failures are found by base_file_commit. */
 static void write_chunk(FILE *f, const char *name, const void *first, uint32_t first_size, const void *second,
@@ -105,7 +97,7 @@ static int write_frame(struct sheet *s, struct base_err *err)
     if (s->frame == 0)
         fwrite(png, 1, SIGNATURE, s->file.file);
     for (size_t at = SIGNATURE; at + AROUND <= size;) {
-        const uint32_t length = word_at(png + at);
+        const uint32_t length = __builtin_bswap32(base_get_u32(png + at));
         take_chunk(s, png + at, length, &is_open);
         at += AROUND + length;
     }
@@ -159,9 +151,7 @@ static int add_frame(struct sheet *s, const char *path, struct base_err *err)
 {
     struct pic_image picture = {0}, spp = {0};
     static struct report_view view;
-    int rc = report_view_read(path, &view, err);
-    if (!rc)
-        rc = report_view_picture(path, &view, &picture, err);
+    int rc = report_view_picture(path, &view, &picture, err);
     if (!rc)
         rc = pic_read_channel(path, "lull.spp.V", &spp, err);
     if (!rc &&

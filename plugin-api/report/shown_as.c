@@ -19,7 +19,7 @@ static int next(const char **at, double low, double high, double *out)
     return found;
 }
 
-int report_view_read(const char *path, struct report_view *out, struct base_err *err)
+static int read_view(const char *path, struct report_view *out, struct base_err *err)
 {
     struct pic_attribute attribute = {.name = "lull:view"};
     struct pic_window window;
@@ -73,10 +73,12 @@ uint8_t *report_view_layer(const char *path, const char *layer, const struct rep
     return codes;
 }
 
-int report_view_picture(const char *path, const struct report_view *view, struct pic_image *out, struct base_err *err)
+int report_view_picture(const char *path, struct report_view *view, struct pic_image *out, struct base_err *err)
 {
     struct pic_image picture = {0};
-    int rc = pic_read_display(path, &picture, err);
+    int rc = read_view(path, view, err);
+    if (!rc)
+        rc = pic_read_display(path, &picture, err);
     if (rc)
         return rc;
     if (view->count > 0) {
