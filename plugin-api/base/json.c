@@ -63,12 +63,12 @@ int base_json_get(const cJSON *object, const char *key, double lo, double hi, do
     return 1;
 }
 
-int base_json_get_whole(const cJSON *object, const char *key, double lo, double hi, double *out)
+int base_json_get_whole(const cJSON *object, const char *key, double lo, double hi, uint64_t *out)
 {
     double value;
     if (!base_json_get(object, key, lo, hi, &value) || floor(value) != value)
         return 0;
-    *out = value;
+    *out = value < 0x1p64 ? (uint64_t)value : UINT64_MAX;
     return 1;
 }
 

@@ -6,6 +6,7 @@
 #define BASE_JSON_H
 
 #include <cjson/cJSON.h>
+#include <stdint.h>
 
 #include "base/err.h"
 
@@ -29,8 +30,8 @@ int base_json_write(const char *path, const cJSON *root, int failed, struct base
 
 /* Whether object has a number `key` in [lo, hi]; then *out is it. */
 int base_json_get(const cJSON *object, const char *key, double lo, double hi, double *out);
-/* And a whole one. */
-int base_json_get_whole(const cJSON *object, const char *key, double lo, double hi, double *out);
+/* And a whole one; lo >= 0, and 2^64 is the largest that *out can be. */
+int base_json_get_whole(const cJSON *object, const char *key, double lo, double hi, uint64_t *out);
 /* The same of what must be there: BASE_EINVAL says what is wrong with it. */
 int base_json_need(const cJSON *object, const char *key, double lo, double hi, double *out, struct base_err *err);
 int base_json_need_int(const cJSON *object, const char *key, int lo, int hi, int *out, struct base_err *err);

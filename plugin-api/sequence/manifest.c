@@ -1,6 +1,7 @@
 #include "sequence/manifest.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,11 +22,20 @@ void seq_manifest_release(struct seq_manifest *m)
     *m = (struct seq_manifest){0};
 }
 
-static void get_text(const cJSON *o, const char *name, char *out, size_t room)
+/* Whether it is there and has room; else it is cut. */
+static int get_text(const cJSON *o, const char *name, char *out, size_t room)
 {
     const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
-    if (cJSON_IsString(v))
-        snprintf(out, room, "%s", v->valuestring);
+    return cJSON_IsString(v) && snprintf(out, room, "%s", v->valuestring) < (int)room;
+}
+
+static int get_u32(const cJSON *o, const char *name, double lo, double hi, uint32_t *out)
+{
+    uint64_t value;
+    if (!base_json_get_whole(o, name, lo, hi, &value))
+        return 0;
+    *out = (uint32_t)value;
+    return 1;
 }
 
 /* Eight hex digits. */
@@ -60,28 +70,14 @@ static int get_levels(const char *path, const cJSON *root, struct seq_manifest *
 
 static int get_block(const cJSON *o, const struct seq_manifest *m, struct seq_manifest_block *b)
 {
-    const cJSON *file = cJSON_GetObjectItemCaseSensitive(o, "file");
-    const cJSON *seconds = cJSON_GetObjectItemCaseSensitive(o, "seconds");
-    double id, x0, y0, x1, y1, bytes, dropped = 0;
-    uint32_t crc;
-    if (!base_json_get_whole(o, "id", 0, UINT32_MAX, &id) || !base_json_get_whole(o, "x0", 0, m->width - 1.0, &x0) ||
-        !base_json_get_whole(o, "y0", 0, m->height - 1.0, &y0) || !base_json_get_whole(o, "x1", x0 + 1, m->width, &x1) ||
-        !base_json_get_whole(o, "y1", y0 + 1, m->height, &y1) || !base_json_get_whole(o, "bytes", 1, 1 << 30, &bytes) ||
-        (cJSON_HasObjectItem(o, "dropped") && !base_json_get_whole(o, "dropped", 0, 1e15, &dropped)) ||
-        !get_crc(o, "crc32", &crc) || !cJSON_IsString(file) || strlen(file->valuestring) >= sizeof b->file ||
-        strchr(file->valuestring, '/') || file->valuestring[0] == '.' || file->valuestring[0] == '\0')
-        return 0;
-    *b = (struct seq_manifest_block){.id = (uint32_t)id,
-                                     .x0 = (uint32_t)x0,
-                                     .y0 = (uint32_t)y0,
-                                     .x1 = (uint32_t)x1,
-                                     .y1 = (uint32_t)y1,
-                                     .bytes = (uint64_t)bytes,
-                                     .crc32 = crc,
-                                     .seconds = cJSON_IsNumber(seconds) ? seconds->valuedouble : 0.0,
-                                     .dropped = (uint64_t)dropped};
-    strcpy(b->file, file->valuestring);
-    return 1;
+    *b = (struct seq_manifest_block){0};
+    base_json_get(o, "seconds", -HUGE_VAL, HUGE_VAL, &b->seconds);
+    return get_u32(o, "id", 0, UINT32_MAX, &b->id) && get_u32(o, "x0", 0, m->width - 1.0, &b->x0) &&
+           get_u32(o, "y0", 0, m->height - 1.0, &b->y0) && get_u32(o, "x1", b->x0 + 1, m->width, &b->x1) &&
+           get_u32(o, "y1", b->y0 + 1, m->height, &b->y1) && base_json_get_whole(o, "bytes", 1, 1 << 30, &b->bytes) &&
+           (!cJSON_HasObjectItem(o, "dropped") || base_json_get_whole(o, "dropped", 0, 1e15, &b->dropped)) &&
+           get_crc(o, "crc32", &b->crc32) && get_text(o, "file", b->file, sizeof b->file) && b->file[0] != '\0' &&
+           b->file[0] != '.' && !strchr(b->file, '/');
 }
 
 static int get_blocks(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
@@ -109,7 +105,6 @@ static int get_blocks(const char *path, const cJSON *root, struct seq_manifest *
 static int get_view(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
 {
     const cJSON *look_at = cJSON_GetObjectItemCaseSensitive(root, "look_at"), *v;
-    const cJSON *fov = cJSON_GetObjectItemCaseSensitive(root, "fov");
     int n = 0;
     if (look_at && (!cJSON_IsArray(look_at) || cJSON_GetArraySize(look_at) != 9))
         return base_fail(err, BASE_EINVAL, "%s: look_at is not nine numbers", path);
@@ -119,33 +114,18 @@ static int get_view(const char *path, const cJSON *root, struct seq_manifest *m,
         m->look_at[n++] = v->valuedouble;
     }
     m->has_look_at = n > 0;
-    if (cJSON_IsNumber(fov))
-        m->fov_deg = fov->valuedouble;
+    base_json_get(root, "fov", -HUGE_VAL, HUGE_VAL, &m->fov_deg);
     return 0;
-}
-
-/* The nearest to it that JSON's numbers have: seeds of other programs reach 2^64. */
-static uint64_t get_seed(const cJSON *root, const char *name)
-{
-    double seed = 0;
-    base_json_get_whole(root, name, 0, 0x1p64, &seed);
-    return seed < 0x1p64 ? (uint64_t)seed : UINT64_MAX;
 }
 
 static int get_sizes(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
 {
-    double width, height, block, spp = 0;
-    if (!base_json_get_whole(root, "width", 1, 1 << 20, &width) ||
-        !base_json_get_whole(root, "height", 1, 1 << 20, &height) ||
-        !base_json_get_whole(root, "block", 1, SEQ_MAX_SIDE, &block))
+    if (!get_u32(root, "width", 1, 1 << 20, &m->width) || !get_u32(root, "height", 1, 1 << 20, &m->height) ||
+        !get_u32(root, "block", 1, SEQ_MAX_SIDE, &m->block))
         return base_fail(err, BASE_EINVAL, "%s: width, height or block is missing or out of range", path);
-    base_json_get_whole(root, "reference_spp", 0, MAX_SPP, &spp);
-    m->width = (uint32_t)width;
-    m->height = (uint32_t)height;
-    m->block = (uint32_t)block;
-    m->reference_spp = (uint32_t)spp;
-    m->seed = get_seed(root, "seed");
-    m->reference_seed = get_seed(root, "reference_seed");
+    get_u32(root, "reference_spp", 0, MAX_SPP, &m->reference_spp);
+    base_json_get_whole(root, "seed", 0, 0x1p64, &m->seed); /* seeds of other programs reach 2^64 */
+    base_json_get_whole(root, "reference_seed", 0, 0x1p64, &m->reference_seed);
     m->reference_independent = !cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(root, "reference_independent"));
     return 0;
 }
@@ -153,7 +133,7 @@ static int get_sizes(const char *path, const cJSON *root, struct seq_manifest *m
 static int get_all(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
 {
     const cJSON *format = cJSON_GetObjectItemCaseSensitive(root, "format");
-    double version;
+    uint64_t version;
     if (!cJSON_IsString(format) || strcmp(format->valuestring, "lull-sequence") != 0)
         return base_fail(err, BASE_EINVAL, "%s: not the manifest of a sequence", path);
     if (!base_json_get_whole(root, "version", 1, 1, &version))
