@@ -1,6 +1,7 @@
 #include "report/report.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -28,12 +29,9 @@ struct source {
 
 static int read_block_size(const char *text, uint32_t *width, uint32_t *height)
 {
-    char *end;
-    const long w = strtol(text, &end, 10);
-    if (*end != 'x')
-        return 0;
-    const long h = strtol(end + 1, &end, 10);
-    if (*end || w < 1 || h < 1 || w > INT32_MAX || h > INT32_MAX)
+    long w, h;
+    char more;
+    if (sscanf(text, "%ldx%ld%c", &w, &h, &more) != 2 || w < 1 || h < 1 || w > INT32_MAX || h > INT32_MAX)
         return 0;
     *width = (uint32_t)w;
     *height = (uint32_t)h;

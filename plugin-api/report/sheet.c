@@ -32,21 +32,15 @@ enum { SIGNATURE = 8, AROUND = 12, WORD = 4 }; /* bytes: of a file's head, of a 
 
 static void put_word(uint8_t *at, uint32_t v) { base_put_u32(at, __builtin_bswap32(v)); }
 
-/* A chunk of up to two parts. Failures are found by base_file_commit. */
-static void write_chunk(FILE *f, const char *name, const void *first, uint32_t first_size, const void *second,
-                        uint32_t second_size)
+/* Failures are found by base_file_commit. */
+static void write_chunk(FILE *f, const char *name, const void *data, uint32_t size)
 {
     uint8_t word[WORD];
-    uint32_t sum = (uint32_t)crc32(crc32(0, (const Bytef *)name, WORD), first, first_size);
-    put_word(word, first_size + second_size);
+    put_word(word, size);
     fwrite(word, 1, WORD, f);
     fwrite(name, 1, WORD, f);
-    fwrite(first, 1, first_size, f);
-    if (second_size > 0) {
-        fwrite(second, 1, second_size, f);
-        sum = (uint32_t)crc32(sum, second, second_size);
-    }
-    put_word(word, sum);
+    fwrite(data, 1, size, f);
+    put_word(word, (uint32_t)crc32(crc32(0, (const Bytef *)name, WORD), data, size));
     fwrite(word, 1, WORD, f);
 }
 
@@ -59,11 +53,11 @@ static void write_frame_head(struct sheet *s)
     put_word(c + 8, (uint32_t)s->canvas.height);
     for (int i = 0; i < 4; i++)
         c[20 + i] = (uint8_t)(s->delay[i / 2] >> (i % 2 ? 0 : 8));
-    write_chunk(s->file.file, "fcTL", c, sizeof c, NULL, 0);
+    write_chunk(s->file.file, "fcTL", c, sizeof c);
 }
 
 /* One chunk of a frame's own PNG. The first frame's all stay; of the others the compressed pixels do, under another name. */
-static void take_chunk(struct sheet *s, const uint8_t *chunk, uint32_t size, int *is_open)
+static void take_chunk(struct sheet *s, uint8_t *chunk, uint32_t size, int *is_open)
 {
     FILE *f = s->file.file;
     const char *name = (const char *)chunk + WORD;
@@ -72,15 +66,14 @@ static void take_chunk(struct sheet *s, const uint8_t *chunk, uint32_t size, int
         if (s->frame == 0) {
             uint8_t c[8] = {0}; /* how many; how often: 0, for ever */
             put_word(c, s->frames);
-            write_chunk(f, "acTL", c, sizeof c, NULL, 0);
+            write_chunk(f, "acTL", c, sizeof c);
         }
         write_frame_head(s);
         *is_open = 1;
     }
     if (is_pixels && s->frame > 0) {
-        uint8_t number[WORD];
-        put_word(number, s->chunks++);
-        write_chunk(f, "fdAT", number, WORD, chunk + 2 * WORD, size);
+        put_word(chunk + WORD, s->chunks++); /* in front of the pixels, where the name was */
+        write_chunk(f, "fdAT", chunk + WORD, WORD + size);
     } else if (s->frame == 0 && !is_end) {
         fwrite(chunk, 1, AROUND + size, f);
     }
@@ -193,7 +186,7 @@ int report_sheet(const char *const *pictures, int count, double fps, const char 
     for (int i = 0; i < count && !rc; i++)
         rc = add_frame(&s, pictures[i], err);
     if (!rc) {
-        write_chunk(s.file.file, "IEND", "", 0, NULL, 0);
+        write_chunk(s.file.file, "IEND", "", 0);
         rc = base_file_commit(&s.file, err);
     }
     base_file_abort(&s.file);
