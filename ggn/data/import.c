@@ -17,7 +17,6 @@
 #include "base/half.h"
 #include "data/labels.h"
 #include "picture/read.h"
-#include "sequence/builder.h"
 #include "sequence/manifest.h"
 #include "sequence/tail.h"
 

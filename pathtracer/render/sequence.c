@@ -11,7 +11,6 @@
 #include "base/list.h"
 #include "base/text.h"
 #include "base/version.h"
-#include "sequence/builder.h"
 #include "sequence/manifest.h"
 #include "sequence/simulate.h"
 #include "sequence/tail.h"

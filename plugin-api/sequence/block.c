@@ -3,14 +3,17 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <zlib.h>
 
 #include "base/bytes.h"
 #include "base/colour.h"
 #include "base/files.h"
 #include "base/half.h"
-#include "sequence/layout.h"
 
-enum { MAX_FILE = 1 << 30 };
+enum { MAX_FILE = 1 << 30, KIND_LEVEL = 1, KIND_REFERENCE = 2 };
+static const char MAGIC[] = "LULLSEQ1";
+
+static uint32_t crc_of(const uint8_t *bytes, size_t size) { return (uint32_t)crc32_z(0, bytes, size); }
 
 static int parse_stats(const char *path, const uint8_t *p, struct seq_record *r, struct base_err *err)
 {
@@ -65,7 +68,7 @@ static int parse_record(const char *path, struct seq_block *b, uint32_t index, u
         return base_fail(err, BASE_EINVAL, "%s: truncated: %u of %u images", path, index, count);
     uint32_t kind = base_get_u32(p), payload = base_get_u32(p + 20);
     /* Sums come first: what follows may only be trusted to be what was written. */
-    if (seq_crc(p, 28) != base_get_u32(p + 28))
+    if (crc_of(p, 28) != base_get_u32(p + 28))
         return base_fail(err, BASE_EINVAL, "%s: header of image %u is damaged (CRC)", path, index);
     if (b->size - *at - SEQ_RECORD_HEADER < payload)
         return base_fail(err, BASE_EINVAL, "%s: truncated: %u of %u images", path, index, count);
@@ -75,15 +78,15 @@ static int parse_record(const char *path, struct seq_block *b, uint32_t index, u
                              .n_stats = base_get_u32(p + 12),
                              .n_planes = base_get_u32(p + 16)};
     p += SEQ_RECORD_HEADER;
-    if (seq_crc(p, payload) != base_get_u32(p - 8))
+    if (crc_of(p, payload) != base_get_u32(p - 8))
         return base_fail(err, BASE_EINVAL, "%s: image at %u spp is damaged (CRC)", path, r->spp);
-    if ((kind != SEQ_KIND_LEVEL && kind != SEQ_KIND_REFERENCE) || (kind == SEQ_KIND_REFERENCE && index + 1 != count) ||
-        r->spp == 0 || r->half_spp > r->spp || r->n_stats > SEQ_MAX_STATS || r->n_planes < 1 ||
-        r->n_planes > SEQ_MAX_PLANES || (size_t)r->n_stats * SEQ_STAT_BYTES > payload) {
+    if ((kind != KIND_LEVEL && kind != KIND_REFERENCE) || (kind == KIND_REFERENCE && index + 1 != count) || r->spp == 0 ||
+        r->half_spp > r->spp || r->n_stats > SEQ_MAX_STATS || r->n_planes < 1 || r->n_planes > SEQ_MAX_PLANES ||
+        (size_t)r->n_stats * SEQ_STAT_BYTES > payload) {
         r->n_stats = 0;
         return base_fail(err, BASE_EINVAL, "%s: header of image %u makes no sense", path, index);
     }
-    if (kind == SEQ_KIND_LEVEL && index > 0 && r->spp <= b->levels[index - 1].spp)
+    if (kind == KIND_LEVEL && index > 0 && r->spp <= b->levels[index - 1].spp)
         return base_fail(err, BASE_EINVAL, "%s: levels do not rise: %u spp after %u", path, r->spp,
                          b->levels[index - 1].spp);
     if (r->n_stats > 0) {
@@ -94,7 +97,7 @@ static int parse_record(const char *path, struct seq_block *b, uint32_t index, u
     int rc = parse_stats(path, p, r, err);
     if (!rc)
         rc = parse_planes(path, b, p + (size_t)r->n_stats * SEQ_STAT_BYTES, p + payload, r, err);
-    if (kind == SEQ_KIND_REFERENCE)
+    if (kind == KIND_REFERENCE)
         b->reference = r;
     *at += SEQ_RECORD_HEADER + (size_t)payload;
     return rc;
@@ -103,11 +106,11 @@ static int parse_record(const char *path, struct seq_block *b, uint32_t index, u
 static int parse_header(const char *path, const uint8_t *p, size_t size, struct seq_block *b, uint32_t *count,
                         struct base_err *err)
 {
-    if (size < SEQ_FILE_HEADER || memcmp(p, SEQ_MAGIC, 8) != 0)
+    if (size < SEQ_FILE_HEADER || memcmp(p, MAGIC, 8) != 0)
         return base_fail(err, BASE_EINVAL, "%s: not a block sequence", path);
     if (base_get_u32(p + 8) != 1 || base_get_u32(p + 12) != SEQ_FILE_HEADER)
         return base_fail(err, BASE_EINVAL, "%s: version %u of the format is not known", path, base_get_u32(p + 8));
-    if (seq_crc(p, 60) != base_get_u32(p + 60))
+    if (crc_of(p, 60) != base_get_u32(p + 60))
         return base_fail(err, BASE_EINVAL, "%s: the header is damaged (CRC)", path);
     *b = (struct seq_block){.width = base_get_u32(p + 16),
                             .height = base_get_u32(p + 20),
@@ -332,4 +335,168 @@ int seq_half_luminance(const struct seq_block *b, const struct seq_record *r, fl
         y[i] = table[code[i]];
     free(code);
     return rc;
+}
+
+static int make_room(struct seq_builder *w, size_t more, struct base_err *err)
+{
+    if (w->room - w->size >= more)
+        return 0;
+    size_t room = 2 * w->room + more;
+    uint8_t *bytes = realloc(w->bytes, room);
+    if (!bytes)
+        return base_fail_nomem(err, "block sequence");
+    w->bytes = bytes;
+    w->room = room;
+    return 0;
+}
+
+int seq_builder_init(struct seq_builder *w, uint32_t width, uint32_t height, int32_t x0, int32_t y0, uint32_t id,
+                     uint64_t seed, struct base_err *err)
+{
+    if (width < 1 || width > SEQ_MAX_SIDE || height < 1 || height > SEQ_MAX_SIDE)
+        return base_fail(err, BASE_EINVAL, "a block of %ux%u pixels", width, height);
+    *w = (struct seq_builder){.width = width, .height = height};
+    int rc = make_room(w, SEQ_FILE_HEADER, err);
+    if (rc)
+        return rc;
+    uint8_t *p = w->bytes;
+    memset(p, 0, SEQ_FILE_HEADER);
+    memcpy(p, MAGIC, 8);
+    base_put_u32(p + 8, 1);
+    base_put_u32(p + 12, SEQ_FILE_HEADER);
+    base_put_u32(p + 16, width);
+    base_put_u32(p + 20, height);
+    base_put_u32(p + 24, (uint32_t)x0);
+    base_put_u32(p + 28, (uint32_t)y0);
+    base_put_u32(p + 32, id);
+    base_put_u64(p + 40, seed);
+    w->size = SEQ_FILE_HEADER;
+    return 0;
+}
+
+void seq_builder_release(struct seq_builder *w)
+{
+    free(w->bytes);
+    *w = (struct seq_builder){0};
+}
+
+/* Filters raw in place, deflates it to the end of the builder. */
+static int add_plane(struct seq_builder *w, enum seq_plane_number plane, uint32_t filter, uint8_t *raw, struct base_err *err)
+{
+    size_t raw_bytes = seq_plane_raw_bytes((uint32_t)plane, w->width, w->height);
+    uLongf stored = compressBound(raw_bytes);
+    int rc = make_room(w, SEQ_PLANE_HEADER + stored, err);
+    if (!rc)
+        rc = seq_plane_filter((uint32_t)plane, filter, raw, w->width, w->height, 0, err);
+    if (rc)
+        return rc;
+    if (compress2(w->bytes + w->size + SEQ_PLANE_HEADER, &stored, raw, raw_bytes, 6) != Z_OK)
+        return base_fail_nomem(err, "zlib");
+    uint8_t *p = w->bytes + w->size;
+    base_put_u32(p, (uint32_t)plane);
+    base_put_u32(p + 4, filter);
+    base_put_u32(p + 8, (uint32_t)raw_bytes);
+    base_put_u32(p + 12, (uint32_t)stored);
+    w->size += SEQ_PLANE_HEADER + stored;
+    return 0;
+}
+
+/* Fills raw [6P] from planar values. */
+static void code_plane(const struct seq_frame *f, enum seq_plane_number plane, size_t pixels, uint8_t *raw)
+{
+    const double *half = f->half, *light = plane == SEQ_PLANE_HALF_F16 ? half : f->mean;
+    for (size_t i = 0; i < (plane == SEQ_PLANE_HALF_LOG ? pixels : 3 * pixels); i++)
+        switch (plane) {
+        case SEQ_PLANE_DISPLAY: raw[i] = f->display ? f->display[i] : base_srgb_code(f->mean[i]); break;
+        case SEQ_PLANE_FINE:
+            raw[i] = seq_fine_encode(f->display ? f->display[i] : base_srgb_code(f->mean[i]), f->mean[i]);
+            break;
+        case SEQ_PLANE_HALF_LOG:
+            raw[i] = seq_half_log_encode(base_luminance(half[i], half[pixels + i], half[2 * pixels + i]));
+            break;
+        default: raw[2 * i] = (uint8_t)seq_half_float(light[i]); raw[2 * i + 1] = (uint8_t)(seq_half_float(light[i]) >> 8);
+        }
+}
+
+static int add_planes(struct seq_builder *w, const struct seq_frame *f, uint8_t *raw, uint32_t *count, struct base_err *err)
+{
+    const int full = f->full || f->is_reference;
+    const struct {
+        int is_there;
+        enum seq_plane_number plane;
+        uint32_t filter;
+    } planes[] = {{1, SEQ_PLANE_DISPLAY, SEQ_FILTER_AVERAGE | SEQ_FILTER_GREEN},
+                  {f->mean != NULL, full ? SEQ_PLANE_MEAN_F16 : SEQ_PLANE_FINE, full ? SEQ_FILTER_SHUFFLE : 0},
+                  {f->half != NULL, full ? SEQ_PLANE_HALF_F16 : SEQ_PLANE_HALF_LOG, full ? SEQ_FILTER_SHUFFLE : 0}};
+    int rc = 0;
+    *count = 0;
+    for (int i = 0; i < 3 && !rc; i++)
+        if (planes[i].is_there) {
+            code_plane(f, planes[i].plane, (size_t)w->width * w->height, raw);
+            rc = add_plane(w, planes[i].plane, planes[i].filter, raw, err);
+            ++*count;
+        }
+    return rc;
+}
+
+/* Statistics in the form of the file. */
+static void put_stats(const struct seq_frame *f, uint8_t *p)
+{
+    for (uint32_t i = 0; i < f->n_stats; i++, p += SEQ_STAT_BYTES) {
+        uint64_t bits;
+        memset(p, 0, SEQ_NAME);
+        memcpy(p, f->stats[i].name, strnlen(f->stats[i].name, SEQ_NAME - 1));
+        memcpy(&bits, &f->stats[i].value, sizeof bits);
+        base_put_u64(p + SEQ_NAME, bits);
+    }
+}
+
+int seq_builder_add(struct seq_builder *w, const struct seq_frame *f, struct base_err *err)
+{
+    if (w->has_reference || w->n_records >= SEQ_MAX_RECORDS || f->n_stats > SEQ_MAX_STATS || f->spp == 0 ||
+        !(f->display || f->mean))
+        return base_fail(err, BASE_EINVAL, "image at %u spp cannot be added to the sequence", f->spp);
+    size_t start = w->size, stats = (size_t)f->n_stats * SEQ_STAT_BYTES;
+    uint8_t *raw = malloc(6 * (size_t)w->width * w->height);
+    if (!raw)
+        return base_fail_nomem(err, "plane");
+    int rc = make_room(w, SEQ_RECORD_HEADER + stats, err);
+    if (rc)
+        goto out;
+    put_stats(f, w->bytes + start + SEQ_RECORD_HEADER);
+    w->size += SEQ_RECORD_HEADER + stats;
+    uint32_t planes;
+    rc = add_planes(w, f, raw, &planes, err);
+    if (rc) {
+        w->size = start;
+        goto out;
+    }
+    uint8_t *p = w->bytes + start;
+    size_t payload = w->size - start - SEQ_RECORD_HEADER;
+    base_put_u32(p, f->is_reference ? KIND_REFERENCE : KIND_LEVEL);
+    base_put_u32(p + 4, f->spp);
+    base_put_u32(p + 8, f->half_spp);
+    base_put_u32(p + 12, f->n_stats);
+    base_put_u32(p + 16, planes);
+    base_put_u32(p + 20, (uint32_t)payload);
+    base_put_u32(p + 24, crc_of(p + SEQ_RECORD_HEADER, payload));
+    base_put_u32(p + 28, crc_of(p, 28));
+    w->n_records++;
+    w->has_reference = f->is_reference != 0;
+out:
+    free(raw);
+    return rc;
+}
+
+int seq_builder_write(struct seq_builder *w, const char *path, uint32_t *crc, struct base_err *err)
+{
+    base_put_u32(w->bytes + 36, w->n_records);
+    base_put_u32(w->bytes + 60, crc_of(w->bytes, 60));
+    struct base_file_out out;
+    int rc = base_file_begin(&out, path, err);
+    if (rc)
+        return rc;
+    fwrite(w->bytes, 1, w->size, out.file);
+    *crc = crc_of(w->bytes, w->size);
+    return base_file_commit(&out, err);
 }

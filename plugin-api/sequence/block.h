@@ -15,6 +15,8 @@
 #include "sequence/planes.h"
 
 enum { SEQ_MAX_SIDE = 4096, SEQ_MAX_RECORDS = 4096, SEQ_MAX_PLANES = 16, SEQ_MAX_STATS = 64, SEQ_NAME = 24 };
+/* Bytes of the parts of a file. */
+enum { SEQ_FILE_HEADER = 64, SEQ_RECORD_HEADER = 32, SEQ_STAT_BYTES = SEQ_NAME + 8, SEQ_PLANE_HEADER = 16 };
 
 struct seq_stat {
     char name[SEQ_NAME];
@@ -68,5 +70,29 @@ const struct seq_record *seq_full_level(const struct seq_block *b);
 double seq_stat(const struct seq_record *r, const char *name);
 /* The level with this spp, or NULL. */
 const struct seq_record *seq_level(const struct seq_block *b, uint32_t spp);
+
+/* A block that is written: built in memory, and then written whole. Not thread-safe per object. */
+struct seq_builder {
+    uint32_t width, height, n_records, has_reference;
+    uint8_t *bytes; /* owns */
+    size_t size, room;
+};
+
+struct seq_frame { /* what to add; NULL planes are left out; all borrowed during the call */
+    uint32_t spp, half_spp;
+    int is_reference, full;    /* full: f16 planes instead of FINE and HALF_LOG (always for the reference) */
+    const uint8_t *display;    /* [3][P]; NULL: the codes of mean */
+    const double *mean, *half; /* [3][P], linear, finite: mean, and half-buffer difference D */
+    const struct seq_stat *stats;
+    uint32_t n_stats;
+};
+
+int seq_builder_init(struct seq_builder *w, uint32_t width, uint32_t height, int32_t x0, int32_t y0, uint32_t id,
+                     uint64_t seed, struct base_err *err);
+/* Levels in rising spp, the reference last. */
+int seq_builder_add(struct seq_builder *w, const struct seq_frame *frame, struct base_err *err);
+/* Writes the file atomically; *crc gets the CRC of the whole file. */
+int seq_builder_write(struct seq_builder *w, const char *path, uint32_t *crc, struct base_err *err);
+void seq_builder_release(struct seq_builder *w);
 
 #endif

@@ -1,6 +1,5 @@
 /* Every allocation of reading and writing data, of FLIP, the observer and the statistics fails once: an error, no crash, no leak, and never a file that
  * lacks something. */
-#include "sequence/builder.h"
 #include "support/ggn_cmocka.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
 #ifndef TESTS_SUPPORT_BASE_MADE_BLOCK_H
 #define TESTS_SUPPORT_BASE_MADE_BLOCK_H
 
-#include "sequence/builder.h"
+#include "sequence/block.h"
 
 enum { MADE_W = 37, MADE_H = 21, MADE_P = MADE_W * MADE_H };
 

@@ -13,7 +13,6 @@
 #include <cmocka.h>
 
 #include "data/labels.h"
-#include "sequence/builder.h"
 #include "sequence/manifest.h"
 #include "model/preprocess.h"
 

@@ -16,7 +16,6 @@
 
 #include "base/files.h"
 #include "data/labels.h"
-#include "sequence/builder.h"
 #include "sequence/manifest.h"
 #include "model/preprocess.h"
 #include "nn/hash.h"

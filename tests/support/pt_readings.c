@@ -12,7 +12,6 @@
 #include "pbrt/build.h"
 #include "pbrt/ply.h"
 #include "render/checkpoint.h"
-#include "sequence/builder.h"
 #include "sequence/manifest.h"
 #include "support/pt_fake.h"
 #include "support/pt_identity.h"

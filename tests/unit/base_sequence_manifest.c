@@ -10,7 +10,6 @@
 
 #include "base/colour.h"
 #include "base/files.h"
-#include "sequence/builder.h"
 #include "sequence/manifest.h"
 #include "support/base_made_block.h"
 
