@@ -14,7 +14,6 @@
 #include "base/bytes.h"
 #include "base/colour.h"
 #include "base/files.h"
-#include "base/half.h"
 #include "data/labels.h"
 #include "picture/read.h"
 #include "sequence/manifest.h"

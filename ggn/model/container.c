@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "base/bytes.h"
-#include "base/half.h"
 
 const struct base_file_kind ggn_container_kind = {"model file", {'L', 'U', 'L', 'L', 'G', 'G', 'N', '\n'}};
 

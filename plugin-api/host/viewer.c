@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "base/bytes.h"
-#include "base/half.h"
 
 enum { CREATE = 4, UPDATE = 6, VECTOR_GRAPHICS = 8 };
 enum { STROKE_COLOR = 4, STROKE = 5, BEGIN_PATH = 6, MOVE_TO = 10, LINE_TO = 11, RECT = 18 };

@@ -8,7 +8,6 @@
 #include "base/bytes.h"
 #include "base/colour.h"
 #include "base/files.h"
-#include "base/half.h"
 
 enum { MAX_FILE = 1 << 30, KIND_LEVEL = 1, KIND_REFERENCE = 2 };
 static const char MAGIC[] = "LULLSEQ1";

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "base/colour.h"
-#include "base/half.h"
+#include "base/bytes.h"
 
 /* Bytes of a pixel before compression, and which filters may be on it; zeros: not known. */
 static const struct {

@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 #include "base/colour.h"
-#include "base/half.h"
+#include "base/bytes.h"
 
 const uint32_t lc_plane_channels[LULL_PLANE_COUNT] = {3, 1, 1, 1, 3, 3, 3, 1};
 const char *const lc_plane_names[LULL_PLANE_COUNT] = {"COLOR", "WEIGHT", "SPP",    "MOMENT2",

@@ -23,7 +23,6 @@
 #include "base/bytes.h"
 #include "base/colour.h"
 #include "base/files.h"
-#include "base/half.h"
 #include "base/paths.h"
 #include "base/json.h"
 #include "picture/png.h"

@@ -7,7 +7,7 @@
 #include <cmocka.h>
 
 #include "base/colour.h"
-#include "base/half.h"
+#include "base/bytes.h"
 #include "sequence/tail.h"
 #include "support/ggn_near.h"
 #include "support/lseq_oracle.h"

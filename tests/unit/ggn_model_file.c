@@ -13,7 +13,7 @@
 #include "model/description.h"
 #include "model/measure.h"
 #include "model/model.h"
-#include "base/half.h"
+#include "base/bytes.h"
 
 static char path[] = "/tmp/ggn_model.XXXXXX";
 static struct ggn_hyper small = {GGN_PRESET_LULL, 16, 17, 2, 1, 2, 1, 0, 0, 0};

@@ -9,7 +9,7 @@
 #include "model/networks.h"
 #include "nn/exec.h"
 #include "nn/hash.h"
-#include "base/half.h"
+#include "base/bytes.h"
 #include "support/ggn_naive.h"
 #include "support/ggn_network_run.h"
 #include "support/ggn_nn_near.h"

@@ -1,4 +1,4 @@
-#include "base/half.h"
+#include "base/bytes.h"
 
 #include <math.h>
 
