@@ -14,16 +14,20 @@ static const char MAGIC[] = "LULLSEQ1";
 
 static uint32_t crc_of(const uint8_t *bytes, size_t size) { return (uint32_t)crc32_z(0, bytes, size); }
 
-static int parse_stats(const char *path, const uint8_t *p, struct seq_record *r, struct base_err *err)
+static double value_of(const uint8_t *stat)
 {
-    for (uint32_t i = 0; i < r->n_stats; i++, p += SEQ_STAT_BYTES) {
-        struct seq_stat *s = &r->stats[i];
-        uint64_t bits = base_get_u64(p + SEQ_NAME);
-        memcpy(s->name, p, SEQ_NAME);
-        memcpy(&s->value, &bits, sizeof s->value);
-        if (!memchr(s->name, 0, SEQ_NAME) || !isfinite(s->value))
+    const uint64_t bits = base_get_u64(stat + SEQ_NAME);
+    double value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+static int check_stats(const char *path, const struct seq_record *r, struct base_err *err)
+{
+    const uint8_t *p = r->stats;
+    for (uint32_t i = 0; i < r->n_stats; i++, p += SEQ_STAT_BYTES)
+        if (!memchr(p, 0, SEQ_NAME) || !isfinite(value_of(p)))
             return base_fail(err, BASE_EINVAL, "%s: %u spp: statistic %u is not usable", path, r->spp, i);
-    }
     return 0;
 }
 
@@ -75,25 +79,19 @@ static int parse_record(const char *path, struct seq_block *b, uint32_t index, u
     *r = (struct seq_record){.spp = base_get_u32(p + 4),
                              .half_spp = base_get_u32(p + 8),
                              .n_stats = base_get_u32(p + 12),
-                             .n_planes = base_get_u32(p + 16)};
+                             .n_planes = base_get_u32(p + 16),
+                             .stats = p + SEQ_RECORD_HEADER};
     p += SEQ_RECORD_HEADER;
     if (crc_of(p, payload) != base_get_u32(p - 8))
         return base_fail(err, BASE_EINVAL, "%s: image at %u spp is damaged (CRC)", path, r->spp);
     if ((kind != KIND_LEVEL && kind != KIND_REFERENCE) || (kind == KIND_REFERENCE && index + 1 != count) || r->spp == 0 ||
         r->half_spp > r->spp || r->n_stats > SEQ_MAX_STATS || r->n_planes < 1 || r->n_planes > SEQ_MAX_PLANES ||
-        (size_t)r->n_stats * SEQ_STAT_BYTES > payload) {
-        r->n_stats = 0;
+        (size_t)r->n_stats * SEQ_STAT_BYTES > payload)
         return base_fail(err, BASE_EINVAL, "%s: header of image %u makes no sense", path, index);
-    }
     if (kind == KIND_LEVEL && index > 0 && r->spp <= b->levels[index - 1].spp)
         return base_fail(err, BASE_EINVAL, "%s: levels do not rise: %u spp after %u", path, r->spp,
                          b->levels[index - 1].spp);
-    if (r->n_stats > 0) {
-        r->stats = malloc(r->n_stats * sizeof *r->stats);
-        if (!r->stats)
-            return base_fail_nomem(err, path);
-    }
-    int rc = parse_stats(path, p, r, err);
+    int rc = check_stats(path, r, err);
     if (!rc)
         rc = parse_planes(path, b, p + (size_t)r->n_stats * SEQ_STAT_BYTES, p + payload, r, err);
     if (kind == KIND_REFERENCE)
@@ -147,15 +145,11 @@ int seq_block_parse(const char *path, uint8_t *bytes, size_t size, struct seq_bl
         rc = base_fail(err, BASE_EINVAL, "%s: bytes after the last image", path);
     if (!rc && b.n_levels == 0)
         rc = base_fail(err, BASE_EINVAL, "%s: a reference but no level", path);
-    if (rc) {
-        b.bytes = NULL;
-        b.n_levels = count;
-        b.reference = NULL;
-        seq_block_release(&b);
-        return rc;
-    }
-    *block = b;
-    return 0;
+    if (rc)
+        free(b.levels);
+    else
+        *block = b;
+    return rc;
 }
 
 int seq_block_read(const char *path, struct seq_block *block, struct base_err *err)
@@ -173,9 +167,6 @@ int seq_block_read(const char *path, struct seq_block *block, struct base_err *e
 
 void seq_block_release(struct seq_block *block)
 {
-    uint32_t count = block->n_levels + (block->reference != NULL);
-    for (uint32_t i = 0; i < count; i++)
-        free(block->levels[i].stats);
     free(block->levels);
     free(block->bytes);
     *block = (struct seq_block){0};
@@ -203,9 +194,10 @@ const struct seq_record *seq_full_level(const struct seq_block *b)
 
 double seq_stat(const struct seq_record *r, const char *name)
 {
-    for (uint32_t i = 0; i < r->n_stats; i++)
-        if (strcmp(r->stats[i].name, name) == 0)
-            return r->stats[i].value;
+    const uint8_t *p = r->stats;
+    for (uint32_t i = 0; i < r->n_stats; i++, p += SEQ_STAT_BYTES)
+        if (strcmp((const char *)p, name) == 0)
+            return value_of(p);
     return (double)NAN;
 }
 

@@ -32,7 +32,7 @@ struct seq_record { /* a level, or the reference */
     uint32_t spp, half_spp;
     uint32_t n_planes, n_stats;
     struct seq_plane planes[SEQ_MAX_PLANES];
-    struct seq_stat *stats; /* owns */
+    const uint8_t *stats; /* borrows, as planes do; seq_stat reads them */
 };
 
 struct seq_block {
