@@ -296,6 +296,7 @@ int read_pixels(ImageInput &input, const pic_request &q, const header &h, pic_im
         s.count--;
     for (int c = 0; c < s.count && h.is_ordered; c++)
         s.at[c] = h.order[s.at[c]];
+    /* Sizes are checked before memory is taken for them: those that are stored, and those of the picture. */
     const ImageSpec spec = input.spec(s.part, 0);
     canvas c = {};
     if (int rc = check_size(spec, q.name, err))

@@ -169,6 +169,7 @@ int report_sheet(const char *const *pictures, int count, double fps, const char 
     const uint16_t parts = fps <= 60.0 ? 1000 : 250; /* as fine as 16 bits have room for */
     struct sheet s = {.low = (double)INFINITY, .frames = (uint32_t)count, .delay = {parts, (uint16_t)lround(parts * fps)}};
     int rc = 0;
+    /* Twice through all frames: their scale must be known before the first is painted. */
     for (int i = 0; i < count && !rc; i++)
         rc = measure(&s, pictures[i], err);
     if (rc)
