@@ -54,50 +54,28 @@ static int read_at(int fd, void *out, size_t size, uint64_t offset)
     return offset <= INT64_MAX && pread(fd, out, size, (off_t)offset) == (ssize_t)size;
 }
 
-static const char *header_fault(const ElfW(Ehdr) * h)
-{
-    unsigned char own_class = sizeof(void *) == 8 ? ELFCLASS64 : ELFCLASS32;
-    if (memcmp(h->e_ident, ELFMAG, SELFMAG) != 0)
-        return "not a shared object";
-    if (h->e_ident[EI_CLASS] != own_class)
-        return "a shared object of another word size";
-    if (h->e_type != ET_DYN || h->e_phentsize != sizeof(ElfW(Phdr)))
-        return "not a shared object";
-    return NULL;
-}
-
-static const char *segments_fault(int fd, const ElfW(Ehdr) * h, uint64_t size)
-{
-    for (unsigned i = 0; i < h->e_phnum; i++) {
-        ElfW(Phdr) p;
-        if (h->e_phoff > size || !read_at(fd, &p, sizeof p, h->e_phoff + (uint64_t)i * sizeof p))
-            return "a shared object that was cut short";
-        if (p.p_type == PT_LOAD && (p.p_offset > size || p.p_filesz > size - p.p_offset))
-            return "a shared object that was cut short";
-    }
-    return NULL;
-}
-
 /* NULL if the file is an ELF shared object of this machine's class whose segments all lie within the file; else what is
  * wrong with it. */
-static const char *find_fault(const char *path)
+static const char *find_fault(int fd)
 {
-    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    if (fd < 0)
-        return errno == ENOENT ? "no such file" : "cannot be opened";
+    const unsigned char own_class = sizeof(void *) == 8 ? ELFCLASS64 : ELFCLASS32;
     struct stat st;
-    ElfW(Ehdr) header;
-    const char *fault;
+    ElfW(Ehdr) h;
+    ElfW(Phdr) p;
     if (fstat(fd, &st) != 0 || !S_ISREG(st.st_mode))
-        fault = "not a file";
-    else if (!read_at(fd, &header, sizeof header, 0))
-        fault = "not a shared object";
-    else
-        fault = header_fault(&header);
-    if (!fault)
-        fault = segments_fault(fd, &header, (uint64_t)st.st_size);
-    close(fd);
-    return fault;
+        return "not a file";
+    if (!read_at(fd, &h, sizeof h, 0) || memcmp(h.e_ident, ELFMAG, SELFMAG) != 0)
+        return "not a shared object";
+    if (h.e_ident[EI_CLASS] != own_class)
+        return "a shared object of another word size";
+    if (h.e_type != ET_DYN || h.e_phentsize != sizeof p)
+        return "not a shared object";
+    const uint64_t size = (uint64_t)st.st_size;
+    for (unsigned i = 0; i < h.e_phnum; i++)
+        if (h.e_phoff > size || !read_at(fd, &p, sizeof p, h.e_phoff + (uint64_t)i * sizeof p) ||
+            (p.p_type == PT_LOAD && (p.p_offset > size || p.p_filesz > size - p.p_offset)))
+            return "a shared object that was cut short";
+    return NULL;
 }
 
 /* Tells about, and where possible undoes, what loading did to the process. */
@@ -110,28 +88,6 @@ static void compare_process(const struct lull_search *search, const char *path, 
         say(search, LULL_LOG_WARNING, "%s: loading changed %s; restored", path, changed);
     if (after.thread_count > before->thread_count)
         say(search, LULL_LOG_WARNING, "%s: loading started %ld thread(s)", path, after.thread_count - before->thread_count);
-}
-
-static int32_t load_entry(const struct lull_search *search, const char *path, lull_entry_fn *entry, struct lull_error *err)
-{
-    const char *fault = find_fault(path);
-    if (fault)
-        return lull_error_set(err, LULL_E_IO, "%s: %s", path, fault);
-
-    struct lull_process_state before;
-    lull_process_state_read(&before);
-    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    const char *why = !library ? dlerror() : NULL;
-    compare_process(search, path, &before);
-    if (!library) /* dlerror's text begins with the path */
-        return lull_error_set(err, LULL_E_IO, "cannot load: %s", why ? why : path);
-
-    void *symbol = dlsym(library, LULL_ENTRY_NAME);
-    if (!symbol)
-        return lull_error_set(err, LULL_E_VERSION, "%s: not a criterion of ABI %d (no symbol %s)", path, LULL_API_MAJOR,
-                              LULL_ENTRY_NAME);
-    memcpy(entry, &symbol, sizeof symbol); /* ISO C knows no conversion from object to function pointer */
-    return LULL_OK;
 }
 
 /* At most this many criteria in one library: an entry that never returns NULL must end somewhere. */
@@ -161,8 +117,27 @@ static int32_t entry_check(const char *path, lull_entry_fn entry, uint32_t *coun
 static int32_t load_library(const struct lull_search *search, const char *path, lull_entry_fn *entry, uint32_t *count,
                             struct lull_error *err)
 {
-    int32_t status = load_entry(search, path, entry, err);
-    return status != LULL_OK ? status : entry_check(path, *entry, count, err);
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    const char *fault = fd >= 0 ? find_fault(fd) : errno == ENOENT ? "no such file" : "cannot be opened";
+    if (fd >= 0)
+        close(fd);
+    if (fault)
+        return lull_error_set(err, LULL_E_IO, "%s: %s", path, fault);
+
+    struct lull_process_state before;
+    lull_process_state_read(&before);
+    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    const char *why = !library ? dlerror() : NULL;
+    compare_process(search, path, &before);
+    if (!library) /* dlerror's text begins with the path */
+        return lull_error_set(err, LULL_E_IO, "cannot load: %s", why ? why : path);
+
+    void *symbol = dlsym(library, LULL_ENTRY_NAME);
+    if (!symbol)
+        return lull_error_set(err, LULL_E_VERSION, "%s: not a criterion of ABI %d (no symbol %s)", path, LULL_API_MAJOR,
+                              LULL_ENTRY_NAME);
+    memcpy(entry, &symbol, sizeof symbol); /* ISO C knows no conversion from object to function pointer */
+    return entry_check(path, *entry, count, err);
 }
 
 /* What the library holds, as "ID, ID …". */
@@ -253,25 +228,20 @@ static int has_suffix(const char *text, const char *suffix)
     return n > m && strcmp(text + n - m, suffix) == 0;
 }
 
-/* Writes the path of a file there; 0 if there is none. */
-static int find_file(const char *dir, const char *name, const char *ending, char path[LULL_PATH_MAX])
+/* The first directory that has such a file, counted from 1, and the file's path; 0: none has. */
+static size_t find_file(const struct lull_search *search, const char *name, const char *ending, char path[LULL_PATH_MAX])
 {
-    return snprintf(path, LULL_PATH_MAX, "%s/%s%s", dir, name, ending) < LULL_PATH_MAX && is_file(path);
+    char dir[LULL_PATH_MAX];
+    size_t number = 1;
+    for (struct dir_walk walk = {.search = search}; next_dir(&walk, dir); number++)
+        if (snprintf(path, LULL_PATH_MAX, "%s/%s%s", dir, name, ending) < LULL_PATH_MAX && is_file(path))
+            return number;
+    return 0;
 }
 
 static int is_library(const struct dirent *e) { return e->d_name[0] != '.' && has_suffix(e->d_name, ".so"); }
 
 static int by_name(const struct dirent **a, const struct dirent **b) { return strcmp((*a)->d_name, (*b)->d_name); }
-
-/* Whether one of the first so many directories has it, too. */
-static int is_hidden(const struct lull_search *search, const char *name, size_t earlier)
-{
-    char dir[LULL_PATH_MAX], path[LULL_PATH_MAX];
-    int found = 0;
-    for (struct dir_walk walk = {.search = search}; earlier > 0 && !found && next_dir(&walk, dir); earlier--)
-        found = find_file(dir, name, "", path);
-    return found;
-}
 
 static int32_t visit_library(const struct lull_search *search, struct lull_found *found,
                              int32_t (*visit)(void *context, const struct lull_found *found), void *context)
@@ -298,13 +268,12 @@ int32_t lull_list(const struct lull_search *search, int32_t (*visit)(void *conte
     struct dir_walk walk = {.search = search};
     char dir[LULL_PATH_MAX];
     int32_t status = found ? LULL_OK : LULL_E_MEMORY;
-    for (size_t earlier = 0; status == LULL_OK && next_dir(&walk, dir); earlier++) {
+    for (size_t number = 1; status == LULL_OK && next_dir(&walk, dir); number++) {
         struct dirent **list = NULL;
         const int count = scandir(dir, &list, is_library, by_name); /* -1: most often there is no such directory */
         status = count < 0 && errno == ENOMEM ? LULL_E_MEMORY : LULL_OK;
         for (int i = 0; i < count; i++) {
-            const char *name = list[i]->d_name;
-            if (status == LULL_OK && find_file(dir, name, "", found->path) && !is_hidden(search, name, earlier))
+            if (status == LULL_OK && find_file(search, list[i]->d_name, "", found->path) == number)
                 status = visit_library(search, found, visit, context);
             free(list[i]);
         }
@@ -354,10 +323,9 @@ static int32_t take_if_named(void *context, const struct lull_found *found)
 static int32_t open_name(const struct lull_search *search, const char *name, const char *id, struct lull_found *found,
                          struct lull_error *err)
 {
-    char dir[LULL_PATH_MAX], path[LULL_PATH_MAX];
-    for (struct dir_walk walk = {.search = search}; next_dir(&walk, dir);)
-        if (find_file(dir, name, ".so", path))
-            return open_path(search, path, id ? id : name, found, err);
+    char path[LULL_PATH_MAX];
+    if (find_file(search, name, ".so", path))
+        return open_path(search, path, id ? id : name, found, err);
     if (!id) {
         struct name_query query = {.id = name, .found = found};
         int32_t status = lull_list(search, take_if_named, &query);
