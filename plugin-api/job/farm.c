@@ -94,12 +94,13 @@ static void deal(struct farming *f)
     }
 }
 
-static int apply(struct farming *f, int rank, const struct job_message *message, size_t size)
+static int apply(struct farming *f, const struct job_mail *mail)
 {
-    const struct job_task *answer = (const struct job_task *)message;
+    const struct job_task *answer = (const struct job_task *)mail->message;
+    const int rank = mail->rank;
     struct job_worker *w = &f->job->workers[rank];
     const struct job_held held = w->held[0];
-    if (message->kind != JOB_ANSWER || size < sizeof *answer || w->held_count == 0 || answer->serial != held.serial ||
+    if (answer->kind != JOB_ANSWER || mail->size < sizeof *answer || w->held_count == 0 || answer->serial != held.serial ||
         answer->first != held.first || answer->count != held.count)
         return job_nonsense(f->job, rank);
     w->held[0] = w->held[1];
@@ -107,7 +108,7 @@ static int apply(struct farming *f, int rank, const struct job_message *message,
     w->since_s = base_clock_wall_s();
     if (held.serial != f->job->serial) /* of a farm that was given up */
         return 0;
-    if (size != sizeof *answer + answer->count * f->farm->answer_bytes)
+    if (mail->size != sizeof *answer + answer->count * f->farm->answer_bytes)
         return job_nonsense(f->job, rank);
     for (uint32_t k = 0; k < answer->count && f->farm->apply; k++)
         if (f->farm->apply(f->farm->data, held.first + k, answer->bytes + k * f->farm->answer_bytes))
@@ -132,13 +133,11 @@ static int look_round(struct farming *f)
 static void attend(struct farming *f, double wait_s)
 {
     for (int got = 1; got > 0; wait_s = 0.0) {
-        int rank;
-        struct job_message *message;
-        size_t size;
-        got = job_receive(f->job, wait_s, &rank, &message, &size);
+        struct job_mail mail;
+        got = job_receive(f->job, wait_s, &mail);
         if (got > 0) {
-            got = apply(f, rank, message, size) ? -1 : 1;
-            free(message);
+            got = apply(f, &mail) ? -1 : 1;
+            free(mail.message);
         }
     }
     if (look_round(f))
@@ -216,7 +215,6 @@ int job_farm_run(struct job *job, struct base_threads *threads, const struct job
 
 /* A task on its way through a worker. */
 struct queued {
-    struct queued *next;
     struct job_task *task, *answer; /* own */
     uint32_t begun, done;           /* items */
 };
@@ -226,11 +224,14 @@ struct serving {
     const struct job_service *service;
     pthread_mutex_t lock;
     pthread_cond_t work;
-    struct queued *first, *last; /* guarded by lock, with all below: tasks in the order of their arrival */
-    int over;                    /* by a message of rank 0, or something has failed */
+    struct queued queue[JOB_HELD]; /* guarded by lock, with all below: tasks in the order of their arrival, a ring */
+    uint32_t first, count;
+    int over; /* by a message of rank 0, or something has failed */
     struct base_err failed;
     double look_s; /* wall time of the next look for messages; of the thread that serves */
 };
+
+static struct queued *queued(struct serving *s, uint32_t k) { return &s->queue[(s->first + k) % JOB_HELD]; }
 
 static void give_up(struct serving *s, const struct base_err *why)
 {
@@ -253,27 +254,20 @@ static void do_items(struct serving *s, struct queued *q, uint32_t k, uint32_t n
     pthread_mutex_unlock(&s->lock);
 }
 
-static int accept(struct serving *s, struct job_message *message, size_t size)
+/* Takes the message over unless it fails. */
+static int accept(struct serving *s, const struct job_mail *mail)
 {
-    struct job_task *task = (struct job_task *)message;
-    if (size < sizeof *task || size != sizeof *task + task->common_bytes + task->count * task->item_bytes)
+    struct job_task *task = (struct job_task *)mail->message;
+    if (mail->size < sizeof *task || s->count == JOB_HELD ||
+        mail->size != sizeof *task + task->common_bytes + task->count * task->item_bytes)
         return job_nonsense(s->job, 0);
-    struct queued *q = calloc(1, sizeof *q);
     struct job_task *answer = malloc(sizeof *answer + task->count * task->answer_bytes);
-    if (!q || !answer) {
-        free(q);
-        free(answer);
+    if (!answer)
         return base_fail_nomem(&s->job->failed, "a task");
-    }
     *answer = *task;
     answer->kind = JOB_ANSWER;
-    *q = (struct queued){.task = task, .answer = answer};
     pthread_mutex_lock(&s->lock);
-    if (s->last)
-        s->last->next = q;
-    else
-        s->first = q;
-    s->last = q;
+    *queued(s, s->count++) = (struct queued){.task = task, .answer = answer};
     pthread_cond_broadcast(&s->work);
     pthread_mutex_unlock(&s->lock);
     return 0;
@@ -284,19 +278,18 @@ static int send_finished(struct serving *s)
 {
     for (int rc = 0;;) {
         pthread_mutex_lock(&s->lock);
-        struct queued *q = s->first;
-        const int finished = q && q->done == q->task->count && !s->failed.code;
+        const struct queued q = *queued(s, 0);
+        const int finished = s->count > 0 && q.done == q.task->count && !s->failed.code;
         if (finished) {
-            s->first = q->next;
-            s->last = s->first ? s->last : NULL;
+            s->first++;
+            s->count--;
             pthread_cond_broadcast(&s->work);
         }
         pthread_mutex_unlock(&s->lock);
         if (!finished || rc)
             return rc;
-        rc = job_send(s->job, 0, q->answer, sizeof *q->answer + q->task->count * q->task->answer_bytes);
-        free(q->task);
-        free(q);
+        rc = job_send(s->job, 0, q.answer, sizeof *q.answer + q.task->count * q.task->answer_bytes);
+        free(q.task);
     }
 }
 
@@ -305,16 +298,12 @@ static int receive(struct serving *s, double wait_s)
 {
     int got = 1, over = 0;
     for (; got > 0 && !over; wait_s = 0.0) {
-        int rank;
-        struct job_message *message;
-        size_t size;
-        got = job_receive(s->job, wait_s, &rank, &message, &size);
-        if (got > 0 && message->kind == JOB_TASK) {
-            got = accept(s, message, size) ? -1 : 1;
-        } else if (got > 0) {
-            over = message->kind == JOB_DONE || job_nonsense(s->job, 0);
-            free(message);
-        }
+        struct job_mail mail;
+        got = job_receive(s->job, wait_s, &mail);
+        if (got <= 0 || (mail.message->kind == JOB_TASK && accept(s, &mail) == 0))
+            continue;
+        over = mail.message->kind == JOB_DONE || s->job->failed.code || job_nonsense(s->job, 0);
+        free(mail.message);
     }
     pthread_mutex_lock(&s->lock);
     s->over |= over || s->job->over;
@@ -339,16 +328,20 @@ static void serve_now(struct serving *s, double wait_s)
 /* The next item that nobody has begun, *k of a task; NULL if there is none. Called with the lock held. */
 static struct queued *begin_item(struct serving *s, uint32_t *k)
 {
-    for (struct queued *q = s->over ? NULL : s->first; q && !q->task->whole; q = q->next)
+    for (uint32_t i = 0; i < s->count && !s->over; i++) {
+        struct queued *q = queued(s, i);
+        if (q->task->whole)
+            break;
         if (q->begun < q->task->count) {
             *k = q->begun++;
             return q;
         }
+    }
     return NULL;
 }
 
 /* Is there no more to do for single threads? Called with the lock held. */
-static int is_done(const struct serving *s) { return s->over || (s->first && s->first->task->whole); }
+static int is_done(struct serving *s) { return s->over || (s->count > 0 && queued(s, 0)->task->whole); }
 
 /* One thread until the end or until there is a task for all; the first one serves between two items. */
 static void work(void *data, long n, int thread)
@@ -367,7 +360,7 @@ static void work(void *data, long n, int thread)
             pthread_cond_wait(&s->work, &s->lock);
             q = begin_item(s, &k);
         }
-        const double wait_s = s->first ? SHORT_WAIT_S : LONG_WAIT_S;
+        const double wait_s = s->count > 0 ? SHORT_WAIT_S : LONG_WAIT_S;
         done = !q && is_done(s);
         pthread_mutex_unlock(&s->lock);
         if (q)
@@ -387,16 +380,13 @@ int job_serve(struct job *job, struct base_threads *threads, const struct job_se
     while (!s.over) {
         base_threads_for(threads, base_threads_count(threads), work, &s);
         if (!s.over) {
-            do_items(&s, s.first, 0, s.first->task->count, 0);
+            do_items(&s, queued(&s, 0), 0, queued(&s, 0)->task->count, 0);
             serve_now(&s, 0.0);
         }
     }
-    while (s.first) {
-        struct queued *q = s.first;
-        s.first = q->next;
-        free(q->task);
-        free(q->answer);
-        free(q);
+    for (uint32_t k = 0; k < s.count; k++) {
+        free(queued(&s, k)->task);
+        free(queued(&s, k)->answer);
     }
     pthread_cond_destroy(&s.work);
     pthread_mutex_destroy(&s.lock);

@@ -167,38 +167,38 @@ int job_send_head(struct job *job, int rank, enum job_kind kind, uint32_t serial
     return send_copy(job, rank, &head, sizeof head);
 }
 
-static int receive_farewell(struct job *job, int rank, const void *message, size_t size)
+static int receive_farewell(struct job *job, const struct job_mail *mail)
 {
-    struct job_farewell *f = &job->workers[rank].farewell;
-    if (size != sizeof *f)
-        return job_nonsense(job, rank);
-    memcpy(f, message, sizeof *f);
-    job->workers[rank].gone = 1;
+    struct job_farewell *f = &job->workers[mail->rank].farewell;
+    if (mail->size != sizeof *f)
+        return job_nonsense(job, mail->rank);
+    memcpy(f, mail->message, sizeof *f);
+    job->workers[mail->rank].gone = 1;
     if (f->status == 0 || job->over)
         return 0;
-    return base_fail(&job->failed, f->status == 1 ? BASE_ENOMEM : BASE_EINVAL, "%s: %s", name_of(job, rank),
+    return base_fail(&job->failed, f->status == 1 ? BASE_ENOMEM : BASE_EINVAL, "%s: %s", name_of(job, mail->rank),
                      f->text[0] ? f->text : "ended too early");
 }
 
-int job_receive(struct job *job, double wait_s, int *rank, struct job_message **message, size_t *size)
+int job_receive(struct job *job, double wait_s, struct job_mail *mail)
 {
     void *data = NULL;
-    int got = job->transport->calls->receive(job->transport, wait_s, rank, &data, size, &job->failed);
-    *message = data;
+    int got = job->transport->calls->receive(job->transport, wait_s, &mail->rank, &data, &mail->size, &job->failed);
+    mail->message = data;
     if (got <= 0)
         return got;
     const int worker = job->transport->rank > 0;
-    const uint32_t kind = *size < sizeof **message ? JOB_FAREWELL : (*message)->kind;
+    const uint32_t kind = mail->size < sizeof *mail->message ? JOB_FAREWELL : mail->message->kind;
     job->traffic.messages++;
-    job->traffic.bytes += *size;
+    job->traffic.bytes += mail->size;
     if (kind != JOB_END && kind != JOB_FAREWELL)
         return 1;
     int rc = 0;
     if (worker && kind == JOB_END) {
         job->over = 1;
-        job->status = (int)(*message)->serial;
+        job->status = (int)mail->message->serial;
     } else {
-        rc = worker ? job_nonsense(job, *rank) : receive_farewell(job, *rank, data, *size);
+        rc = worker ? job_nonsense(job, mail->rank) : receive_farewell(job, mail);
     }
     free(data);
     return rc;
@@ -215,13 +215,14 @@ static int say_hello(struct job *job, const char *settings, int threads)
     return job_send(job, 0, hello, size);
 }
 
-static int receive_hello(struct job *job, int rank, const struct job_message *message, size_t size, const char *ours)
+static int receive_hello(struct job *job, const struct job_mail *mail, const char *ours)
 {
     static const struct base_identity_words words = {" has", " has no", "rank 0"};
-    const struct job_hello *hello = (const struct job_hello *)message;
+    const struct job_hello *hello = (const struct job_hello *)mail->message;
+    const int rank = mail->rank;
     const struct base_identity here = {.text = (char *)(size_t)ours, .size = strlen(ours)}; /* every key decides */
     struct base_err why = {0};
-    if (message->kind != JOB_HELLO || size <= sizeof *hello || ((const char *)message)[size - 1] != '\0' ||
+    if (hello->head.kind != JOB_HELLO || mail->size <= sizeof *hello || ((const char *)hello)[mail->size - 1] != '\0' ||
         hello->threads < 1 || job->workers[rank].threads > 0)
         return job_nonsense(job, rank);
     if (base_identity_compare(&here, hello->settings, strlen(hello->settings), name_of(job, rank), &words, NULL, &why) != 0)
@@ -231,34 +232,35 @@ static int receive_hello(struct job *job, int rank, const struct job_message *me
     return 0;
 }
 
-/* The first worker without a message to rank 0 yet; count: none. */
-static int first_silent(const struct job *job)
+/* Rank 0 takes messages until the first one of each worker has come, of whom it wants the same settings; NULL: the last one
+ * of each. */
+static void await_all(struct job *job, const char *settings)
 {
-    int rank = 1;
-    while (rank < job->transport->count && job->workers[rank].threads > 0)
-        rank++;
-    return rank;
+    const double start_s = base_clock_wall_s();
+    for (int r = 1; r < job->transport->count && !job->failed.code;) {
+        const struct job_worker *w = &job->workers[r];
+        struct job_mail mail;
+        if (settings ? w->threads > 0 : w->gone) {
+            r++;
+            continue;
+        }
+        int got = job_receive(job, LOOK_S, &mail);
+        if (got > 0) {
+            if (settings)
+                receive_hello(job, &mail, settings);
+            free(mail.message); /* at the end: it was on its way when rank 0 ended the job */
+        } else if (got == 0 && (settings || !w->gone)) {
+            look_round(job, r, base_clock_wall_s() - start_s);
+        }
+    }
 }
 
 int job_handshake(struct job *job, const char *settings, int threads, struct base_err *err)
 {
-    if (job && job->transport->rank > 0) {
+    if (job && job->transport->rank > 0)
         say_hello(job, settings, threads);
-    } else if (job) {
-        const double start_s = base_clock_wall_s();
-        while (first_silent(job) < job->transport->count && !job->failed.code) {
-            int rank;
-            struct job_message *message;
-            size_t size;
-            int got = job_receive(job, LOOK_S, &rank, &message, &size);
-            if (got > 0) {
-                receive_hello(job, rank, message, size, settings);
-                free(message);
-            } else if (got == 0) {
-                look_round(job, first_silent(job), base_clock_wall_s() - start_s);
-            }
-        }
-    }
+    else if (job)
+        await_all(job, settings);
     return job_failed(job, err);
 }
 
@@ -270,11 +272,9 @@ static void say_farewell(struct job *job, int status, const char *text)
     job->failed.code = 0;
     send_copy(job, 0, &f, sizeof f);
     while (!job->over && !job->failed.code) {
-        int rank;
-        struct job_message *message;
-        size_t size;
-        if (job_receive(job, LOOK_S, &rank, &message, &size) > 0)
-            free(message);
+        struct job_mail mail;
+        if (job_receive(job, LOOK_S, &mail) > 0)
+            free(mail.message);
     }
 }
 
@@ -282,22 +282,11 @@ static void say_farewell(struct job *job, int status, const char *text)
 static int receive_farewells(struct job *job, int status, struct base_err *err)
 {
     const int count = job->transport->count;
-    const double start_s = base_clock_wall_s();
     job->failed = (struct base_err){0};
     job->over = 1;
     for (int r = 1; r < count && !job->failed.code; r++)
         job_send_head(job, r, JOB_END, (uint32_t)status);
-    for (int r = 1; r < count && !job->failed.code;) {
-        int rank;
-        struct job_message *message;
-        size_t size;
-        if (job->workers[r].gone)
-            r++;
-        else if (job_receive(job, LOOK_S, &rank, &message, &size) > 0)
-            free(message); /* on its way when rank 0 ended the job */
-        else if (!job->workers[r].gone)
-            look_round(job, r, base_clock_wall_s() - start_s);
-    }
+    await_all(job, NULL);
     for (int r = 1; r < count && status == 0 && !job->failed.code; r++) {
         status = job->workers[r].farewell.status;
         if (status)

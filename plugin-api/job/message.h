@@ -31,6 +31,13 @@ struct job_farewell {
     char text[516];
 };
 
+/* A message that has come. */
+struct job_mail {
+    int rank; /* of its sender */
+    size_t size;
+    struct job_message *message; /* the receiver's, who frees it */
+};
+
 /* A task that is with a worker. */
 struct job_held {
     uint32_t first, count, serial; /* items; of the farm */
@@ -61,9 +68,9 @@ struct job {
 
 /* Takes `message`, from malloc. */
 int job_send(struct job *job, int rank, void *message, size_t size);
-/* The next message, waiting for up to wait_s: 1 with *message to free, 0 none, negative a failure. Not those about
- * ends: a worker's farewell with a reason is a failure, the end of the job sets job->over. */
-int job_receive(struct job *job, double wait_s, int *rank, struct job_message **message, size_t *size);
+/* The next message, waiting for up to wait_s: 1 with *mail, 0 none, negative a failure. Not those about ends: a worker's
+ * farewell with a reason is a failure, the end of the job sets job->over. */
+int job_receive(struct job *job, double wait_s, struct job_mail *mail);
 /* A message of its head alone. */
 int job_send_head(struct job *job, int rank, enum job_kind kind, uint32_t serial);
 /* A failure: the message of a process makes no sense. */
