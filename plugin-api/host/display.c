@@ -44,10 +44,10 @@ struct lull_host_display {
     struct lull_host_block *seen; /* owns; [blocks], as they were copied; next_spp 0: never */
     uint8_t *is_new;              /* owns; [blocks] the viewer has not got */
     uint32_t new_count;
-    int marks_are_new, live, over; /* live: there is a viewer */
-    double over_s;                 /* wall time of the end */
-    int socket;                    /* of the thread, as the next; -1: no viewer */
-    struct viewer_packet packet;
+    int marks_are_new, over;
+    double over_s;               /* wall time of the end */
+    int socket;                  /* that the thread sends through; -1: no viewer */
+    struct viewer_packet packet; /* of the thread */
 };
 
 /* A connection to somebody who may be slow, hostile or gone. */
@@ -114,21 +114,6 @@ static int connect_to(const struct addrinfo *to)
     return -1;
 }
 
-/* Sends what the other side takes, without SIGPIPE, and waits for at most STEP_S until it takes something. The number of
- * bytes; -1: it is gone. */
-static ssize_t send_some(int socket, const void *data, size_t size)
-{
-    for (int waited = 0;; waited = 1) {
-        ssize_t n = send(socket, data, size, MSG_NOSIGNAL);
-        if (n >= 0)
-            return n;
-        if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)
-            return -1;
-        if (waited || !wait_for(socket, STEP_S))
-            return 0;
-    }
-}
-
 static int has_changed(const struct lull_host_block *b, const struct lull_host_block *seen)
 {
     return seen->next_spp == 0 || b->spp != seen->spp || b->reason != seen->reason || b->asked_spp != seen->asked_spp;
@@ -182,7 +167,7 @@ int32_t lull_host_display_update(struct lull_host_display *d, const struct lull_
     const double start_s = base_clock_wall_s();
     if (start_s < d->next_s || pthread_mutex_trylock(&d->lock) != 0)
         return LULL_OK;
-    code = d->live ? copy(d, view, err) : LULL_OK;
+    code = d->socket >= 0 ? copy(d, view, err) : LULL_OK;
     pthread_mutex_unlock(&d->lock);
     d->next_s = start_s + fmax(EVERY_S, (base_clock_wall_s() - start_s) / COPY_SHARE);
     return code;
@@ -196,7 +181,6 @@ static void forget(struct lull_host_display *d)
     if (d->socket >= 0)
         close(d->socket);
     d->socket = -1;
-    d->live = 0;
     d->new_count = 0;
     for (uint32_t i = 0; i < d->blocks->count; i++)
         d->new_count += d->is_new[i] = d->seen[i].spp > 0;
@@ -213,7 +197,7 @@ static int is_patient(struct lull_host_display *d, double idle_s)
     return over ? fmin(idle_s, past_s) < LAST_PATIENCE_S && past_s < FAREWELL_S : idle_s < viewer_patience_s;
 }
 
-/* Without the lock, which is free meanwhile. */
+/* Without the lock, which is free meanwhile, and without SIGPIPE. */
 static void send_packet(struct lull_host_display *d)
 {
     size_t sent = 0;
@@ -221,11 +205,13 @@ static void send_packet(struct lull_host_display *d)
     int gone = 0;
     pthread_mutex_unlock(&d->lock);
     while (sent < d->packet.size && !gone) {
-        const ssize_t n = send_some(d->socket, d->packet.at + sent, d->packet.size - sent);
+        wait_for(d->socket, STEP_S);
+        const ssize_t n = send(d->socket, d->packet.at + sent, d->packet.size - sent, MSG_NOSIGNAL);
+        gone = n < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR;
         const double now_s = base_clock_wall_s();
         taken_s = n > 0 ? now_s : taken_s;
         sent += n > 0 ? (size_t)n : 0;
-        gone = n < 0 || (sent < d->packet.size && !is_patient(d, now_s - taken_s));
+        gone |= sent < d->packet.size && !is_patient(d, now_s - taken_s);
     }
     pthread_mutex_lock(&d->lock);
     if (gone)
@@ -242,7 +228,6 @@ static void find_viewer(struct lull_host_display *d)
     if (socket >= 0) {
         viewer_create(&d->packet, b->x1 - b->x0, b->y1 - b->y0);
         send_packet(d);
-        d->live = d->socket >= 0;
     }
     if (d->socket < 0 && !d->over) {
         struct timespec until;
@@ -308,6 +293,8 @@ static void destroy(struct lull_host_display *d)
     if (d->address)
         freeaddrinfo(d->address);
     viewer_release(&d->packet);
+    pthread_cond_destroy(&d->changed);
+    pthread_mutex_destroy(&d->lock);
     free(d->rgb);
     free(d->seen);
     free(d->is_new);
@@ -338,26 +325,17 @@ static int32_t allocate(struct lull_host_display *d, const char *name, struct lu
 static int32_t begin_thread(struct lull_host_display *d, struct lull_error *err)
 {
     sigset_t all, before;
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
-    pthread_mutex_init(&d->lock, NULL);
-    pthread_cond_init(&d->changed, &monotonic);
-    pthread_condattr_destroy(&monotonic);
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
     int failed = pthread_create(&d->thread, NULL, serve, d);
     pthread_sigmask(SIG_SETMASK, &before, NULL);
-    if (!failed)
-        return LULL_OK;
-    pthread_cond_destroy(&d->changed);
-    pthread_mutex_destroy(&d->lock);
-    return lull_error_set(err, LULL_E_MEMORY, "no thread for the live view");
+    return failed ? lull_error_set(err, LULL_E_MEMORY, "no thread for the live view") : LULL_OK;
 }
 
 int32_t lull_host_display_open(const struct lull_host_frame *frame, const char *address, const char *name,
                                struct lull_host_display **out, struct lull_error *err)
 {
+    pthread_condattr_t monotonic;
     int32_t code = lull_host_given(err, "frame", frame, "address", address, "name", name, "out", out, NULL);
     if (code != LULL_OK)
         return code;
@@ -366,6 +344,11 @@ int32_t lull_host_display_open(const struct lull_host_frame *frame, const char *
         return lull_host_no_memory(err, "the live view");
     d->socket = -1;
     d->blocks = &frame->blocks;
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    pthread_mutex_init(&d->lock, NULL);
+    pthread_cond_init(&d->changed, &monotonic);
+    pthread_condattr_destroy(&monotonic);
     code = find_address(address, &d->address, err);
     if (code == LULL_OK)
         code = allocate(d, name, err);
@@ -390,8 +373,6 @@ int32_t lull_host_display_close(struct lull_host_display *d, const struct lull_h
     pthread_cond_signal(&d->changed);
     pthread_mutex_unlock(&d->lock);
     pthread_join(d->thread, NULL);
-    pthread_cond_destroy(&d->changed);
-    pthread_mutex_destroy(&d->lock);
     const int32_t complete = d->socket >= 0;
     destroy(d);
     return complete;
