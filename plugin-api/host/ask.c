@@ -1,5 +1,7 @@
 #include "host/frame.h"
 
+#include <lull/criterion_kit.h>
+
 #include <math.h>
 #include <stdio.h>
 
@@ -47,8 +49,9 @@ static struct lull_decision sensible(struct lull_decision d)
 
 /* Asks the instance of one step about those of the due blocks that are its own. */
 static int32_t evaluate_step(struct lull_host_criterion *c, uint32_t step, const struct lull_view *view,
-                             const struct question *q, struct lull_error *e)
+                             const struct question *q, struct lull_error *err)
 {
+    struct lull_error e = {.struct_size = sizeof e};
     uint32_t n = 0;
     for (uint32_t k = 0; k < q->count; k++) {
         if (q->blocks->list[q->due[k]].step != step)
@@ -63,28 +66,23 @@ static int32_t evaluate_step(struct lull_host_criterion *c, uint32_t step, const
     struct lull_process_state before;
     lull_thread_state_read(&before);
     int32_t code =
-        c->table->evaluate(c->instances[step], view, c->due, sizeof c->due[0], c->answers, sizeof c->answers[0], n, e);
+        c->table->evaluate(c->instances[step], view, c->due, sizeof c->due[0], c->answers, sizeof c->answers[0], n, &e);
     lull_host_leave(c, &before, "evaluate");
     n = 0;
     for (uint32_t k = 0; k < q->count && code == LULL_OK; k++)
         if (q->blocks->list[q->due[k]].step == step)
             q->decisions[k] = sensible(c->answers[n++]);
-    return code;
+    return code == LULL_OK ? code : lull_host_blame(c, "", code, &e, err);
 }
 
-static int32_t evaluate(struct lull_host_criterion *c, const struct question *q, const struct lull_host_view *v,
-                        const struct lull_host_shown *shown, struct lull_error *err)
+/* Are all of the mask `planes` there, but for counts, which the library makes? */
+static int32_t check_announced(uint32_t planes, const struct lull_plane shown[LULL_PLANE_COUNT], struct lull_error *err)
 {
-    struct lull_view view = lull_host_seen(v, shown);
-    view.all = c->all;
-    view.all_count = q->blocks->count;
-    view.all_stride = sizeof c->all[0];
-    view.elapsed_s = base_clock_wall_s() - c->begin_s;
-    struct lull_error e = {.struct_size = sizeof e};
-    int32_t code = LULL_OK;
-    for (uint32_t s = 0; s <= LULL_HOST_STEPS && code == LULL_OK; s++)
-        code = evaluate_step(c, s, &view, q, &e);
-    return code == LULL_OK ? code : lull_host_blame(c, "", code, &e, err);
+    for (int i = 0; i < LULL_PLANE_COUNT; i++)
+        if ((planes & ~LULL_HOST_COUNTS & LULL_PLANE_BIT(i)) && !shown[i].data)
+            return lull_error_set(err, LULL_E_PLANE, "%s: the view does not have the plane, which the config announced",
+                                  lull_kit_plane_name((unsigned)i));
+    return LULL_OK;
 }
 
 int32_t lull_host_evaluate(struct lull_host_criterion *c, const struct lull_host_frame *f, const struct lull_host_view *view,
@@ -114,11 +112,16 @@ int32_t lull_host_evaluate(struct lull_host_criterion *c, const struct lull_host
     if (code != LULL_OK)
         return code;
     /* what a criterion requires it misses itself */
-    code = lull_host_check_announced(f->config.planes & ~c->needs.planes_required, shown.planes, err);
+    code = check_announced(f->config.planes & ~c->needs.planes_required, shown.planes, err);
     for (uint32_t i = 0; i < b->count; i++)
         c->all[i] = lull_host_state_of(&b->list[i], i, shown.planes[LULL_PLANE_HALF].data != NULL);
-    if (code == LULL_OK)
-        code = evaluate(c, &q, view, &shown, err);
+    struct lull_view seen = lull_host_seen(view, &shown);
+    seen.all = c->all;
+    seen.all_count = b->count;
+    seen.all_stride = sizeof c->all[0];
+    seen.elapsed_s = base_clock_wall_s() - c->begin_s;
+    for (uint32_t s = 0; s <= LULL_HOST_STEPS && code == LULL_OK; s++)
+        code = evaluate_step(c, s, &seen, &q, err);
     for (uint32_t k = 0; k < count && code != LULL_OK; k++)
         decisions[k] = lull_host_undecided();
     lull_host_hide(&shown);

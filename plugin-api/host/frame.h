@@ -144,13 +144,10 @@ int32_t lull_host_check_services(const struct lull_host_services *services, stru
 /* All of it but size, blocks and mask. */
 int32_t lull_host_check_config(const struct lull_host_config *config, const struct lull_host_criterion *criterion,
                                struct lull_error *err);
-int32_t lull_host_check_disjoint(const struct lull_host_block *list, uint32_t count, struct lull_error *err);
 /* What describes a plane that has data. */
 int32_t lull_host_check_plane(const char *name, const struct lull_plane *plane, uint32_t channels, struct lull_error *err);
 int32_t lull_host_check_view(const struct lull_host_blocks *blocks, const struct lull_host_view *view,
                              struct lull_error *err);
-/* Are all of the mask `planes` there, but for counts, which the library makes? */
-int32_t lull_host_check_announced(uint32_t planes, const struct lull_plane shown[LULL_PLANE_COUNT], struct lull_error *err);
 /* What the renderer writes into blocks and totals. */
 int32_t lull_host_check_samples(const struct lull_host_frame *frame, struct lull_error *err);
 

@@ -5,7 +5,6 @@
 
 #include <math.h>
 #include <stdarg.h>
-#include <stdlib.h>
 
 /* More threads are a mistake; the operating system's own limit is lower. */
 enum { MOST_THREADS = 1 << 20 };
@@ -115,73 +114,6 @@ int32_t lull_host_check_config(const struct lull_host_config *g, const struct lu
     return LULL_OK;
 }
 
-static int by_place(const void *a, const void *b)
-{
-    const struct lull_host_block *x = *(const struct lull_host_block *const *)a,
-                                 *y = *(const struct lull_host_block *const *)b;
-    const int rows = (x->y0 > y->y0) - (x->y0 < y->y0);
-    return rows ? rows : (x->x0 > y->x0) - (x->x0 < y->x0);
-}
-
-/* The blocks that a line of pixels crosses, from left to right. */
-struct crossed {
-    const struct lull_host_block **list;
-    size_t count;
-};
-
-static void leave(struct crossed *line, int32_t y)
-{
-    size_t n = 0;
-    for (size_t i = 0; i < line->count; i++)
-        if (line->list[i]->y1 > y)
-            line->list[n++] = line->list[i];
-    line->count = n;
-}
-
-/* Adds one; returns the block that it overlaps, NULL if there is none. */
-static const struct lull_host_block *enter(struct crossed *line, const struct lull_host_block *b)
-{
-    size_t low = 0, high = line->count;
-    while (low < high) { /* the first that begins to the right */
-        const size_t middle = low + (high - low) / 2;
-        if (line->list[middle]->x0 > b->x0)
-            high = middle;
-        else
-            low = middle + 1;
-    }
-    if (low > 0 && line->list[low - 1]->x1 > b->x0)
-        return line->list[low - 1];
-    if (low < line->count && line->list[low]->x0 < b->x1)
-        return line->list[low];
-    for (size_t i = line->count++; i > low; i--)
-        line->list[i] = line->list[i - 1];
-    line->list[low] = b;
-    return NULL;
-}
-
-int32_t lull_host_check_disjoint(const struct lull_host_block *list, uint32_t count, struct lull_error *err)
-{
-    const struct lull_host_block **sorted = calloc(2 * (size_t)count, sizeof *sorted), *other = NULL;
-    if (!sorted)
-        return lull_host_no_memory(err, "blocks");
-    struct crossed line = {.list = sorted + count};
-    int32_t code = LULL_OK;
-    for (uint32_t i = 0; i < count; i++)
-        sorted[i] = &list[i];
-    qsort(sorted, count, sizeof *sorted, by_place);
-    for (uint32_t i = 0; i < count && !other; i++) {
-        if (i > 0 && sorted[i]->y0 > sorted[i - 1]->y0)
-            leave(&line, sorted[i]->y0);
-        other = enter(&line, sorted[i]);
-        if (other)
-            code = lull_error_set(err, LULL_E_INVALID, "blocks %u (%d,%d,%d,%d) and %u (%d,%d,%d,%d) overlap", other->id,
-                                  other->x0, other->y0, other->x1, other->y1, sorted[i]->id, sorted[i]->x0, sorted[i]->y0,
-                                  sorted[i]->x1, sorted[i]->y1);
-    }
-    free(sorted);
-    return code;
-}
-
 int32_t lull_host_check_plane(const char *name, const struct lull_plane *p, uint32_t channels, struct lull_error *err)
 {
     static const int64_t sizes[] = {4, 2, 8, 4}; /* bytes of a LULL_TYPE_ */
@@ -202,15 +134,6 @@ int32_t lull_host_check_plane(const char *name, const struct lull_plane *p, uint
         if (stride[i] % size != 0)
             return lull_error_set(err, LULL_E_PLANE, "%s: %s is not aligned to elements of %d bytes", name, what[i],
                                   (int)size);
-    return LULL_OK;
-}
-
-int32_t lull_host_check_announced(uint32_t planes, const struct lull_plane shown[LULL_PLANE_COUNT], struct lull_error *err)
-{
-    for (int i = 0; i < LULL_PLANE_COUNT; i++)
-        if ((planes & ~LULL_HOST_COUNTS & LULL_PLANE_BIT(i)) && !shown[i].data)
-            return lull_error_set(err, LULL_E_PLANE, "%s: the view does not have the plane, which the config announced",
-                                  lull_kit_plane_name((unsigned)i));
     return LULL_OK;
 }
 

@@ -1,6 +1,7 @@
 #include "host/frame.h"
 
 #include <math.h>
+#include <search.h>
 #include <stdlib.h>
 
 /* Blocks by default: up to so many pixels wide, and small enough that a picture has so many. */
@@ -77,10 +78,14 @@ static int32_t choose_size(const struct lull_host_config *g, const struct lull_r
     return LULL_OK;
 }
 
-static int32_t too_many(uint64_t count, struct lull_error *err)
+static int32_t make_list(struct lull_host_blocks *b, uint64_t count, struct lull_error *err)
 {
-    return lull_error_set(err, LULL_E_INVALID, "%llu blocks are too many: expected at most %d", (unsigned long long)count,
-                          MOST_BLOCKS);
+    if (count > MOST_BLOCKS)
+        return lull_error_set(err, LULL_E_INVALID, "%llu blocks are too many: expected at most %d",
+                              (unsigned long long)count, MOST_BLOCKS);
+    b->count = (uint32_t)count;
+    b->list = calloc(b->count, sizeof *b->list);
+    return b->list ? LULL_OK : lull_host_no_memory(err, "blocks");
 }
 
 static int32_t lay_grid(const struct lull_host_config *g, int clip, struct lull_host_blocks *b, struct lull_error *err)
@@ -95,14 +100,10 @@ static int32_t lay_grid(const struct lull_host_config *g, int clip, struct lull_
     b->columns = (uint32_t)((width - 1) / w + 1);
     b->rows = (uint32_t)((height - 1) / h + 1);
     int32_t c0 = crop.x0 / w, c1 = (crop.x1 - 1) / w + 1, r0 = crop.y0 / h, r1 = (crop.y1 - 1) / h + 1;
-    const uint64_t count = (uint64_t)(c1 - c0) * (uint64_t)(r1 - r0);
-    if (count > MOST_BLOCKS)
-        return too_many(count, err);
+    const int32_t code = make_list(b, (uint64_t)(c1 - c0) * (uint64_t)(r1 - r0), err);
+    if (code != LULL_OK)
+        return code;
     b->list_columns = (uint32_t)(c1 - c0);
-    b->count = b->list_columns * (uint32_t)(r1 - r0);
-    b->list = calloc(b->count, sizeof *b->list);
-    if (!b->list)
-        return lull_host_no_memory(err, "blocks");
     struct lull_host_block *out = b->list;
     for (int32_t r = r0; r < r1; r++) {
         for (int32_t c = c0; c < c1; c++) {
@@ -116,6 +117,53 @@ static int32_t lay_grid(const struct lull_host_config *g, int clip, struct lull_
     return LULL_OK;
 }
 
+static int by_top(const void *a, const void *b)
+{
+    const struct lull_host_block *x = *(const struct lull_host_block *const *)a,
+                                 *y = *(const struct lull_host_block *const *)b;
+    const int rows = (x->y0 > y->y0) - (x->y0 < y->y0);
+    return rows ? rows : (x->x0 > y->x0) - (x->x0 < y->x0);
+}
+
+/* Blocks that one line of pixels crosses have an order; two that overlap have none. */
+static int by_columns(const void *a, const void *b)
+{
+    const struct lull_host_block *x = a, *y = b;
+    return (x->x0 >= y->x1) - (y->x0 >= x->x1);
+}
+
+/* A line of pixels goes down the picture, with a tree of the blocks that it crosses. One that it has left stays in the tree
+ * until another takes its columns. */
+static int32_t check_disjoint(const struct lull_host_block *list, uint32_t count, struct lull_error *err)
+{
+    const struct lull_host_block **sorted = calloc(count, sizeof *sorted);
+    if (!sorted)
+        return lull_host_no_memory(err, "blocks");
+    void *line = NULL;
+    int32_t code = LULL_OK;
+    for (uint32_t i = 0; i < count; i++)
+        sorted[i] = &list[i];
+    qsort(sorted, count, sizeof *sorted, by_top);
+    for (uint32_t i = 0; i < count && code == LULL_OK; i++) {
+        const struct lull_host_block *b = sorted[i], *other = NULL, *const * found;
+        while ((found = tsearch(b, &line, by_columns)) && *found != b && (*found)->y1 <= b->y0)
+            tdelete(*found, &line, by_columns);
+        if (!found)
+            code = lull_host_no_memory(err, "blocks");
+        else if (*found != b) {
+            for (uint32_t k = 0; k < i; k++) /* the leftmost one is named */
+                if (sorted[k]->y1 > b->y0 && by_columns(sorted[k], b) == 0 && (!other || sorted[k]->x0 < other->x0))
+                    other = sorted[k];
+            code = lull_error_set(err, LULL_E_INVALID, "blocks %u (%d,%d,%d,%d) and %u (%d,%d,%d,%d) overlap", other->id,
+                                  other->x0, other->y0, other->x1, other->y1, b->id, b->x0, b->y0, b->x1, b->y1);
+        }
+    }
+    while (line)
+        tdelete(*(const struct lull_host_block *const *)line, &line, by_columns);
+    free(sorted);
+    return code;
+}
+
 static int32_t lay_own(const struct lull_host_config *g, struct lull_host_blocks *b, struct lull_error *err)
 {
     if (!g->layout)
@@ -123,12 +171,9 @@ static int32_t lay_own(const struct lull_host_config *g, struct lull_host_blocks
     if (g->layout_count == 0 || g->layout_stride < sizeof(struct lull_rect) || g->layout_stride % sizeof(int32_t) != 0 ||
         (uintptr_t)g->layout % sizeof(int32_t) != 0)
         return lull_error_set(err, LULL_E_INVALID, "the layout has no blocks or a bad stride");
-    if (g->layout_count > MOST_BLOCKS)
-        return too_many(g->layout_count, err);
-    b->count = g->layout_count;
-    b->list = calloc(b->count, sizeof *b->list);
-    if (!b->list)
-        return lull_host_no_memory(err, "blocks");
+    const int32_t code = make_list(b, g->layout_count, err);
+    if (code != LULL_OK)
+        return code;
     for (uint32_t i = 0; i < b->count; i++) {
         const struct lull_rect *r = (const void *)((const char *)g->layout + (size_t)i * g->layout_stride);
         if (!is_inside(r, g))
@@ -137,7 +182,7 @@ static int32_t lay_own(const struct lull_host_config *g, struct lull_host_blocks
                                   r->x1, r->y1, g->width, g->height);
         b->list[i] = fresh(i, *r);
     }
-    return lull_host_check_disjoint(b->list, b->count, err);
+    return check_disjoint(b->list, b->count, err);
 }
 
 int32_t lull_host_lay_out(const struct lull_host_config *g, const struct lull_requirements *needs, int clip,
@@ -147,7 +192,9 @@ int32_t lull_host_lay_out(const struct lull_host_config *g, const struct lull_re
                                  .flags = g->flags & (LULL_HOST_UNIFORM | LULL_HOST_OPEN_ENDED),
                                  .spp_min = g->spp_min,
                                  .spp_max = g->spp_max,
-                                 .check_step = g->check_step > 0 ? g->check_step : 1};
+                                 .check_step = g->check_step > 0 ? g->check_step : 1,
+                                 .x0 = INT32_MAX,
+                                 .y0 = INT32_MAX};
     if (g->width < 1 || g->height < 1 || g->width > INT32_MAX || g->height > INT32_MAX)
         return lull_error_set(err, LULL_E_INVALID, "a picture of %ux%u pixels: expected 1 to 2^31 - 1", g->width, g->height);
     int32_t code = choose_size(g, needs, &b, err);
@@ -157,11 +204,7 @@ int32_t lull_host_lay_out(const struct lull_host_config *g, const struct lull_re
         free(b.list);
         return code;
     }
-    b.x0 = b.list[0].x0;
-    b.y0 = b.list[0].y0;
-    b.x1 = b.list[0].x1;
-    b.y1 = b.list[0].y1;
-    for (uint32_t i = 1; i < b.count; i++) {
+    for (uint32_t i = 0; i < b.count; i++) {
         b.x0 = least(b.x0, b.list[i].x0);
         b.y0 = least(b.y0, b.list[i].y0);
         b.x1 = most(b.x1, b.list[i].x1);
