@@ -15,7 +15,8 @@ struct picture {
     const struct lull_host_denoising *how;
     struct lull_view view;
     int32_t width;
-    double exposure, luminance[3];
+    double exposure;
+    const double *luminance;        /* [3] borrows; what makes it of colours */
     int albedo, normal;             /* whether the view has these */
     struct lull_denoised_pair pair; /* owns; of the whole view, */
     struct lull_denoised_part part; /* as this */
@@ -211,10 +212,10 @@ int32_t lull_host_denoise(const struct lull_host_frame *frame, const struct lull
                         .how = how,
                         .view = lull_host_seen(view, &s),
                         .width = view->x1 - view->x0,
-                        .exposure = frame->config.exposure > 0.0 ? frame->config.exposure : 1.0,
+                        .exposure = frame->config.exposure,
+                        .luminance = frame->config.rgb_to_xyz + 3,
                         .albedo = s.planes[LULL_PLANE_ALBEDO].data != NULL};
     p.normal = p.albedo && s.planes[LULL_PLANE_NORMAL].data;
-    lull_host_luminance(frame, p.luminance);
     if (!s.planes[LULL_PLANE_COLOR].data || (!is_full(&p) && !s.planes[LULL_PLANE_HALF].data))
         code = lull_error_set(err, LULL_E_INVALID, "a denoised picture needs the plane COLOR, a blend HALF besides");
     else

@@ -29,7 +29,7 @@ enum { LULL_HOST_MESSAGES = 8, LULL_HOST_LINE = 600 };
 struct lull_host_criterion {
     const struct lull_criterion *table;
     struct lull_instance *instances[LULL_HOST_STEPS + 1]; /* own; by step of the mask, NULL where no block is of that step */
-    struct lull_pair *pairs;                              /* owns, as their text */
+    struct lull_pair *pairs;                              /* owns, as their text; [pair_count + 1], the last one free */
     uint32_t pair_count;
     struct lull_requirements needs;
     struct lull_host_services offered; /* name: owns */
@@ -39,8 +39,9 @@ struct lull_host_criterion {
     /* Of its frame, if one is open: scratch of an evaluate, [block_count]. */
     const struct lull_host_frame *frame; /* never followed, only compared; NULL after a failure */
     uint32_t block_count;
-    struct lull_block *all, *due;  /* own; the state of every block; of those that one instance is asked about */
-    struct lull_decision *answers; /* owns */
+    struct lull_block *all;        /* owns, with the next two: the state of every block */
+    struct lull_block *due;        /* of those that one instance is asked about */
+    struct lull_decision *answers; /* of that instance */
     double begin_s;
     int open;
 
@@ -73,15 +74,15 @@ struct lull_host_answer {
 enum { LULL_HOST_ANSWERS = 64, LULL_HOST_ANSWERS_IN_ALL = 1 << 22 };
 
 struct lull_host_frame {
-    struct lull_host_config config;        /* layout and mask: NULL, they were read */
+    struct lull_host_config config; /* exposure, rgb_to_xyz: what they stand for; layout, mask: NULL, they were read */
     struct lull_host_criterion *criterion; /* borrows; may be NULL */
     struct lull_host_blocks blocks;
     struct lull_host_totals totals;
     struct lull_host_sample dropped[LULL_HOST_DROPPED_KEPT];
     uint32_t dropped_count;
-    uint32_t *due;                    /* owns; [blocks], as the next two: scratch of lull_host_check */
-    uint8_t *final;                   /* owns */
-    struct lull_decision *decisions;  /* owns */
+    struct lull_decision *decisions; /* owns, with the next two; [blocks] each: scratch of lull_host_check */
+    uint32_t *due;
+    uint8_t *final;
     struct lull_host_answer *answers; /* owns; [blocks][answer_room] */
     uint32_t *answer_count;           /* owns; [blocks] */
     uint32_t answer_room;             /* 0: none are kept */
@@ -150,11 +151,6 @@ int32_t lull_host_check_view(const struct lull_host_blocks *blocks, const struct
                              struct lull_error *err);
 /* What the renderer writes into blocks and totals. */
 int32_t lull_host_check_samples(const struct lull_host_frame *frame, struct lull_error *err);
-
-/* --- open.c --------------------------------------------------------------------------------------------------------- */
-
-/* What makes luminance of the frame's colours. */
-void lull_host_luminance(const struct lull_host_frame *frame, double weights[3]);
 
 /* --- grid.c --------------------------------------------------------------------------------------------------------- */
 

@@ -29,15 +29,22 @@ static void give_back(const struct lull_host_services *services)
         services->release(services->context);
 }
 
-/* Of a step of the mask. Nothing is believed of what a failed create leaves behind. */
-static int32_t make_instance(struct lull_host_criterion *c, const struct lull_pair *pairs, uint32_t count, uint32_t step,
-                             struct lull_error *err)
+/* Of a step of the mask: beyond the first one its quality parameter is scaled. Nothing is believed of what a failed create
+ * leaves behind. */
+static int32_t make_instance(struct lull_host_criterion *c, uint32_t step, struct lull_error *err)
 {
     struct lull_error e = {.struct_size = sizeof e};
     struct lull_instance *made = NULL;
     struct lull_process_state before;
+    char value[32];
+    uint32_t count = c->pair_count;
+    int32_t code = LULL_OK;
+    if (step > 0) /* a later pair wins */
+        code = lull_host_scale_quality(c->table, c->pairs, c->pair_count, step, value, &c->pairs[count++], err);
+    if (code != LULL_OK)
+        return code;
     lull_signal_state_read(&before);
-    const int32_t code = c->table->create(&c->host, pairs, count, sizeof *pairs, &made, &e);
+    code = c->table->create(&c->host, c->pairs, count, sizeof *c->pairs, &made, &e);
     lull_host_leave(c, &before, "create");
     if (code != LULL_OK)
         return lull_host_blame(c, "", code, &e, err);
@@ -80,11 +87,10 @@ int32_t lull_host_create(const struct lull_host_services *services, const struct
     code = lull_host_offer(c, services, err);
     if (code == LULL_OK)
         code = copy_pairs(c, pairs, pair_count, err);
-    if (code == LULL_OK) {
-        code = make_instance(c, pairs, pair_count, 0, err);
-        if (code == LULL_OK)
-            code = ask_needs(c, err);
-    }
+    if (code == LULL_OK)
+        code = make_instance(c, 0, err);
+    if (code == LULL_OK)
+        code = ask_needs(c, err);
     if (code != LULL_OK) {
         lull_host_close(c);
         return code;
@@ -122,15 +128,6 @@ int32_t lull_host_open(const struct lull_host_services *services, const char *sp
     return code;
 }
 
-static void release_frame(struct lull_host_criterion *c)
-{
-    free(c->all);
-    free(c->due);
-    free(c->answers);
-    c->all = c->due = NULL;
-    c->answers = NULL;
-}
-
 void lull_host_close(struct lull_host_criterion *c)
 {
     if (!c)
@@ -144,7 +141,7 @@ void lull_host_close(struct lull_host_criterion *c)
             c->table->destroy(c->instances[s]);
     }
     lull_host_leave(c, &before, "destroy");
-    release_frame(c);
+    free(c->all);
     for (uint32_t i = 0; c->pairs && i < c->pair_count; i++) {
         free((void *)(uintptr_t)c->pairs[i].key);
         free((void *)(uintptr_t)c->pairs[i].value);
@@ -176,21 +173,6 @@ const char *lull_host_parameter(const struct lull_criterion *t, const char *name
     return text;
 }
 
-/* An instance like the first one, its quality parameter scaled for this step of the mask. */
-static int32_t create_instance(struct lull_host_criterion *c, uint32_t step, struct lull_error *err)
-{
-    char value[32];
-    struct lull_pair *pairs = calloc((size_t)c->pair_count + 1, sizeof *pairs);
-    if (!pairs)
-        return lull_host_no_memory(err, "criterion");
-    memcpy(pairs, c->pairs, c->pair_count * sizeof *pairs);
-    int32_t code = lull_host_scale_quality(c->table, c->pairs, c->pair_count, step, value, &pairs[c->pair_count], err);
-    if (code == LULL_OK) /* a later pair wins */
-        code = make_instance(c, pairs, c->pair_count + 1, step, err);
-    free(pairs);
-    return code;
-}
-
 static int32_t fits(const struct lull_host_criterion *c, const struct lull_host_blocks *b, struct lull_error *err)
 {
     const struct lull_requirements *n = &c->needs;
@@ -199,21 +181,6 @@ static int32_t fits(const struct lull_host_criterion *c, const struct lull_host_
         return LULL_OK;
     return lull_error_set(err, LULL_E_UNSUPPORTED, "criterion %s judges blocks of %ux%u pixels only", c->table->id,
                           n->block_width, n->block_height);
-}
-
-/* To XYZ, row by row. */
-static const double *primaries(const struct lull_host_config *g)
-{
-    static const double srgb[9] = BASE_RGB_TO_XYZ;
-    int given = 0;
-    for (int i = 0; i < 9; i++)
-        given |= g->rgb_to_xyz[i] != 0.0;
-    return given ? g->rgb_to_xyz : srgb;
-}
-
-void lull_host_luminance(const struct lull_host_frame *f, double weights[3])
-{
-    memcpy(weights, primaries(&f->config) + 3, 3 * sizeof *weights);
 }
 
 static struct lull_frame describe(const struct lull_host_frame *f, const struct lull_host_criterion *c,
@@ -231,13 +198,13 @@ static struct lull_frame describe(const struct lull_host_frame *f, const struct 
                                .planes = g->planes | (lull_host_wants_counts(c) ? LULL_HOST_COUNTS : 0),
                                .transfer = g->transfer,
                                .gamma = g->gamma,
-                               .exposure = g->exposure > 0.0 ? g->exposure : 1.0,
+                               .exposure = g->exposure,
                                .sample_clamp = g->sample_clamp,
                                .time_budget_s = g->time_budget_s,
                                .spp_min = g->spp_min,
                                .spp_max = g->spp_max,
                                .seed = g->seed};
-    memcpy(frame.rgb_to_xyz, primaries(g), sizeof frame.rgb_to_xyz);
+    memcpy(frame.rgb_to_xyz, g->rgb_to_xyz, sizeof frame.rgb_to_xyz);
     return frame;
 }
 
@@ -253,7 +220,7 @@ static int32_t begin_instances(struct lull_host_criterion *c, const struct lull_
         const struct lull_host_block *k = &b->list[i];
         rects[i] = (struct lull_rect){k->x0, k->y0, k->x1, k->y1};
         if (!c->instances[k->step])
-            code = create_instance(c, k->step, err);
+            code = make_instance(c, k->step, err);
     }
     struct lull_frame frame = describe(f, c, rects);
     struct lull_process_state before;
@@ -279,13 +246,13 @@ int32_t lull_host_join(const struct lull_host_frame *f, struct lull_host_criteri
     code = fits(c, &f->blocks, err);
     if (code != LULL_OK)
         return code;
-    release_frame(c);
+    free(c->all);
     c->block_count = f->blocks.count;
-    c->all = calloc(c->block_count, sizeof *c->all);
-    c->due = calloc(c->block_count, sizeof *c->due);
-    c->answers = calloc(c->block_count, sizeof *c->answers);
-    if (!c->all || !c->due || !c->answers)
+    c->all = calloc(c->block_count, 2 * sizeof *c->all + sizeof *c->answers);
+    if (!c->all)
         return lull_host_no_memory(err, "blocks of the criterion");
+    c->due = c->all + c->block_count;
+    c->answers = (struct lull_decision *)(c->due + c->block_count);
     code = begin_instances(c, f, err);
     if (code != LULL_OK)
         return code;
@@ -312,15 +279,15 @@ static int32_t fill_frame(struct lull_host_frame *f, const struct lull_plane *ma
     char value[32];
     struct lull_pair quality;
     int32_t code = LULL_OK;
-    f->due = calloc(b->count, sizeof *f->due);
-    f->final = calloc(b->count, sizeof *f->final);
-    f->decisions = calloc(b->count, sizeof *f->decisions);
+    f->decisions = calloc(b->count, sizeof *f->decisions + sizeof *f->due + sizeof *f->final);
     uint32_t room = LULL_HOST_ANSWERS_IN_ALL / b->count / 2 * 2;
     f->answer_room = room < LULL_HOST_ANSWERS ? room : LULL_HOST_ANSWERS;
     f->answers = calloc((size_t)b->count * f->answer_room + 1, sizeof *f->answers);
     f->answer_count = calloc(b->count, sizeof *f->answer_count);
-    if (!f->due || !f->final || !f->decisions || !f->answers || !f->answer_count)
+    if (!f->decisions || !f->answers || !f->answer_count)
         return lull_host_no_memory(err, "blocks");
+    f->due = (uint32_t *)(f->decisions + b->count);
+    f->final = (uint8_t *)(f->due + b->count);
     if (mask) /* a criterion without a quality parameter is refused whatever the mask shows */
         code = lull_host_scale_quality(c->table, c->pairs, c->pair_count, 0, value, &quality, err);
     if (mask && code == LULL_OK)
@@ -330,6 +297,22 @@ static int32_t fill_frame(struct lull_host_frame *f, const struct lull_plane *ma
     for (uint32_t i = 0; i < b->count && code == LULL_OK; i++)
         b->list[i].next_spp = first_check(f);
     return code;
+}
+
+/* With what its zeros stand for, and without what is read but once. */
+static struct lull_host_config understood(const struct lull_host_config *given)
+{
+    static const double srgb[9] = BASE_RGB_TO_XYZ;
+    struct lull_host_config g = *given;
+    int is_given = 0;
+    g.layout = NULL;
+    g.mask = NULL;
+    g.exposure = g.exposure > 0.0 ? g.exposure : 1.0;
+    for (int i = 0; i < 9; i++)
+        is_given |= g.rgb_to_xyz[i] != 0.0;
+    if (!is_given)
+        memcpy(g.rgb_to_xyz, srgb, sizeof srgb);
+    return g;
 }
 
 int32_t lull_host_begin(const struct lull_host_config *config, struct lull_host_criterion *criterion,
@@ -343,9 +326,7 @@ int32_t lull_host_begin(const struct lull_host_config *config, struct lull_host_
     struct lull_host_frame *f = calloc(1, sizeof *f);
     if (!f)
         return lull_host_no_memory(err, "frame");
-    f->config = *config;
-    f->config.layout = NULL;
-    f->config.mask = NULL;
+    f->config = understood(config);
     f->criterion = criterion;
     code = lull_host_lay_out(config, criterion ? &criterion->needs : NULL, !criterion, &f->blocks, err);
     if (code == LULL_OK)
@@ -363,8 +344,6 @@ void lull_host_end(struct lull_host_frame *f)
     if (!f)
         return;
     free(f->blocks.list);
-    free(f->due);
-    free(f->final);
     free(f->decisions);
     free(f->answers);
     free(f->answer_count);

@@ -66,17 +66,11 @@ static int32_t create_changed(const struct lull_host_criterion *own, const struc
                               struct lull_host_criterion **made, struct lull_error *err)
 {
     struct lull_host_services services = own->offered;
-    struct lull_pair *pairs = calloc((size_t)own->pair_count + 1, sizeof *pairs);
-    if (!pairs)
-        return no_memory(err);
     services.struct_size = sizeof services;
     services.release = NULL; /* the context is the frame's criterion's */
-    memcpy(pairs, own->pairs, own->pair_count * sizeof *pairs);
     if (changed)
-        pairs[own->pair_count] = *changed; /* a later pair wins */
-    int32_t code = lull_host_create(&services, own->table, pairs, own->pair_count + (changed != NULL), made, err);
-    free(pairs);
-    return code;
+        own->pairs[own->pair_count] = *changed; /* a later pair wins */
+    return lull_host_create(&services, own->table, own->pairs, own->pair_count + (changed != NULL), made, err);
 }
 
 int32_t lull_host_quote_add(struct lull_host_quote *q, const struct lull_pair *changed, int32_t asked,
@@ -236,12 +230,11 @@ static double top_share(const struct lull_host_frame *f, const struct lull_view 
 {
     const struct lull_block b =
         lull_host_state_of(&f->blocks.list[index], index, lull_kit_plane(view, LULL_PLANE_HALF) != NULL);
-    double weights[3];
+    const double *weights = f->config.rgb_to_xyz + 3; /* what makes luminance of colours */
     size_t n = 0;
     struct lull_kit_span s;
     if (b.half_spp == 0 || b.half_spp == b.spp)
         return 0.0;
-    lull_host_luminance(f, weights);
     lull_kit_span_begin(&s, view, &b, LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF));
     while (lull_kit_span_next(&s))
         for (int32_t i = 0; i < s.count; i++) {
