@@ -20,6 +20,7 @@ struct picture {
     int albedo, normal;             /* whether the view has these */
     struct lull_denoised_pair pair; /* owns; of the whole view, */
     struct lull_denoised_part part; /* as this */
+    float *const *other;            /* [2] borrows; by which the denoised halves are judged */
     float *mean;                    /* owns; [pixels][3]: of all samples */
 };
 
@@ -59,27 +60,20 @@ static void each_span(struct picture *p, uint32_t planes, visit *fn)
     }
 }
 
-static void read_halves(struct picture *p, const struct lull_kit_span *s, size_t at)
+static void read_pictures(struct picture *p, const struct lull_kit_span *s, size_t at)
 {
-    for (size_t i = 0; i < (size_t)s->count; i++)
-        lull_denoised_put(&p->pair, at + i, s->value[LULL_PLANE_COLOR][i], s->value[LULL_PLANE_HALF][i],
-                          (double)s->block->spp, (double)s->block->half_spp);
-}
-
-static void read_mean(struct picture *p, const struct lull_kit_span *s, size_t at)
-{
-    for (size_t i = 0; i < (size_t)s->count; i++)
-        for (size_t c = 0; c < 3; c++)
+    float *const auxiliary[2] = {p->pair.albedo, p->pair.normal};
+    for (size_t i = 0; i < (size_t)s->count; i++) {
+        if (!is_full(p))
+            lull_denoised_put(&p->pair, at + i, s->value[LULL_PLANE_COLOR][i], s->value[LULL_PLANE_HALF][i],
+                              (double)s->block->spp, (double)s->block->half_spp);
+        for (size_t c = 0; c < 3; c++) {
             p->mean[3 * (at + i) + c] = (float)s->value[LULL_PLANE_COLOR][i][c];
-}
-
-static void read_auxiliary(struct picture *p, const struct lull_kit_span *s, size_t at)
-{
-    float *const to[2] = {p->pair.albedo, p->pair.normal};
-    for (int k = 0; k < 2; k++)
-        for (size_t i = 0; to[k] && i < (size_t)s->count; i++)
-            for (size_t c = 0; c < 3; c++)
-                to[k][3 * (at + i) + c] = (float)s->value[LULL_PLANE_ALBEDO + k][i][c];
+            for (int k = 0; k < 2; k++)
+                if (auxiliary[k])
+                    auxiliary[k][3 * (at + i) + c] = (float)s->value[LULL_PLANE_ALBEDO + k][i][c];
+        }
+    }
 }
 
 /* Luminance by which pictures are compared, 1 is the display's white: what is far beyond shows no noise. What is little
@@ -94,12 +88,13 @@ static float compared(const struct picture *p, const float *rgb)
     return (float)(y > 0.0 ? fmin(y, most) : 0.0);
 }
 
-/* What the denoised halves gain by two others. Where there are no halves it stays 0: the denoised picture is kept. */
-static void estimate(struct picture *p, const struct lull_kit_span *s, size_t at, float *const other[2])
+/* What the denoised halves gain by the others. Where there are no halves it stays 0: the denoised picture is kept. */
+static void estimate(struct picture *p, const struct lull_kit_span *s, size_t at)
 {
     const struct lull_denoised_part *part = &p->part;
     const double share = (double)s->block->half_spp / (double)s->block->spp;
-    float *const pictures[6] = {part->half[0], part->half[1], part->denoised[0], part->denoised[1], other[0], other[1]};
+    float *const pictures[6] = {part->half[0],     part->half[1], part->denoised[0],
+                                part->denoised[1], p->other[0],   p->other[1]};
     float light[6][LULL_KIT_SPAN_MAX];
     if (s->block->half_spp == 0 || s->block->half_spp >= s->block->spp)
         return;
@@ -109,13 +104,6 @@ static void estimate(struct picture *p, const struct lull_kit_span *s, size_t at
     const struct lull_estimate_in in = {light[0], light[1], light[2], light[3], light[4], light[5], share};
     lull_denoised_estimate(&p->part, at, (size_t)s->count, &in);
 }
-
-static void estimate_other(struct picture *p, const struct lull_kit_span *s, size_t at)
-{
-    estimate(p, s, at, p->pair.other);
-}
-
-static void estimate_noisy(struct picture *p, const struct lull_kit_span *s, size_t at) { estimate(p, s, at, p->part.half); }
 
 /* Whether this is a draft that is as good as was asked: the criterion has stopped every block, and told of one that it shows
  * an error. Clean auxiliaries would take more than twice as long as the rest, for what nobody asked. */
@@ -137,15 +125,16 @@ static int32_t denoise_halves(struct picture *p, float *denoised, struct lull_er
 {
     const struct lull_denoised_part *part = &p->part;
     struct base_err why = {0};
-    each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF), read_halves);
     if (lull_denoised_run(&p->pair, p->how->cancelled, p->how->context, &why) ||
         (!is_draft(p) && lull_denoised_again(&p->pair, p->how->cancelled, p->how->context, &why)))
         return lull_host_translate(&why, err);
     if (p->pair.other[0]) {
-        each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), estimate_other);
+        p->other = p->pair.other;
+        each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), estimate);
         lull_denoised_mix(&p->part, &p->pair);
     }
-    each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), estimate_noisy);
+    p->other = part->half;
+    each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), estimate);
     lull_denoised_weigh(&p->part);
     for (size_t i = 0; i < 3 * part->pixels; i++)
         denoised[i] = 0.5f * part->denoised[0][i] + 0.5f * part->denoised[1][i];
@@ -184,8 +173,10 @@ static int32_t make(struct picture *p, int32_t height, const struct lull_host_pi
     if (!p->mean)
         return lull_host_no_memory(err, "the denoised picture");
     float *denoised = out->denoised ? out->denoised : part->denoised[0];
-    each_span(p, LULL_PLANE_BIT(LULL_PLANE_ALBEDO) | LULL_PLANE_BIT(LULL_PLANE_NORMAL), read_auxiliary);
-    each_span(p, LULL_PLANE_BIT(LULL_PLANE_COLOR), read_mean);
+    each_span(p,
+              LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF) | LULL_PLANE_BIT(LULL_PLANE_ALBEDO) |
+                  LULL_PLANE_BIT(LULL_PLANE_NORMAL),
+              read_pictures);
     code = is_full(p) ? denoise_mean(p, denoised, err) : denoise_halves(p, denoised, err);
     if (code != LULL_OK)
         return code;
