@@ -98,17 +98,22 @@ struct lull_host_response {
     double error;         /* that it was given; of rows of a quote by error alone */
 };
 
-/* What a row of a quote asks, and the responses to it. */
+/* What a row says of a block, first and last. */
+struct lull_host_responses {
+    struct lull_host_response first, last;
+};
+
+/* A row, and what it asks. */
 struct lull_host_quote_asked {
     struct lull_host_criterion *criterion; /* owns; NULL: nobody is asked */
-    struct lull_host_response *response;   /* owns; [blocks] */
-    struct lull_host_response *first;      /* owns; [blocks] its first response */
+    struct lull_host_responses *responses; /* owns; [blocks] */
     struct lull_host_quote_block *blocks;  /* owns; the answer */
     double limit;                          /* the error at which a row by error stops; 0: another row */
     uint64_t first_spp;                    /* samples at the first check of such a row */
+    int itself;                            /* it stands for the render */
     int other;                             /* not the frame's criterion: its checks take their own time */
     double asked_s;                        /* wall seconds that it was asked */
-    uint64_t asked;                        /* blocks */
+    uint64_t count;                        /* blocks that it was asked about */
 };
 
 struct lull_host_quote {

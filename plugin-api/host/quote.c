@@ -34,8 +34,7 @@ void lull_host_quote_end(struct lull_host_quote *q)
         return;
     for (uint32_t i = 0; i < q->count; i++) {
         lull_host_close(q->asked[i].criterion);
-        free(q->asked[i].response);
-        free(q->asked[i].first);
+        free(q->asked[i].responses);
         free(q->asked[i].blocks);
     }
     free(q->asked);
@@ -44,21 +43,17 @@ void lull_host_quote_end(struct lull_host_quote *q)
 }
 
 /* The new row is the last one, even after a failure, so that it is freed. */
-static int32_t add_row(struct lull_host_quote *q, int32_t asked, struct lull_error *err)
+static int32_t add_row(struct lull_host_quote *q, struct lull_error *err)
 {
     const size_t n = q->frame->blocks.count;
-    void *rows = realloc(q->rows, (q->count + 1) * sizeof *q->rows);
-    q->rows = rows ? rows : q->rows;
-    void *answers = realloc(q->asked, (q->count + 1) * sizeof *q->asked);
-    q->asked = answers ? answers : q->asked;
-    if (!rows || !answers)
+    struct lull_host_quote_asked *grown = realloc(q->asked, (q->count + 1) * sizeof *grown);
+    if (!grown)
         return no_memory(err);
-    struct lull_host_quote_asked *a = &q->asked[q->count];
-    *a = (struct lull_host_quote_asked){.response = calloc(n, sizeof *a->response),
-                                        .first = calloc(n, sizeof *a->first),
-                                        .blocks = calloc(n, sizeof *a->blocks)};
-    q->rows[q->count++] = (struct lull_host_quote_row){.asked = asked};
-    return a->response && a->first && a->blocks ? LULL_OK : no_memory(err);
+    struct lull_host_quote_asked *a = &grown[q->count++];
+    *a =
+        (struct lull_host_quote_asked){.responses = calloc(n, sizeof *a->responses), .blocks = calloc(n, sizeof *a->blocks)};
+    q->asked = grown;
+    return a->responses && a->blocks ? LULL_OK : no_memory(err);
 }
 
 /* The frame's criterion once more, with a parameter changed; NULL: with none. */
@@ -80,12 +75,15 @@ int32_t lull_host_quote_add(struct lull_host_quote *q, const struct lull_pair *c
     if (code == LULL_OK)
         code = lull_host_check_pairs(changed, changed != NULL, err);
     if (code == LULL_OK)
-        code = add_row(q, asked, err);
-    if (code != LULL_OK || !q->frame->criterion)
+        code = add_row(q, err);
+    if (code != LULL_OK)
         return code;
-    struct lull_host_criterion **made = &q->asked[q->count - 1].criterion;
-    code = create_changed(q->frame->criterion, changed, made, err);
-    return code == LULL_OK ? lull_host_join(q->frame, *made, err) : code;
+    struct lull_host_quote_asked *a = &q->asked[q->count - 1];
+    a->itself = asked;
+    if (!q->frame->criterion)
+        return LULL_OK;
+    code = create_changed(q->frame->criterion, changed, &a->criterion, err);
+    return code == LULL_OK ? lull_host_join(q->frame, a->criterion, err) : code;
 }
 
 /* Samples at the first check of the frame's criterion if it stopped at this error: drafts may be checked earlier. */
@@ -107,7 +105,7 @@ int32_t lull_host_quote_add_error(struct lull_host_quote *q, double limit, struc
     if (code == LULL_OK && !(limit > 0.0 && limit < INFINITY))
         code = lull_error_set(err, LULL_E_INVALID, "an error of %g: expected more than 0", limit);
     if (code == LULL_OK)
-        code = add_row(q, 0, err);
+        code = add_row(q, err);
     if (code != LULL_OK)
         return code;
     struct lull_host_quote_asked *a = &q->asked[q->count - 1];
@@ -120,7 +118,7 @@ int32_t lull_host_quote_add_other(struct lull_host_quote *q, struct lull_host_cr
 {
     int32_t code = lull_host_given(err, "quote", q, "criterion", criterion, NULL);
     if (code == LULL_OK)
-        code = add_row(q, 0, err);
+        code = add_row(q, err);
     if (code != LULL_OK) {
         lull_host_close(criterion);
         return code;
@@ -130,20 +128,27 @@ int32_t lull_host_quote_add_other(struct lull_host_quote *q, struct lull_host_cr
     return lull_host_join(q->frame, criterion, err);
 }
 
+static void note(struct lull_host_responses *r, struct lull_host_response response)
+{
+    r->last = response;
+    r->first = r->first.spp > 0 ? r->first : response;
+}
+
 /* A row that would have stopped the block at an earlier check has stopped it; where between the two checks follows from what
  * it expected at the first. */
-static void note_answer(struct lull_host_response *response, const struct lull_host_block *b, const struct lull_decision *d,
+static void note_answer(struct lull_host_responses *r, const struct lull_host_block *b, const struct lull_decision *d,
                         uint64_t spp_min)
 {
-    if (response->stopped || b->spp <= response->spp)
+    const struct lull_host_response *before = &r->last;
+    struct lull_host_response response = {.spp = b->spp, .predicted = d->predicted_spp};
+    if (before->stopped || b->spp <= before->spp)
         return;
     if (d->action == LULL_STOP && b->spp >= spp_min) {
-        double expected = response->spp > 0 && isfinite(response->predicted) ? response->predicted : (double)b->spp;
-        double stop = fmin(fmax(expected, (double)response->spp), (double)b->spp);
-        *response = (struct lull_host_response){.spp = b->spp, .predicted = fmax(stop, (double)spp_min), .stopped = 1};
-    } else {
-        *response = (struct lull_host_response){.spp = b->spp, .predicted = d->predicted_spp};
+        double expected = before->spp > 0 && isfinite(before->predicted) ? before->predicted : (double)b->spp;
+        double stop = fmin(fmax(expected, (double)before->spp), (double)b->spp);
+        response = (struct lull_host_response){.spp = b->spp, .predicted = fmax(stop, (double)spp_min), .stopped = 1};
     }
+    note(r, response);
 }
 
 /* Errors fall by half an octave for each of the samples where they are noise, slower where they are a denoiser's. */
@@ -153,7 +158,7 @@ static const double LEAST_FALL = 0.25, FALL_OF_NOISE = 0.5;
 static void note_error(struct lull_host_quote_asked *a, uint32_t index, const struct lull_host_block *b, double error,
                        uint64_t spp_min)
 {
-    struct lull_host_response *response = &a->response[index];
+    const struct lull_host_response *response = &a->responses[index].last;
     if (response->stopped || b->spp <= response->spp)
         return;
     const double spp = (double)b->spp, before = response->error, limit = a->limit * lull_host_mask_factor(b->step);
@@ -167,7 +172,8 @@ static void note_error(struct lull_host_quote_asked *a, uint32_t index, const st
     const double least = has_before ? (double)response->spp : b->checks > 1 ? 0.0 : first;
     if (stopped)
         stop = fmax(fmin(fmax(stop, least), spp), (double)spp_min);
-    *response = (struct lull_host_response){.spp = b->spp, .predicted = stop, .error = error, .stopped = stopped};
+    note(&a->responses[index],
+         (struct lull_host_response){.spp = b->spp, .predicted = stop, .error = error, .stopped = stopped});
 }
 
 static void note_errors(const struct lull_host_quote *q, const uint32_t *due, uint32_t count,
@@ -175,49 +181,36 @@ static void note_errors(const struct lull_host_quote *q, const uint32_t *due, ui
 {
     const struct lull_host_blocks *blocks = &q->frame->blocks;
     for (uint32_t i = 0; i < q->count; i++)
-        for (uint32_t k = 0; k < count && q->asked[i].limit > 0.0; k++) {
-            struct lull_host_quote_asked *a = &q->asked[i];
-            note_error(a, due[k], &blocks->list[due[k]], decisions[k].error, blocks->spp_min);
-            if (a->first[due[k]].spp == 0)
-                a->first[due[k]] = a->response[due[k]];
-        }
+        for (uint32_t k = 0; k < count && q->asked[i].limit > 0.0; k++)
+            note_error(&q->asked[i], due[k], &blocks->list[due[k]], decisions[k].error, blocks->spp_min);
 }
 
-static int32_t ask_row(const struct lull_host_quote *q, uint32_t row, const struct lull_host_view *view, const uint32_t *due,
-                       uint32_t count, struct lull_error *err)
+static int32_t ask_row(const struct lull_host_quote *q, struct lull_host_quote_asked *a, const struct lull_host_view *view,
+                       const uint32_t *due, uint32_t count, struct lull_error *err)
 {
-    struct lull_host_quote_asked *a = &q->asked[row];
     const struct lull_host_blocks *blocks = &q->frame->blocks;
     if (!a->criterion || count == 0 || (blocks->flags & LULL_HOST_UNIFORM))
         return LULL_OK;
-    struct lull_decision *decisions = calloc(count, sizeof *decisions);
-    uint8_t *final = malloc(count); /* the answers are read, and followed by no sample */
-    if (!decisions || !final) {
-        free(decisions);
-        free(final);
+    struct lull_decision *decisions = calloc(count, sizeof *decisions + 1);
+    if (!decisions)
         return no_memory(err);
-    }
-    memset(final, 1, count);
+    uint8_t *final = memset(decisions + count, 1, count); /* the answers are read, and followed by no sample */
     double start_s = base_clock_wall_s();
     int32_t code = lull_host_evaluate(a->criterion, q->frame, view, due, final, count, decisions, err);
     a->asked_s += base_clock_wall_s() - start_s;
-    a->asked += count;
-    for (uint32_t k = 0; k < count && code == LULL_OK; k++) {
-        note_answer(&a->response[due[k]], &blocks->list[due[k]], &decisions[k], blocks->spp_min);
-        if (a->first[due[k]].spp == 0)
-            a->first[due[k]] = a->response[due[k]];
-    }
-    if (code == LULL_OK && q->rows[row].asked)
+    a->count += count;
+    for (uint32_t k = 0; k < count && code == LULL_OK; k++)
+        note_answer(&a->responses[due[k]], &blocks->list[due[k]], &decisions[k], blocks->spp_min);
+    if (code == LULL_OK && a->itself)
         note_errors(q, due, count, decisions);
     free(decisions);
-    free(final);
     return code;
 }
 
 void lull_host_quote_ask(struct lull_host_quote *q, const struct lull_host_view *view, const uint32_t *due, uint32_t count)
 {
     for (uint32_t i = 0; i < q->count; i++)
-        ask_row(q, i, view, due, count, NULL);
+        ask_row(q, &q->asked[i], view, due, count, NULL);
 }
 
 /* One pixel in a hundred with more than this share of the squared difference of the halves (8 % in normal noise) … */
@@ -246,10 +239,10 @@ static double top_share(const struct lull_host_frame *f, const struct lull_view 
     return seq_tail_of(scratch, n, 0.0).top_share;
 }
 
-static int grows(const struct lull_host_response *first, const struct lull_host_response *response)
+static int grows(const struct lull_host_responses *r)
 {
-    return first->spp > 0 && response->spp > first->spp && !response->stopped &&
-           log2(response->predicted / first->predicted) > GROWTH * log2((double)response->spp / (double)first->spp);
+    return r->first.spp > 0 && r->last.spp > r->first.spp &&
+           log2(r->last.predicted / r->first.predicted) > GROWTH * log2((double)r->last.spp / (double)r->first.spp);
 }
 
 static size_t pixels_of(const struct lull_host_block *b) { return (size_t)(b->x1 - b->x0) * (size_t)(b->y1 - b->y0); }
@@ -269,8 +262,8 @@ static int32_t find_undersampled(const struct lull_host_quote *q, const struct l
     for (uint32_t i = 0; i < blocks->count && code == LULL_OK; i++) {
         int tail = top_share(q->frame, &seen, i, scratch) > MOST_TOP_SHARE;
         for (uint32_t k = 0; k < q->count; k++) {
-            struct lull_host_response *response = &q->asked[k].response[i];
-            response->undersampled = !response->stopped && (tail || grows(&q->asked[k].first[i], response));
+            struct lull_host_responses *r = &q->asked[k].responses[i];
+            r->last.undersampled = !r->last.stopped && (tail || grows(r));
         }
     }
     if (code == LULL_OK)
@@ -293,17 +286,17 @@ static void cost_blocks(const struct lull_host_blocks *blocks, struct lull_host_
     }
 }
 
-static double wall_s(const struct lull_host_quote *q, const struct lull_host_quote_asked *a,
-                     const struct lull_host_quote_row *row, int which, struct lull_host_work *work)
+static double wall_s(const struct lull_host_quote *q, const struct lull_host_quote_asked *a, int which,
+                     struct lull_host_work *work)
 {
-    const double check_s = a->other && a->asked > 0 ? a->asked_s / (double)a->asked : q->check_s;
+    const double check_s = a->other && a->count > 0 ? a->asked_s / (double)a->count : q->check_s;
     const struct lull_host_blocks *blocks = &q->frame->blocks;
     double checks = 0.0;
     for (uint32_t i = 0; i < blocks->count; i++) {
         const struct lull_host_block *b = &blocks->list[i];
-        const struct lull_host_stop_at *stop = &row->blocks[i].stop;
+        const struct lull_host_stop_at *stop = &a->blocks[i].stop;
         const double spp[3] = {stop->spp, stop->low, stop->high};
-        work[i] = (struct lull_host_work){spp[which], spp[which] * row->blocks[i].sample_s, b->y1 - b->y0};
+        work[i] = (struct lull_host_work){spp[which], spp[which] * a->blocks[i].sample_s, b->y1 - b->y0};
         checks += blocks->flags & LULL_HOST_UNIFORM ? 0.0 : (double)b->checks + lull_host_expect_checks(b, spp[which]);
     }
     return lull_host_wall_s(work, blocks->count, q->threads) + checks * check_s;
@@ -329,14 +322,14 @@ static void add_up(const struct lull_host_quote *q, const struct lull_host_quote
 {
     const struct lull_host_blocks *blocks = &q->frame->blocks;
     double pixels = 0.0;
-    *row = (struct lull_host_quote_row){.blocks = a->blocks, .asked = row->asked, .spp_min = INFINITY};
+    *row = (struct lull_host_quote_row){.blocks = a->blocks, .asked = a->itself, .spp_min = INFINITY};
     cost_blocks(blocks, a->blocks);
     for (uint32_t i = 0; i < blocks->count; i++) {
         struct lull_host_quote_block *to = &a->blocks[i];
-        const struct lull_host_stop_at stop = stop_of(blocks, &blocks->list[i], a->response[i], row->asked);
+        const struct lull_host_stop_at stop = stop_of(blocks, &blocks->list[i], a->responses[i].last, a->itself);
         const double size = (double)pixels_of(&blocks->list[i]), cost_s = to->sample_s;
-        *to = (struct lull_host_quote_block){stop,   stop.spp * cost_s,          stop.low * cost_s, stop.high * cost_s,
-                                             cost_s, a->response[i].undersampled};
+        *to = (struct lull_host_quote_block){
+            stop, stop.spp * cost_s, stop.low * cost_s, stop.high * cost_s, cost_s, a->responses[i].last.undersampled};
         row->thread_s += to->thread_s;
         row->thread_low_s += to->thread_low_s;
         row->thread_high_s += to->thread_high_s;
@@ -354,9 +347,9 @@ static void add_up(const struct lull_host_quote *q, const struct lull_host_quote
     row->spp_mean_low /= pixels;
     row->spp_mean_high /= pixels;
     row->against_uniform = row->spp_mean / row->spp_max;
-    row->wall_s = wall_s(q, a, row, 0, work);
-    row->wall_low_s = wall_s(q, a, row, 1, work);
-    row->wall_high_s = wall_s(q, a, row, 2, work);
+    row->wall_s = wall_s(q, a, 0, work);
+    row->wall_low_s = wall_s(q, a, 1, work);
+    row->wall_high_s = wall_s(q, a, 2, work);
 }
 
 int32_t lull_host_quote_finish(struct lull_host_quote *q, const struct lull_host_view *view,
@@ -369,12 +362,14 @@ int32_t lull_host_quote_finish(struct lull_host_quote *q, const struct lull_host
     const struct lull_host_blocks *blocks = &q->frame->blocks;
     struct lull_host_work *work = calloc(blocks->count, sizeof *work);
     uint32_t *due = calloc(blocks->count, sizeof *due), n = 0;
-    code = work && due ? LULL_OK : no_memory(err);
+    free(q->rows);
+    q->rows = calloc(q->count + 1, sizeof *q->rows);
+    code = work && due && q->rows ? LULL_OK : no_memory(err);
     for (uint32_t i = 0; i < blocks->count && code == LULL_OK; i++)
         if (blocks->list[i].spp > 0)
             due[n++] = i;
     for (uint32_t i = 0; i < q->count && code == LULL_OK; i++)
-        code = ask_row(q, i, view, due, n, err);
+        code = ask_row(q, &q->asked[i], view, due, n, err);
     if (code == LULL_OK)
         code = find_undersampled(q, view, err);
     q->check_s = totals->checks > 0 ? totals->criterion_s / (double)totals->checks : 0.0;
@@ -385,4 +380,37 @@ int32_t lull_host_quote_finish(struct lull_host_quote *q, const struct lull_host
     *rows = q->rows;
     *count = q->count;
     return code;
+}
+
+/* Frames of a shot between two quotes: what their blocks need by what the two say. */
+static const double FADE = 0.8408964152537145; /* 2^(-1/4) */
+
+/* A block moves when what it needs has changed by more than the quotes may be wrong. */
+static int has_moved(const struct lull_host_stop_at *a, const struct lull_host_stop_at *b)
+{
+    return a->low > b->high || b->low > a->high;
+}
+
+uint32_t lull_host_quote_between(const struct lull_host_quote_block *a, const struct lull_host_quote_block *b,
+                                 uint32_t count, uint32_t columns, uint32_t block)
+{
+    const long width = (long)columns, height = (long)count / width, x = (long)block % width, y = (long)block / width;
+    const double own = fmax(1.0, fmax(a[block].stop.spp, b[block].stop.spp));
+    double most = own;
+    for (long v = y > 0 ? y - 1 : 0; v <= y + 1 && v < height; v++)
+        for (long u = x > 0 ? x - 1 : 0; u <= x + 1 && u < width; u++) {
+            const struct lull_host_stop_at *before = &a[v * width + u].stop, *after = &b[v * width + u].stop;
+            if (has_moved(before, after))
+                most = fmax(most, fmax(before->spp, after->spp));
+        }
+    return (uint32_t)ceil(sqrt(own * most));
+}
+
+void lull_host_quote_fade(uint32_t *spp, const uint32_t *beside, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        const uint32_t least = (uint32_t)ceil(FADE * beside[i]);
+        if (spp[i] < least)
+            spp[i] = least;
+    }
 }

@@ -180,11 +180,11 @@ static void what_was_asked_has_a_row(void **state)
     struct run run;
     start(&run, "0.1", 64);
     assert_int_equal(run.quote->row_count, 4);
-    assert_true(run.quote->settings[2].value == 0.1 && run.quote->quote->rows[2].asked &&
+    assert_true(run.quote->settings[2].value == 0.1 && run.quote->quote->asked[2].itself &&
                 run.quote->settings[3].value == 0.05);
     end(&run);
     start(&run, "0.01", 64);
-    assert_true(run.quote->row_count == 4 && run.quote->settings[3].value == 0.01 && run.quote->quote->rows[3].asked);
+    assert_true(run.quote->row_count == 4 && run.quote->settings[3].value == 0.01 && run.quote->quote->asked[3].itself);
     end(&run);
 }
 
@@ -387,15 +387,13 @@ static char *quote_of(struct approve_case *c)
     if (strstr(c->text, "unasked"))
         r->blocks->list[3].spp = r->blocks->list[3].half_spp = r->blocks->list[3].asked = 0;
     for (uint32_t i = 0; i < run.quote->row_count && strstr(c->text, "unsaid"); i++)
-        run.quote->quote->asked[i].response[2] =
+        run.quote->quote->asked[i].responses[2].last =
             (struct lull_host_response){.spp = r->blocks->list[2].spp, .predicted = (double)NAN};
     r->totals->criterion_s = 0.25 * (double)r->totals->checks;
     assert_int_equal(pt_quote_finish(run.quote, r, &err), 0);
     fprintf(out, "a check takes %.9g\n", run.quote->quote->check_s);
     for (uint32_t i = 0; i < run.quote->row_count; i++) {
         const struct lull_host_quote_row *row = &run.quote->rows[i];
-        const struct lull_host_response *response = run.quote->quote->asked[i].response,
-                                        *first = run.quote->quote->asked[i].first;
         fprintf(
             out,
             "row %g asked %d spp %.9g %.9g %.9g from %.9g to %.9g thread %.9g %.9g %.9g wall %.9g %.9g %.9g of uniform %.9g",
@@ -405,11 +403,12 @@ static char *quote_of(struct approve_case *c)
         fprintf(out, " unknown %u unmet %u capped %u\n", row->unknown, row->unmet, row->capped);
         for (uint32_t k = 0; k < run.render->blocks->count; k++) {
             const struct lull_host_quote_block *b = &row->blocks[k];
+            const struct lull_host_response *response = &run.quote->quote->asked[i].responses[k].last,
+                                            *first = &run.quote->quote->asked[i].responses[k].first;
             fprintf(out, "  block %u said %llu %.9g%s%s first %llu %.9g stop %.9g %.9g %.9g %d thread %.9g %.9g %.9g\n", k,
-                    (unsigned long long)response[k].spp, response[k].predicted, response[k].stopped ? " stopped" : "",
-                    response[k].undersampled ? " unmet" : "", (unsigned long long)first[k].spp, first[k].predicted,
-                    b->stop.spp, b->stop.low, b->stop.high, (int)b->stop.known, b->thread_s, b->thread_low_s,
-                    b->thread_high_s);
+                    (unsigned long long)response->spp, response->predicted, response->stopped ? " stopped" : "",
+                    response->undersampled ? " unmet" : "", (unsigned long long)first->spp, first->predicted, b->stop.spp,
+                    b->stop.low, b->stop.high, (int)b->stop.known, b->thread_s, b->thread_low_s, b->thread_high_s);
         }
     }
     end(&run);
