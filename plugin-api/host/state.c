@@ -1,5 +1,6 @@
 #include "host/frame.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -102,84 +103,60 @@ int32_t lull_host_load_history(struct lull_host_criterion *c, const void *data, 
     return LULL_OK;
 }
 
-/* Remembers the first failure. */
-struct sink {
-    const struct lull_writer *writer;
+/* A state on its way, out or in. After the first failure nothing more passes. */
+struct passage {
+    const struct lull_writer *to; /* NULL: it is read */
+    struct const_bytes from;
+    const char *name; /* of the file that is read */
+    struct lull_error *err;
     int32_t code;
 };
 
-static void put(struct sink *s, const void *data, size_t size)
+static void refuse(struct passage *s, const char *why)
 {
-    if (s->code == LULL_OK && size > 0)
-        s->code = s->writer->write(s->writer, data, size);
+    if (s->code == LULL_OK)
+        s->code = lull_error_set(s->err, LULL_E_IO, "%s: %s", s->name, why);
 }
 
-static void put_count(struct sink *s, uint64_t n) { put(s, &n, sizeof n); }
-
-static void put_frame(struct sink *s, const struct lull_host_frame *f, const struct bytes *history)
+static void refuse_block(struct passage *s, const struct lull_host_block *b)
 {
-    put_count(s, f->blocks.count);
-    for (uint32_t i = 0; i < f->blocks.count; i++) {
-        const struct lull_host_block *b = &f->blocks.list[i];
+    char why[64];
+    snprintf(why, sizeof why, "block %u of the checkpoint makes no sense", b->id);
+    refuse(s, why);
+}
+
+static void pass(struct passage *s, void *data, size_t size)
+{
+    struct lull_reader reader = {.struct_size = sizeof reader, .context = &s->from};
+    if (s->code != LULL_OK || size == 0)
+        return;
+    if (!s->to && read_bytes(&reader, data, size) != LULL_OK)
+        refuse(s, "the checkpoint is too short");
+    if (s->to && (s->code = s->to->write(s->to, data, size)) != LULL_OK)
+        lull_error_set(s->err, s->code, "the state could not be written");
+}
+
+static uint64_t pass_count(struct passage *s, uint64_t n)
+{
+    pass(s, &n, sizeof n);
+    return n;
+}
+
+static void pass_blocks(struct passage *s, const struct lull_host_blocks *blocks)
+{
+    if (pass_count(s, blocks->count) != blocks->count)
+        refuse(s, "the checkpoint has another number of blocks");
+    for (uint32_t i = 0; i < blocks->count && s->code == LULL_OK; i++) {
+        struct lull_host_block *b = &blocks->list[i];
         struct block_record record = {b->spp,     b->next_spp,   b->asked_spp,     b->rays,     b->dropped,
                                       b->p_noisy, b->error,      b->predicted_spp, b->thread_s, b->reason,
                                       b->checks,  b->stop_votes, b->asked};
-        put(s, &record, sizeof record);
-    }
-    put(s, &f->totals, sizeof(struct totals_record));
-    put_count(s, f->dropped_count);
-    put(s, f->dropped, sizeof f->dropped);
-    put_count(s, history->used);
-    put(s, history->data, history->used);
-    for (uint32_t i = 0; i < f->blocks.count && !(f->config.flags & LULL_HOST_HALF_KNOWN); i++)
-        put_count(s, f->blocks.list[i].half_spp);
-}
-
-int32_t lull_host_save(const struct lull_host_frame *f, const struct lull_writer *writer, struct lull_error *err)
-{
-    struct bytes history = {0};
-    struct lull_writer keep = {.struct_size = sizeof keep, .context = &history, .write = write_bytes};
-    struct sink s = {.writer = writer};
-    int32_t code = lull_host_given(err, "frame", f, "writer", writer, "write", writer ? writer->write : NULL, NULL);
-    if (code != LULL_OK)
-        return code;
-    code = f->criterion ? lull_host_save_history(f->criterion, &keep, err) : LULL_OK;
-    if (code == LULL_OK) {
-        put_frame(&s, f, &history);
-        code = s.code == LULL_OK ? LULL_OK : lull_error_set(err, s.code, "the state could not be written");
-    }
-    free(history.data);
-    return code;
-}
-
-struct source {
-    const char *name;
-    struct const_bytes bytes;
-    struct lull_error *err;
-};
-
-static int32_t take(struct source *s, void *data, size_t size)
-{
-    struct lull_reader reader = {.struct_size = sizeof reader, .context = &s->bytes};
-    return read_bytes(&reader, data, size) == LULL_OK
-               ? LULL_OK
-               : lull_error_set(s->err, LULL_E_IO, "%s: the checkpoint is too short", s->name);
-}
-
-static int32_t take_blocks(struct source *s, const struct lull_host_blocks *blocks, struct lull_host_block *list)
-{
-    uint64_t count = 0;
-    int32_t code = take(s, &count, sizeof count);
-    if (code == LULL_OK && count != blocks->count)
-        code = lull_error_set(s->err, LULL_E_IO, "%s: the checkpoint has another number of blocks", s->name);
-    for (uint32_t i = 0; i < blocks->count && code == LULL_OK; i++) {
-        struct block_record record = {0};
-        struct lull_host_block *b = &list[i];
-        if ((code = take(s, &record, sizeof record)) != LULL_OK)
-            break;
+        pass(s, &record, sizeof record);
+        if (s->to)
+            continue;
         if (record.spp > LULL_HOST_MOST_SPP || record.next_spp > LULL_HOST_MOST_SPP || record.reason < 0 ||
             record.reason >= LULL_REASON_COUNT)
-            return lull_error_set(s->err, LULL_E_IO, "%s: block %u of the checkpoint makes no sense", s->name, b->id);
+            refuse_block(s, b);
         b->spp = record.spp;
         b->next_spp = record.next_spp;
         b->asked_spp = record.asked_spp;
@@ -194,70 +171,74 @@ static int32_t take_blocks(struct source *s, const struct lull_host_blocks *bloc
         b->stop_votes = record.stop_votes;
         b->asked = record.asked;
     }
-    return code;
 }
 
-/* What a state holds beside its blocks. */
-struct parts {
-    struct totals_record totals;
-    uint64_t dropped_count, history_size;
-    struct lull_host_sample dropped[LULL_HOST_DROPPED_KEPT];
-    const unsigned char *history;
-};
-
-static int32_t take_parts(struct source *s, const struct lull_host_frame *f, struct lull_host_block *list, struct parts *p)
+/* history: the criterion's bytes; of a state that is read, where they stand in it. */
+static void pass_frame(struct passage *s, struct lull_host_frame *f, struct const_bytes *history)
 {
-    uint64_t halves = f->config.flags & LULL_HOST_HALF_KNOWN ? 0 : f->blocks.count;
-    int32_t code = take(s, &p->totals, sizeof p->totals);
-    if (code == LULL_OK)
-        code = take(s, &p->dropped_count, sizeof p->dropped_count);
-    if (code == LULL_OK && p->dropped_count > LULL_HOST_DROPPED_KEPT)
-        code = lull_error_set(s->err, LULL_E_IO, "%s: the checkpoint makes no sense", s->name);
-    if (code == LULL_OK)
-        code = take(s, p->dropped, sizeof p->dropped);
-    if (code == LULL_OK)
-        code = take(s, &p->history_size, sizeof p->history_size);
+    const uint32_t halves = f->config.flags & LULL_HOST_HALF_KNOWN ? 0 : f->blocks.count;
+    pass_blocks(s, &f->blocks);
+    pass(s, &f->totals, sizeof(struct totals_record));
+    const uint64_t dropped_count = pass_count(s, f->dropped_count);
+    if (dropped_count > LULL_HOST_DROPPED_KEPT)
+        refuse(s, "the checkpoint makes no sense");
+    f->dropped_count = (uint32_t)dropped_count;
+    pass(s, f->dropped, sizeof f->dropped);
+    const uint64_t size = pass_count(s, history->size), left = s->from.size - s->from.at;
+    if (s->to)
+        pass(s, (void *)(uintptr_t)history->data, history->size);
+    else if (size > left || left - size != halves * sizeof(uint64_t) || (!f->criterion && size > 0))
+        refuse(s, "the checkpoint has a wrong length");
+    else {
+        *history = (struct const_bytes){.data = s->from.data + s->from.at, .size = (size_t)size};
+        s->from.at += (size_t)size;
+    }
+    for (uint32_t i = 0; i < halves && s->code == LULL_OK; i++) {
+        struct lull_host_block *b = &f->blocks.list[i];
+        pass(s, &b->half_spp, sizeof b->half_spp);
+        if (!s->to && b->half_spp > b->spp)
+            refuse_block(s, b);
+    }
+}
+
+int32_t lull_host_save(const struct lull_host_frame *f, const struct lull_writer *writer, struct lull_error *err)
+{
+    struct bytes history = {0};
+    struct lull_writer keep = {.struct_size = sizeof keep, .context = &history, .write = write_bytes};
+    struct passage s = {.to = writer, .err = err};
+    int32_t code = lull_host_given(err, "frame", f, "writer", writer, "write", writer ? writer->write : NULL, NULL);
     if (code != LULL_OK)
         return code;
-    size_t left = s->bytes.size - s->bytes.at;
-    if (p->history_size > left || left - p->history_size != halves * sizeof(uint64_t) ||
-        (!f->criterion && p->history_size > 0))
-        return lull_error_set(s->err, LULL_E_IO, "%s: the checkpoint has a wrong length", s->name);
-    p->history = s->bytes.data + s->bytes.at;
-    s->bytes.at += (size_t)p->history_size;
-    for (uint64_t i = 0; i < halves && code == LULL_OK; i++) {
-        code = take(s, &list[i].half_spp, sizeof list[i].half_spp);
-        if (code == LULL_OK && list[i].half_spp > list[i].spp)
-            code = lull_error_set(s->err, LULL_E_IO, "%s: block %u of the checkpoint makes no sense", s->name, list[i].id);
-    }
-    return code;
+    struct lull_host_frame saved = *f;
+    s.code = f->criterion ? lull_host_save_history(f->criterion, &keep, err) : LULL_OK;
+    pass_frame(&s, &saved, &(struct const_bytes){.data = history.data, .size = history.used});
+    free(history.data);
+    return s.code;
 }
 
-static int32_t load(struct lull_host_frame *f, const void *data, uint64_t size, const char *name, int history,
+static int32_t load(struct lull_host_frame *f, const void *data, uint64_t size, const char *name, int with_history,
                     struct lull_error *err)
 {
-    struct source s = {.name = name, .bytes = {.data = data, .size = (size_t)size}, .err = err};
-    struct parts p = {0};
+    struct passage s = {.from = {.data = data, .size = (size_t)size}, .name = name, .err = err};
+    struct const_bytes history = {0};
     int32_t code = lull_host_given(err, "frame", f, "name", name, "data", size > 0 ? data : name, NULL);
     if (code != LULL_OK)
         return code;
-    struct lull_host_block *list = malloc(f->blocks.count * sizeof *list);
+    struct lull_host_frame loaded = *f;
+    const size_t list_size = f->blocks.count * sizeof *f->blocks.list;
+    struct lull_host_block *list = malloc(list_size);
     if (!list)
         return lull_host_no_memory(err, name);
-    memcpy(list, f->blocks.list, f->blocks.count * sizeof *list);
-    code = take_blocks(&s, &f->blocks, list);
-    if (code == LULL_OK)
-        code = take_parts(&s, f, list, &p);
-    if (code == LULL_OK && f->criterion && history)
-        code = lull_host_load_history(f->criterion, p.history, p.history_size, err);
-    if (code == LULL_OK) {
-        memcpy(f->blocks.list, list, f->blocks.count * sizeof *list);
-        memcpy(&f->totals, &p.totals, sizeof p.totals);
-        memcpy(f->dropped, p.dropped, sizeof p.dropped);
-        f->dropped_count = (uint32_t)p.dropped_count;
+    loaded.blocks.list = memcpy(list, f->blocks.list, list_size);
+    pass_frame(&s, &loaded, &history);
+    if (s.code == LULL_OK && f->criterion && with_history)
+        s.code = lull_host_load_history(f->criterion, history.data, history.size, err);
+    if (s.code == LULL_OK) {
+        loaded.blocks.list = memcpy(f->blocks.list, list, list_size); /* it stays where it is */
+        *f = loaded;
     }
     free(list);
-    return code;
+    return s.code;
 }
 
 int32_t lull_host_load(struct lull_host_frame *f, const void *data, uint64_t size, const char *name, struct lull_error *err)
