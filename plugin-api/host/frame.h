@@ -134,6 +134,9 @@ void lull_host_withdraw(struct lull_host_criterion *criterion);
 /* A line to the renderer's log, of LULL_LOG_INFO once a frame, and, of this or worse, for the report; the first warning
  * without a log is kept for lull_host_pass_warning. */
 void lull_host_say(struct lull_host_criterion *criterion, int32_t level, const char *text);
+/* "criterion ID: ", `what` and its message as one line; returns its code. */
+int32_t lull_host_blame(const struct lull_host_criterion *criterion, const char *what, int32_t code,
+                        const struct lull_error *why, struct lull_error *err);
 /* Passes a warning that was logged nowhere to err, once, with the code LULL_OK; returns LULL_OK. */
 int32_t lull_host_pass_warning(struct lull_host_criterion *criterion, struct lull_error *err);
 
@@ -145,6 +148,9 @@ void lull_host_leave(struct lull_host_criterion *criterion, const struct lull_pr
 
 /* Pairs of a name and a pointer, NULL at the end: LULL_E_INVALID names the first pointer that is NULL. */
 __attribute__((sentinel)) int32_t lull_host_given(struct lull_error *err, ...);
+/* A failure of plugin-api/base in the words of the ABI. */
+int32_t lull_host_translate(const struct base_err *why, struct lull_error *err);
+int32_t lull_host_no_memory(struct lull_error *err, const char *what);
 int32_t lull_host_check_pairs(const struct lull_pair *pairs, uint32_t count, struct lull_error *err);
 int32_t lull_host_check_services(const struct lull_host_services *services, struct lull_error *err);
 /* All of it but size, blocks and mask. */
@@ -242,16 +248,5 @@ struct cJSON;
  * memory. */
 struct cJSON *lull_host_report_block(struct cJSON *list, const struct lull_host_block *b, const double *noisy_error,
                                      int *failed);
-
-/* --- failure.c ------------------------------------------------------------------------------------------------------ */
-
-/* Copies a text of a criterion as one line. */
-void lull_host_line(char *to, size_t room, const char *text);
-/* "criterion ID: ", `what` and its message; returns its code. */
-int32_t lull_host_blame(const struct lull_host_criterion *criterion, const char *what, int32_t code,
-                        const struct lull_error *why, struct lull_error *err);
-/* A failure of plugin-api/base in the words of the ABI. */
-int32_t lull_host_translate(const struct base_err *why, struct lull_error *err);
-int32_t lull_host_no_memory(struct lull_error *err, const char *what);
 
 #endif

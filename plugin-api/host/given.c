@@ -1,4 +1,5 @@
-/* What a renderer hands in, before anything is done with it: a number or a pointer that makes no sense is named. */
+/* What a renderer hands in, before anything is done with it: a number or a pointer that makes no sense is named.
+ * Beside it how any call of the library fails. */
 #include "host/frame.h"
 
 #include <lull/criterion_kit.h>
@@ -18,6 +19,17 @@ int32_t lull_host_given(struct lull_error *err, ...)
         missing = va_arg(args, const void *) ? NULL : name;
     va_end(args);
     return missing ? lull_error_set(err, LULL_E_INVALID, "%s is NULL", missing) : LULL_OK;
+}
+
+int32_t lull_host_translate(const struct base_err *why, struct lull_error *err)
+{
+    int32_t code = why->code == BASE_ENOMEM ? LULL_E_MEMORY : why->code == BASE_EIO ? LULL_E_IO : LULL_E_INVALID;
+    return lull_error_set(err, code, "%s", why->text);
+}
+
+int32_t lull_host_no_memory(struct lull_error *err, const char *what)
+{
+    return lull_error_set(err, LULL_E_MEMORY, "out of memory (%s)", what);
 }
 
 int32_t lull_host_check_pairs(const struct lull_pair *pairs, uint32_t count, struct lull_error *err)

@@ -2,9 +2,28 @@
  * does not, that is put back. */
 #include "host/frame.h"
 
+#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* Copies a text of a criterion as one line. */
+static void copy_line(char *to, size_t room, const char *text)
+{
+    snprintf(to, room, "%s", text);
+    for (char *at = to; *at; at++)
+        *at = iscntrl((unsigned char)*at) ? ' ' : *at;
+}
+
+int32_t lull_host_blame(const struct lull_host_criterion *c, const char *what, int32_t code, const struct lull_error *why,
+                        struct lull_error *err)
+{
+    char whole[sizeof why->message + 1], text[sizeof whole];
+    memcpy(whole, why->message, sizeof why->message);
+    whole[sizeof why->message] = '\0'; /* it may have forgotten that */
+    copy_line(text, sizeof text, whole);
+    return lull_error_set(err, code < LULL_OK ? code : LULL_E_INTERNAL, "criterion %s: %s%s", c->table->id, what, text);
+}
 
 /* Whether it is new. */
 static int keep_message(struct lull_host_criterion *c, const char *line)
@@ -25,7 +44,7 @@ void lull_host_say(struct lull_host_criterion *c, int32_t level, const char *tex
     int none = LULL_WARNING_NONE;
     char line[LULL_HOST_LINE];
     snprintf(line, sizeof line, "criterion %s: ", c->table->id);
-    lull_host_line(line + strlen(line), sizeof line - strlen(line), text ? text : "");
+    copy_line(line + strlen(line), sizeof line - strlen(line), text ? text : "");
     if (level <= LULL_LOG_INFO && !keep_message(c, line) && level == LULL_LOG_INFO)
         return; /* some say it at each check */
     if (c->offered.log)
