@@ -115,13 +115,12 @@ int32_t lull_host_evaluate(struct lull_host_criterion *c, const struct lull_host
     code = check_announced(f->config.planes & ~c->needs.planes_required, shown.planes, err);
     for (uint32_t i = 0; i < b->count; i++)
         c->all[i] = lull_host_state_of(&b->list[i], i, shown.planes[LULL_PLANE_HALF].data != NULL);
-    struct lull_view seen = lull_host_seen(view, &shown);
-    seen.all = c->all;
-    seen.all_count = b->count;
-    seen.all_stride = sizeof c->all[0];
-    seen.elapsed_s = base_clock_wall_s() - c->begin_s;
+    shown.view.all = c->all;
+    shown.view.all_count = b->count;
+    shown.view.all_stride = sizeof c->all[0];
+    shown.view.elapsed_s = base_clock_wall_s() - c->begin_s;
     for (uint32_t s = 0; s <= LULL_HOST_STEPS && code == LULL_OK; s++)
-        code = evaluate_step(c, s, &seen, &q, err);
+        code = evaluate_step(c, s, &shown.view, &q, err);
     for (uint32_t k = 0; k < count && code != LULL_OK; k++)
         decisions[k] = lull_host_undecided();
     lull_host_hide(&shown);

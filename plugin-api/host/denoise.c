@@ -26,24 +26,6 @@ struct picture {
 
 static int is_full(const struct picture *p) { return (p->how->flags & LULL_DENOISE_FULL) != 0; }
 
-static int32_t open_pair(struct picture *p, int32_t height, struct lull_error *err)
-{
-    const struct lull_host_denoising *how = p->how;
-    struct base_err why = {0};
-    const struct lull_oidn_form form = {.width = p->width,
-                                        .height = height,
-                                        .albedo = p->albedo,
-                                        .normal = p->normal,
-                                        .quality = LULL_OIDN_HIGH,
-                                        .threads = (int32_t)how->threads,
-                                        .margin = LULL_OIDN_MARGIN,
-                                        .exposure = (float)p->exposure};
-    int rc = lull_denoised_open(&p->pair, how->library, &form, &why);
-    if (!rc)
-        rc = lull_denoised_part_open(&p->part, p->pair.pixels, &p->pair, &why);
-    return rc ? lull_host_translate(&why, err) : LULL_OK;
-}
-
 /* What a pass over the pixels does with one run of them; at: index of its first pixel. */
 typedef void visit(struct picture *p, const struct lull_kit_span *span, size_t at);
 
@@ -166,9 +148,18 @@ static void black_out(const struct picture *p, float *rgb)
 static int32_t make(struct picture *p, int32_t height, const struct lull_host_picture *out, struct lull_error *err)
 {
     const struct lull_denoised_part *part = &p->part;
-    int32_t code = open_pair(p, height, err);
-    if (code != LULL_OK)
-        return code;
+    const struct lull_oidn_form form = {.width = p->width,
+                                        .height = height,
+                                        .albedo = p->albedo,
+                                        .normal = p->normal,
+                                        .quality = LULL_OIDN_HIGH,
+                                        .threads = (int32_t)p->how->threads,
+                                        .margin = LULL_OIDN_MARGIN,
+                                        .exposure = (float)p->exposure};
+    struct base_err why = {0};
+    if (lull_denoised_open(&p->pair, p->how->library, &form, &why) ||
+        lull_denoised_part_open(&p->part, p->pair.pixels, &p->pair, &why))
+        return lull_host_translate(&why, err);
     p->mean = calloc(3 * part->pixels, sizeof *p->mean);
     if (!p->mean)
         return lull_host_no_memory(err, "the denoised picture");
@@ -177,7 +168,7 @@ static int32_t make(struct picture *p, int32_t height, const struct lull_host_pi
               LULL_PLANE_BIT(LULL_PLANE_COLOR) | LULL_PLANE_BIT(LULL_PLANE_HALF) | LULL_PLANE_BIT(LULL_PLANE_ALBEDO) |
                   LULL_PLANE_BIT(LULL_PLANE_NORMAL),
               read_pictures);
-    code = is_full(p) ? denoise_mean(p, denoised, err) : denoise_halves(p, denoised, err);
+    const int32_t code = is_full(p) ? denoise_mean(p, denoised, err) : denoise_halves(p, denoised, err);
     if (code != LULL_OK)
         return code;
     black_out(p, denoised);
@@ -201,7 +192,7 @@ int32_t lull_host_denoise(const struct lull_host_frame *frame, const struct lull
         return code;
     struct picture p = {.frame = frame,
                         .how = how,
-                        .view = lull_host_seen(view, &s),
+                        .view = s.view,
                         .width = view->x1 - view->x0,
                         .exposure = frame->config.exposure,
                         .luminance = frame->config.rgb_to_xyz + 3,

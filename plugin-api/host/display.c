@@ -138,7 +138,6 @@ static int32_t copy(struct lull_host_display *d, const struct lull_host_view *v,
     int32_t code = lull_host_show(d->blocks, v, 0, &shown, err);
     if (code != LULL_OK)
         return code;
-    const struct lull_view view = lull_host_seen(v, &shown);
     if (!shown.planes[LULL_PLANE_COLOR].data)
         code = lull_error_set(err, LULL_E_INVALID, "a live view needs the plane COLOR");
     for (uint32_t i = 0; i < d->blocks->count && code == LULL_OK; i++) {
@@ -149,7 +148,7 @@ static int32_t copy(struct lull_host_display *d, const struct lull_host_view *v,
         d->seen[i] = *b;
         d->marks_are_new = 1;
         if (b->spp > 0) {
-            copy_pixels(d, &view, &state);
+            copy_pixels(d, &shown.view, &state);
             d->new_count += !d->is_new[i];
             d->is_new[i] = 1;
         }

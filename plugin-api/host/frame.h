@@ -183,6 +183,7 @@ int32_t lull_host_scale_quality(const struct lull_criterion *table, const struct
 
 /* A renderer's view as a criterion gets it. */
 struct lull_host_shown {
+    struct lull_view view; /* of the planes here */
     struct lull_plane planes[LULL_PLANE_COUNT];
     uint32_t *spp;    /* owns, as the others; samples of each pixel, NULL: the view has them, or nobody wants them */
     uint32_t *weight; /* samples of each pixel that are in COLOR, NULL: none was dropped */
@@ -192,8 +193,6 @@ struct lull_host_shown {
 int32_t lull_host_show(const struct lull_host_blocks *blocks, const struct lull_host_view *view, int counts,
                        struct lull_host_shown *out, struct lull_error *err);
 void lull_host_hide(struct lull_host_shown *shown);
-/* The planes for lull_kit_span. */
-struct lull_view lull_host_seen(const struct lull_host_view *view, const struct lull_host_shown *shown);
 
 /* --- ask.c ---------------------------------------------------------------------------------------------------------- */
 

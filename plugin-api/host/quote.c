@@ -258,9 +258,8 @@ static int32_t find_undersampled(const struct lull_host_quote *q, const struct l
     if (!scratch)
         return no_memory(err);
     int32_t code = lull_host_show(blocks, view, 0, &shown, err);
-    const struct lull_view seen = lull_host_seen(view, &shown);
     for (uint32_t i = 0; i < blocks->count && code == LULL_OK; i++) {
-        int tail = top_share(q->frame, &seen, i, scratch) > MOST_TOP_SHARE;
+        int tail = top_share(q->frame, &shown.view, i, scratch) > MOST_TOP_SHARE;
         for (uint32_t k = 0; k < q->count; k++) {
             struct lull_host_responses *r = &q->asked[k].responses[i];
             r->last.undersampled = !r->last.stopped && (tail || grows(r));

@@ -103,6 +103,14 @@ int32_t lull_host_show(const struct lull_host_blocks *b, const struct lull_host_
         fill(&s, v, &b->list[i]);
     place(&s, v);
     *out = s;
+    out->view = (struct lull_view){.struct_size = sizeof out->view,
+                                   .x0 = v->x0,
+                                   .y0 = v->y0,
+                                   .x1 = v->x1,
+                                   .y1 = v->y1,
+                                   .planes = out->planes,
+                                   .plane_count = LULL_PLANE_COUNT,
+                                   .plane_stride = sizeof out->planes[0]};
     return LULL_OK;
 }
 
@@ -111,16 +119,4 @@ void lull_host_hide(struct lull_host_shown *s)
     free(s->spp);
     free(s->weight);
     free(s->half);
-}
-
-struct lull_view lull_host_seen(const struct lull_host_view *v, const struct lull_host_shown *s)
-{
-    return (struct lull_view){.struct_size = sizeof(struct lull_view),
-                              .x0 = v->x0,
-                              .y0 = v->y0,
-                              .x1 = v->x1,
-                              .y1 = v->y1,
-                              .planes = s->planes,
-                              .plane_count = LULL_PLANE_COUNT,
-                              .plane_stride = sizeof s->planes[0]};
 }
