@@ -41,28 +41,13 @@ static int is_size(const double size[2])
            size[1] == floor(size[1]);
 }
 
-/* Takes report and quote over. Text that may stand in a script element, the caller's; NULL: no memory. */
-static char *make_data(cJSON *report, cJSON *quote)
-{
-    int failed = 0;
-    cJSON *root = cJSON_CreateObject();
-    base_json_item(root, "report", report, &failed);
-    base_json_item(root, "quote", quote, &failed);
-    char *text = failed ? NULL : cJSON_PrintUnformatted(root);
-    if (text && strlen(text) > HISTORY_LIMIT && cJSON_HasObjectItem(report, "history")) {
-        cJSON_free(text);
-        cJSON_DeleteItemFromObject(report, "history");
-        text = cJSON_PrintUnformatted(root);
-    }
-    cJSON_Delete(root);
-    return text;
-}
-
-static int32_t parse(const char *report, const char *quote, uint32_t layer_count, const double size[2], char **data,
-                     struct lull_error *err)
+/* Report and quote as text that may stand in a script element; the caller frees *data with cJSON_free. */
+static int32_t make_data(const char *report, const char *quote, uint32_t layer_count, const double size[2], char **data,
+                         struct lull_error *err)
 {
     double wanted[2] = {0.0, 0.0};
-    cJSON *r = cJSON_Parse(report), *q = quote ? cJSON_Parse(quote) : cJSON_CreateNull();
+    int failed = 0;
+    cJSON *root = cJSON_CreateObject(), *r = cJSON_Parse(report), *q = quote ? cJSON_Parse(quote) : cJSON_CreateNull();
     int32_t code = LULL_OK;
     if (!find_size(r, wanted))
         code = lull_error_set(err, LULL_E_INVALID, "no report (expected what lull-render --report writes)");
@@ -74,13 +59,17 @@ static int32_t parse(const char *report, const char *quote, uint32_t layer_count
     else if (layer_count > 0 && (size[0] != wanted[0] || size[1] != wanted[1]))
         code = lull_error_set(err, LULL_E_INVALID, "the picture has %.0fx%.0f pixels, the report is of %.0fx%.0f", size[0],
                               size[1], wanted[0], wanted[1]);
-    if (code != LULL_OK) {
-        cJSON_Delete(r);
-        cJSON_Delete(q);
-        return code;
+    base_json_item(root, "report", r, &failed);
+    base_json_item(root, "quote", q, &failed);
+    char *text = failed || code != LULL_OK ? NULL : cJSON_PrintUnformatted(root);
+    if (text && strlen(text) > HISTORY_LIMIT && cJSON_HasObjectItem(r, "history")) {
+        cJSON_free(text);
+        cJSON_DeleteItemFromObject(r, "history");
+        text = cJSON_PrintUnformatted(root);
     }
-    *data = make_data(r, q);
-    return *data ? LULL_OK : lull_host_no_memory(err, "the page");
+    cJSON_Delete(root);
+    *data = text;
+    return text || code != LULL_OK ? code : lull_host_no_memory(err, "the page");
 }
 
 static void put_base64(FILE *file, const uint8_t *bytes, size_t size)
@@ -159,7 +148,7 @@ int32_t lull_host_page(const char *report, const char *quote, const struct lull_
     for (uint32_t i = 0; i < layer_count && code == LULL_OK; i++)
         code = lull_host_given(err, "the name of a layer", layers[i].name, "rgb of a layer", layers[i].rgb, NULL);
     if (code == LULL_OK)
-        code = parse(report, quote, layer_count, size, &data, err);
+        code = make_data(report, quote, layer_count, size, &data, err);
     if (code != LULL_OK)
         return code;
     if (base_file_begin(&out, path, &e) != 0)
