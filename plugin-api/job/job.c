@@ -16,21 +16,15 @@ static const double LOOK_S = 0.05; /* longest wait between two looks whether eve
 
 static const char MODULE[] = "lull-mpi.so";
 
-/* What launchers leave in the environment: Open MPI, any with PMIx, MPICH and Slurm. */
+/* Whether a launcher has started this process and others, by what Open MPI, any with PMIx, MPICH and Slurm leave in the
+ * environment. */
 static int was_launched(void)
-{
-    static const char *const marks[] = {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"};
-    for (size_t i = 0; i < sizeof marks / sizeof marks[0]; i++)
-        if (getenv(marks[i]))
-            return 1;
-    return 0;
-}
-
-static int launched_alone(void)
 {
     const char *count = getenv("OMPI_COMM_WORLD_SIZE");
     count = count ? count : getenv("PMI_SIZE");
-    return count && strcmp(count, "1") == 0;
+    if (count && strcmp(count, "1") == 0)
+        return 0;
+    return getenv("OMPI_COMM_WORLD_RANK") || getenv("PMIX_RANK") || getenv("PMI_RANK");
 }
 
 int job_open(struct job **out, struct base_err *err)
@@ -38,7 +32,7 @@ int job_open(struct job **out, struct base_err *err)
     int (*open)(struct job_transport * *out, struct base_err * err) = NULL;
     struct job_transport *transport = NULL;
     *out = NULL;
-    if (!was_launched() || launched_alone())
+    if (!was_launched())
         return 0;
     void *symbol = base_module_symbol(MODULE, "job_mpi_open", 1); /* MPI libraries load parts of themselves */
     memcpy(&open, &symbol, sizeof open);
@@ -137,13 +131,6 @@ int job_find_dead(struct job *job)
             return base_fail(&job->failed, BASE_EIO, "%s has died", name_of(job, i));
         }
     return 0;
-}
-
-/* Rank 0 has waited for `rank` so long. */
-static int look_round(struct job *job, int rank, double waited_s)
-{
-    int rc = job->interrupted && *job->interrupted ? job_find_dead(job) : 0;
-    return rc ? rc : job_give_up(job, rank, waited_s);
 }
 
 int job_send(struct job *job, int rank, void *message, size_t size)
@@ -249,8 +236,8 @@ static void await_all(struct job *job, const char *settings)
             if (settings)
                 receive_hello(job, &mail, settings);
             free(mail.message); /* at the end: it was on its way when rank 0 ended the job */
-        } else if (got == 0 && (settings || !w->gone)) {
-            look_round(job, r, base_clock_wall_s() - start_s);
+        } else if (got == 0 && (settings || !w->gone) && !(job->interrupted && *job->interrupted && job_find_dead(job))) {
+            job_give_up(job, r, base_clock_wall_s() - start_s);
         }
     }
 }
