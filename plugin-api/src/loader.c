@@ -148,72 +148,59 @@ static void list_ids(lull_entry_fn entry, uint32_t count, char *text, size_t roo
         used += (size_t)snprintf(text + used, room - used, "%s%s", i > 0 ? ", " : "", entry(i)->id);
 }
 
+/* The folder of a file with `tail` behind it; NULL: there is none, or it is too long. */
+static const char *beside(const char *file, const char *tail, char path[LULL_PATH_MAX])
+{
+    const char *slash = strrchr(file, '/');
+    const int length = slash ? snprintf(path, LULL_PATH_MAX, "%.*s%s", (int)(slash - file), file, tail) : LULL_PATH_MAX;
+    return length < LULL_PATH_MAX ? path : NULL;
+}
+
 /* lib/lull beside the running program's own folder: the build tree and the installed tree have the same shape. */
 static const char *beside_program(char path[LULL_PATH_MAX])
 {
-    static const char tail[] = "/../lib/lull";
-    ssize_t n = readlink("/proc/self/exe", path, LULL_PATH_MAX - 1);
-    path[n > 0 ? n : 0] = '\0';
-    char *slash = strrchr(path, '/');
-    if (!slash || (size_t)(slash - path) + sizeof tail > LULL_PATH_MAX)
-        return NULL;
-    memcpy(slash, tail, sizeof tail);
-    return path;
+    char program[LULL_PATH_MAX];
+    const ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
+    program[n > 0 ? n : 0] = '\0';
+    return beside(program, "/../lib/lull", path);
 }
 
 /* lull beside the host library, if that is where this code is: a renderer is installed elsewhere. resolved: beside the file
  * that the library's name links to. */
 static const char *beside_library(int resolved, char path[LULL_PATH_MAX])
 {
-    static const char here, name[] = "/liblull-host.so", tail[] = "/lull";
+    static const char here, name[] = "/liblull-host.so";
     Dl_info info;
     char *file = dladdr(&here, &info) != 0 && info.dli_fname ? realpath(info.dli_fname, NULL) : NULL;
     const char *own = resolved || !file ? file : info.dli_fname, *slash = own ? strrchr(own, '/') : NULL;
-    int is_there = slash && strncmp(slash, name, strlen(name)) == 0 && (size_t)(slash - own) + sizeof tail <= LULL_PATH_MAX;
-    if (is_there) {
-        memcpy(path, own, (size_t)(slash - own));
-        memcpy(path + (slash - own), tail, sizeof tail);
-    }
+    const char *there = slash && strncmp(slash, name, strlen(name)) == 0 ? beside(own, "/lull", path) : NULL;
     free(file);
-    return is_there ? path : NULL;
+    return there;
 }
-
-/* Walks the directories of a search, entries joined by ':' one by one. */
-struct dir_walk {
-    const struct lull_search *search;
-    size_t index;
-    const char *rest;
-    char own[LULL_PATH_MAX];
-};
 
 enum { USUAL_ENTRIES = 4 };
 
-static const char *usual_entry(struct dir_walk *walk, size_t index)
+static const char *usual_entry(size_t index, char own[LULL_PATH_MAX])
 {
-    return index == 0   ? getenv("LULL_PLUGIN_PATH")
-           : index == 1 ? beside_program(walk->own)
-                        : beside_library(index == 3, walk->own);
+    return index == 0 ? getenv("LULL_PLUGIN_PATH") : index == 1 ? beside_program(own) : beside_library(index == 3, own);
 }
 
-static int next_dir(struct dir_walk *walk, char dir[LULL_PATH_MAX])
+/* The directory of a search with this number, from 1: those that an entry joins by ':' count one by one. 0: it has fewer. */
+static int find_dir(const struct lull_search *s, size_t number, char dir[LULL_PATH_MAX])
 {
-    const struct lull_search *s = walk->search;
-    for (;;) {
-        while (!walk->rest || *walk->rest == '\0') {
-            if (!s || walk->index >= (s->dirs ? s->dir_count : USUAL_ENTRIES))
-                return 0;
-            walk->rest = s->dirs ? s->dirs[walk->index] : usual_entry(walk, walk->index);
-            walk->index++;
+    char own[LULL_PATH_MAX];
+    for (size_t i = 0; s && i < (s->dirs ? s->dir_count : USUAL_ENTRIES); i++) {
+        const char *at = s->dirs ? s->dirs[i] : usual_entry(i, own);
+        while (at && *at != '\0') {
+            const size_t length = strcspn(at, ":");
+            if (length > 0 && length < LULL_PATH_MAX && --number == 0) {
+                snprintf(dir, LULL_PATH_MAX, "%.*s", (int)length, at);
+                return 1;
+            }
+            at += length + (at[length] == ':');
         }
-        size_t length = strcspn(walk->rest, ":");
-        const char *start = walk->rest;
-        walk->rest += length + (start[length] == ':');
-        if (length == 0 || length >= LULL_PATH_MAX)
-            continue;
-        memcpy(dir, start, length);
-        dir[length] = '\0';
-        return 1;
     }
+    return 0;
 }
 
 static int is_file(const char *path)
@@ -232,8 +219,7 @@ static int has_suffix(const char *text, const char *suffix)
 static size_t find_file(const struct lull_search *search, const char *name, const char *ending, char path[LULL_PATH_MAX])
 {
     char dir[LULL_PATH_MAX];
-    size_t number = 1;
-    for (struct dir_walk walk = {.search = search}; next_dir(&walk, dir); number++)
+    for (size_t number = 1; find_dir(search, number, dir); number++)
         if (snprintf(path, LULL_PATH_MAX, "%s/%s%s", dir, name, ending) < LULL_PATH_MAX && is_file(path))
             return number;
     return 0;
@@ -265,10 +251,9 @@ int32_t lull_list(const struct lull_search *search, int32_t (*visit)(void *conte
                   void *context)
 {
     struct lull_found *found = malloc(sizeof *found);
-    struct dir_walk walk = {.search = search};
     char dir[LULL_PATH_MAX];
     int32_t status = found ? LULL_OK : LULL_E_MEMORY;
-    for (size_t number = 1; status == LULL_OK && next_dir(&walk, dir); number++) {
+    for (size_t number = 1; status == LULL_OK && find_dir(search, number, dir); number++) {
         struct dirent **list = NULL;
         const int count = scandir(dir, &list, is_library, by_name); /* -1: most often there is no such directory */
         status = count < 0 && errno == ENOMEM ? LULL_E_MEMORY : LULL_OK;
