@@ -14,10 +14,6 @@ struct picture {
     const struct lull_host_frame *frame;
     const struct lull_host_denoising *how;
     struct lull_view view;
-    int32_t width;
-    double exposure;
-    const double *luminance;        /* [3] borrows; what makes it of colours */
-    int albedo, normal;             /* whether the view has these */
     struct lull_denoised_pair pair; /* owns; of the whole view, */
     struct lull_denoised_part part; /* as this */
     float *const *other;            /* [2] borrows; by which the denoised halves are judged */
@@ -38,7 +34,7 @@ static void each_span(struct picture *p, uint32_t planes, visit *fn)
         const struct lull_block b = lull_host_state_of(&blocks->list[i], i, 1);
         struct lull_kit_span s;
         for (lull_kit_span_begin(&s, &p->view, &b, planes); lull_kit_span_next(&s);)
-            fn(p, &s, (size_t)(s.y - p->view.y0) * (size_t)p->width + (size_t)(s.x - p->view.x0));
+            fn(p, &s, (size_t)(s.y - p->view.y0) * (size_t)p->pair.width + (size_t)(s.x - p->view.x0));
     }
 }
 
@@ -65,8 +61,8 @@ static float compared(const struct picture *p, const float *rgb)
     const double most = 4.0;
     double y = 0.0;
     for (int c = 0; c < 3; c++)
-        y += p->luminance[c] * (double)rgb[c];
-    y *= p->exposure;
+        y += p->frame->config.rgb_to_xyz[3 + c] * (double)rgb[c];
+    y *= p->frame->config.exposure;
     return (float)(y > 0.0 ? fmin(y, most) : 0.0);
 }
 
@@ -140,22 +136,23 @@ static void black_out(const struct picture *p, float *rgb)
     for (uint32_t i = 0; i < blocks->count; i++) {
         const struct lull_host_block *b = &blocks->list[i];
         for (int32_t y = b->y0; b->spp == 0 && y < b->y1; y++)
-            memset(rgb + 3 * ((size_t)(y - p->view.y0) * (size_t)p->width + (size_t)(b->x0 - p->view.x0)), 0,
+            memset(rgb + 3 * ((size_t)(y - p->view.y0) * (size_t)p->pair.width + (size_t)(b->x0 - p->view.x0)), 0,
                    3 * (size_t)(b->x1 - b->x0) * sizeof *rgb);
     }
 }
 
-static int32_t make(struct picture *p, int32_t height, const struct lull_host_picture *out, struct lull_error *err)
+static int32_t make(struct picture *p, const struct lull_host_picture *out, struct lull_error *err)
 {
     const struct lull_denoised_part *part = &p->part;
-    const struct lull_oidn_form form = {.width = p->width,
-                                        .height = height,
-                                        .albedo = p->albedo,
-                                        .normal = p->normal,
+    const int albedo = lull_kit_plane(&p->view, LULL_PLANE_ALBEDO) != NULL;
+    const struct lull_oidn_form form = {.width = p->view.x1 - p->view.x0,
+                                        .height = p->view.y1 - p->view.y0,
+                                        .albedo = albedo,
+                                        .normal = albedo && lull_kit_plane(&p->view, LULL_PLANE_NORMAL),
                                         .quality = LULL_OIDN_HIGH,
                                         .threads = (int32_t)p->how->threads,
                                         .margin = LULL_OIDN_MARGIN,
-                                        .exposure = (float)p->exposure};
+                                        .exposure = (float)p->frame->config.exposure};
     struct base_err why = {0};
     if (lull_denoised_open(&p->pair, p->how->library, &form, &why) ||
         lull_denoised_part_open(&p->part, p->pair.pixels, &p->pair, &why))
@@ -190,18 +187,11 @@ int32_t lull_host_denoise(const struct lull_host_frame *frame, const struct lull
     code = lull_host_show(&frame->blocks, view, 0, &s, err);
     if (code != LULL_OK)
         return code;
-    struct picture p = {.frame = frame,
-                        .how = how,
-                        .view = s.view,
-                        .width = view->x1 - view->x0,
-                        .exposure = frame->config.exposure,
-                        .luminance = frame->config.rgb_to_xyz + 3,
-                        .albedo = s.planes[LULL_PLANE_ALBEDO].data != NULL};
-    p.normal = p.albedo && s.planes[LULL_PLANE_NORMAL].data;
+    struct picture p = {.frame = frame, .how = how, .view = s.view};
     if (!s.planes[LULL_PLANE_COLOR].data || (!is_full(&p) && !s.planes[LULL_PLANE_HALF].data))
         code = lull_error_set(err, LULL_E_INVALID, "a denoised picture needs the plane COLOR, a blend HALF besides");
     else
-        code = make(&p, view->y1 - view->y0, out, err);
+        code = make(&p, out, err);
     lull_denoised_part_close(&p.part);
     lull_denoised_close(&p.pair);
     free(p.mean);
