@@ -247,7 +247,7 @@ uint32_t lull_host_due(struct lull_host_frame *f, uint32_t *due, uint8_t *final)
         int again = reopens && b->reason == LULL_REASON_CRITERION && b->spp < blocks->spp_max;
         if (!is_active && !again)
             continue;
-        if (can_go_on(blocks, b) && error_now(b) < below)
+        if (can_go_on(blocks, b) && error_now(b) < below) /* its time goes to blocks of a larger error */
             continue;
         int last = is_active && b->spp >= blocks->spp_max;
         if (last && wait)
@@ -307,6 +307,7 @@ int32_t lull_host_stop(struct lull_host_frame *f, int32_t reason, const struct l
         code = lull_host_ask(f, view, f->due, f->final, n, f->decisions, err);
         lull_host_note(f, f->due, n, f->decisions);
     }
+    /* open-ended blocks with all their samples were asked just now for the last time: they end by the answer */
     const int open_ended = (f->blocks.flags & LULL_HOST_OPEN_ENDED) != 0;
     for (uint32_t k = 0; k < n && f->criterion && view && open_ended; k++)
         if (f->blocks.list[f->due[k]].spp >= f->blocks.spp_max)
