@@ -1,8 +1,5 @@
 #include "nn/exec.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 #include "base/clock.h"
 #include "nn/layers.h"
 #include "nn/real.h"
@@ -22,7 +19,7 @@ static size_t place_values(const struct ggn_graph *g, int flags, size_t offset[G
 
 static size_t most(size_t a, size_t b) { return a > b ? a : b; }
 
-/* Elements of each kind, and the bytes of all but the executor itself. */
+/* Elements of each kind, and the bytes of the executor with all of them. */
 struct room {
     size_t acts, scratch, leaf, sums; /* of all images, one worker, one image, all images */
     size_t bytes;
@@ -55,19 +52,20 @@ static struct room room_for(const struct ggn_graph *g, const struct ggn_kernels 
     r.scratch = (r.scratch + 15) / 16 * 16;
     r.sums = 2 * normed * (images + 1);
     r.bytes =
+        sizeof(struct ggn_exec) + r.sums * sizeof(double) +
         sizeof(real) * (r.acts * (back ? 2 : 1) + 2 * (g->n_stats + 16) + r.scratch * (size_t)workers + r.leaf * images);
     return r;
 }
 
 size_t ggn_exec_bytes(const struct ggn_graph *g, int capacity, int flags, int workers)
 {
-    const struct room r = room_for(g, ggn_kernels_best(), capacity, flags, workers);
-    return r.bytes + r.sums * sizeof(double) + sizeof(struct ggn_exec);
+    return room_for(g, ggn_kernels_best(), capacity, flags, workers).bytes;
 }
 
-static void place_memory(struct ggn_exec *e, char *memory, const struct room *r, int workers)
+static void place_memory(struct ggn_exec *e, const struct room *r, int workers)
 {
-    e->memory = memory;
+    e->sums = (double *)(void *)(e + 1);
+    char *memory = (char *)(e->sums + r->sums);
     e->acts = (real *)(void *)(memory + (ALIGN_BYTES - (size_t)memory % ALIGN_BYTES) % ALIGN_BYTES);
     e->n_acts = place_values(e->graph, e->flags, e->offset);
     e->scratch = e->acts + r->acts;
@@ -88,51 +86,20 @@ struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn
     const int workers = threads ? base_threads_count(threads) : 1;
     const struct ggn_kernels *k = kernels ? kernels : ggn_kernels_best();
     const struct room room = room_for(graph, k, capacity, flags, workers);
-    struct ggn_exec *e = calloc(1, sizeof *e);
     /* calloc: fresh pages are zero already, and the zero padding of the layout is never written with anything else */
-    char *memory = e ? calloc(1, room.bytes + ALIGN_BYTES) : NULL;
+    struct ggn_exec *e = calloc(1, room.bytes + ALIGN_BYTES);
 
-    if (e)
-        *e = (struct ggn_exec){.graph = graph,
-                               .kernels = k,
-                               .threads = threads,
-                               .capacity = capacity,
-                               .flags = flags,
-                               .memory = memory,
-                               .sums = malloc((room.sums + 1) * sizeof *e->sums)};
-    if (!memory || !e->sums) {
-        ggn_exec_destroy(e);
+    if (!e) {
         base_fail_nomem(err, "network activations");
         return NULL;
     }
-    place_memory(e, memory, &room, workers);
+    e->graph = graph;
+    e->kernels = k;
+    e->threads = threads;
+    e->capacity = capacity;
+    e->flags = flags;
+    place_memory(e, &room, workers);
     return e;
-}
-
-void ggn_exec_destroy(struct ggn_exec *e)
-{
-    if (!e)
-        return;
-    free(e->sums);
-    free(e->memory);
-    free(e);
-}
-
-real *ggn_exec_plane(const struct ggn_exec *e, int value, int n, int c) { return ggn_plane_in(e, e->acts, value, n, c); }
-
-real *ggn_exec_output(const struct ggn_exec *e, int n, int c) { return ggn_exec_plane(e, e->graph->n_values - 1, n, c); }
-
-real *ggn_exec_grad(const struct ggn_exec *e, int value, int n, int c) { return ggn_plane_in(e, e->grads, value, n, c); }
-
-void ggn_plane_copy(const struct ggn_value *v, real *to, const real *from, int row)
-{
-    for (int y = 0; y < v->h; y++)
-        memcpy(to + (long)y * v->row, from + (long)y * row, (size_t)v->w * sizeof *to);
-}
-
-void ggn_exec_load(const struct ggn_exec *e, int n, int c, const real *from, int row)
-{
-    ggn_plane_copy(&e->graph->value[0], ggn_exec_plane(e, 0, n, c), from, row);
 }
 
 #define PASSES(op, name, text) [GGN_OP_##op] = &GGN_LAYER(name),
@@ -167,7 +134,7 @@ void ggn_exec_backward(struct ggn_exec *e, const struct ggn_weights *weights, re
 {
     e->params_grad = params_grad;
     for (int i = e->graph->n_layers - 1; i >= 0; i--) {
-        struct ggn_task t = {.e = e, .w = (struct ggn_weights *)(size_t)weights, .l = &e->graph->layer[i]};
+        struct ggn_task t = {.e = e, .w = (struct ggn_weights *)(size_t)weights, .l = &e->graph->layer[i], .back = 1};
         passes[t.l->op]->backward(&t);
     }
 }

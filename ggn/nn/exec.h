@@ -8,6 +8,8 @@
 #ifndef GGN_NN_EXEC_H
 #define GGN_NN_EXEC_H
 
+#include <string.h>
+
 #include "base/threads.h"
 #include "nn/weights.h"
 
@@ -33,12 +35,11 @@ struct ggn_exec {
     enum ggn_mode mode;                        /* of the last forward pass */
     uint32_t dropout_seed;                     /* masks are a function of it; change it between passes */
     size_t offset[GGN_MAX_LAYERS + 1], n_acts; /* where each value starts in one image's activations; their total */
-    real *acts, *grads;                        /* [capacity][n_acts] */
+    real *acts, *grads;                        /* [capacity][n_acts]; behind this struct, as all arrays are */
     real *bn_mean, *bn_inv;                    /* [n_stats] of the last training-mode pass */
     real *scratch;                             /* [workers][scratch_size] */
     size_t scratch_size;
-    void *memory;      /* owns */
-    double *sums;      /* owns; of one batch norm: [2][channels] of the batch, then [capacity][channels][2] of its images */
+    double *sums;      /* of one batch norm: [2][channels] of the batch, then [capacity][channels][2] of its images */
     real *params_grad; /* of the backward pass under way */
     real *leaves;      /* [capacity][leaf_size] the weights' gradient of each image, one convolution at a time */
     size_t leaf_size;
@@ -50,19 +51,44 @@ size_t ggn_exec_bytes(const struct ggn_graph *graph, int capacity, int flags, in
 /* `kernels` must be those of the weights (NULL = the best). NULL on failure. */
 struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity, int flags,
                                  struct base_threads *threads, struct base_err *err);
-void ggn_exec_destroy(struct ggn_exec *exec);
+static inline void ggn_exec_destroy(struct ggn_exec *exec) { free(exec); }
 
-/* Element (0,0) of plane `c` of value `value` of image `n`; rows are graph->value[value].row apart. Value 0 is the input,
- * which the caller writes (h × w elements of each plane and nothing else); n_values − 1 is the output. */
-real *ggn_exec_plane(const struct ggn_exec *exec, int value, int n, int c);
-real *ggn_exec_output(const struct ggn_exec *exec, int n, int c);
-/* The same for the gradient; the caller writes that of the output before backward and may read that of the input after. */
-real *ggn_exec_grad(const struct ggn_exec *exec, int value, int n, int c);
+/* Element (0,0) of plane `c` of value `value` of image `n` among all of a kind; rows are graph->value[value].row apart. */
+static inline real *ggn_exec_at(const struct ggn_exec *exec, real *all, int value, long n, int c)
+{
+    const struct ggn_value *v = &exec->graph->value[value];
+    return all + (size_t)n * exec->n_acts + exec->offset[value] + v->origin + (size_t)c * v->plane;
+}
+
+/* Value 0 is the input, which the caller writes (h × w elements of each plane and nothing else); n_values − 1 is the output. */
+static inline real *ggn_exec_plane(const struct ggn_exec *exec, int value, long n, int c)
+{
+    return ggn_exec_at(exec, exec->acts, value, n, c);
+}
+
+static inline real *ggn_exec_output(const struct ggn_exec *exec, long n, int c)
+{
+    return ggn_exec_plane(exec, exec->graph->n_values - 1, n, c);
+}
+
+/* The caller writes the gradient of the output before backward and may read that of the input after. */
+static inline real *ggn_exec_grad(const struct ggn_exec *exec, int value, long n, int c)
+{
+    return ggn_exec_at(exec, exec->grads, value, n, c);
+}
 
 /* Copies one plane of the size of `v` from rows that lie `row` apart to rows as `v` has them. */
-void ggn_plane_copy(const struct ggn_value *v, real *to, const real *from, int row);
+static inline void ggn_plane_copy(const struct ggn_value *v, real *to, const real *from, int row)
+{
+    for (int y = 0; y < v->h; y++)
+        memcpy(to + (long)y * v->row, from + (long)y * row, (size_t)v->w * sizeof *to);
+}
+
 /* The same into plane `c` of the input of image `n`. */
-void ggn_exec_load(const struct ggn_exec *exec, int n, int c, const real *from, int row);
+static inline void ggn_exec_load(const struct ggn_exec *exec, int n, int c, const real *from, int row)
+{
+    ggn_plane_copy(&exec->graph->value[0], ggn_exec_plane(exec, 0, n, c), from, row);
+}
 
 /* Images 0..batch−1. GGN_TRAIN updates the running statistics in `weights` (not the packed ones: pack before evaluating). */
 void ggn_exec_forward(struct ggn_exec *exec, struct ggn_weights *weights, int batch, enum ggn_mode mode);

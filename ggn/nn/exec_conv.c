@@ -17,18 +17,10 @@ static int input_planes(real **out, const struct ggn_task *t, real *base, long n
     const struct ggn_layer *l = t->l;
     int k = 0;
     for (int c = 0; c < g->value[l->in].c; c++)
-        out[k++] = ggn_plane_in(t->e, base, l->in, n, c);
+        out[k++] = ggn_exec_at(t->e, base, l->in, n, c);
     for (int c = 0; l->in2 >= 0 && c < g->value[l->in2].c; c++)
-        out[k++] = ggn_plane_in(t->e, base, l->in2, n, c);
+        out[k++] = ggn_exec_at(t->e, base, l->in2, n, c);
     return k;
-}
-
-/* The Winograd form of the layer's weights, or NULL where the direct convolution is used. */
-static const real *wino_weights(const struct ggn_task *t, int c_in, int c_out, const real *all)
-{
-    const struct ggn_value *v = ggn_task_out(t);
-    const int suits = t->l->kernel == 3 && ggn_wino_suits(c_in, c_out, v->h, v->w, t->e->kernels->lanes);
-    return all && suits ? all + 4 * t->l->pack : NULL;
 }
 
 /* Cuts the work into pieces that depend on the shape only. `wino`: all Winograd weights of this direction or NULL. */
@@ -36,10 +28,11 @@ static long cut_conv(struct ggn_task *t, int c_in, int c_out, const real *wino)
 {
     const struct ggn_value *v = ggn_task_out(t);
 
-    t->wino = wino_weights(t, c_in, c_out, wino);
-    if (t->wino) {
+    if (wino && t->l->kernel == 3 && ggn_wino_suits(c_in, c_out, v->h, v->w, t->e->kernels->lanes)) {
+        t->wino = wino + 4 * t->l->pack;
         ggn_wino_cut(ggn_wino_tiles(v->h, v->w), c_out, &t->px_blocks, &t->oc_group);
     } else {
+        t->wino = NULL;
         t->px_block = 16L * t->e->kernels->tile_px;
         t->px_blocks = (int)(((long)v->h * v->row + t->px_block - 1) / t->px_block);
         t->oc_group = t->px_blocks >= 8 ? c_out : 32;
@@ -48,48 +41,51 @@ static long cut_conv(struct ggn_task *t, int c_in, int c_out, const real *wino)
     return (long)t->e->batch * t->px_blocks * t->oc_groups;
 }
 
-static void run_conv_piece(const struct ggn_task *t, const struct ggn_conv *conv, long i, int worker)
+/* A piece of Y, or in the backward pass of dX: the same convolution with inputs and outputs swapped and taps mirrored. */
+static void conv_piece(const struct ggn_task *t, long i)
 {
-    const struct ggn_kernels *k = t->e->kernels;
-    real *scratch = t->e->scratch + (size_t)worker * t->e->scratch_size;
-
-    const long part = i / t->oc_groups % t->px_blocks, p0 = part * t->px_block, p1 = p0 + t->px_block;
-    const int oc0 = (int)(i % t->oc_groups) * t->oc_group;
-    const int oc1 = oc0 + t->oc_group < conv->n_out ? oc0 + t->oc_group : conv->n_out;
-    if (t->wino) {
-        const long tiles = ggn_wino_tiles(conv->h, conv->w_px);
-        k->wino(conv, t->wino, (int)(tiles * part / t->px_blocks), (int)(tiles * (part + 1) / t->px_blocks), oc0, oc1,
-                scratch);
-        return;
-    }
-    k->conv(conv, p0, p1, oc0, oc1);
-}
-
-static void conv_piece(void *data, long i, int worker)
-{
-    const struct ggn_task *t = data;
+    const struct ggn_layer *l = t->l;
     const struct ggn_value *v = ggn_task_out(t);
-    long n = i / ((long)t->px_blocks * t->oc_groups);
-    real *x[GGN_MAX_CHANNELS], *y[GGN_MAX_CHANNELS];
-    struct ggn_conv conv = {
-        .x = (const real *const *)x,
-        .y = y,
-        .w = t->w->pack + t->l->pack,
-        .bias = t->w->params + t->l->bias,
-        .scale = t->bn ? t->w->scale + t->bn->stats : NULL,
-        .shift = t->bn ? t->w->shift + t->bn->stats : NULL,
-        .n_out = v->c,
-        .taps = t->l->kernel * t->l->kernel,
-        .h = v->h,
-        .w_px = v->w,
-        .row = v->row,
-        .slope = (real)t->l->slope,
-    };
+    const long n = i / ((long)t->px_blocks * t->oc_groups), part = i / t->oc_groups % t->px_blocks;
+    real *all = t->back ? t->e->grads : t->e->acts, *x[GGN_MAX_CHANNELS], *y[GGN_MAX_CHANNELS];
+    unsigned char add[GGN_MAX_CHANNELS];
+    const int c_in = input_planes(x, t, all, n);
+    struct ggn_conv conv = {.x = (const real *const *)x,
+                            .y = y,
+                            .n_in = c_in,
+                            .n_out = v->c,
+                            .taps = l->kernel * l->kernel,
+                            .h = v->h,
+                            .w_px = v->w,
+                            .row = v->row};
 
-    conv.n_in = input_planes(x, t, t->e->acts, n);
     for (int c = 0; c < v->c; c++)
-        y[c] = ggn_act(t, t->bn ? t->bn->out : t->l->out, n, c);
-    run_conv_piece(t, &conv, i, worker);
+        y[c] = ggn_exec_at(t->e, all, t->bn ? t->bn->out : l->out, n, c);
+    if (t->back) {
+        for (int c = 0; c < c_in; c++)
+            add[c] = (unsigned char)(c < ggn_task_in(t)->c ? l->add_in : l->add_in2);
+        conv.x = (const real *const *)y;
+        conv.y = x;
+        conv.n_in = v->c;
+        conv.n_out = c_in;
+        conv.w = t->w->pack_back + l->pack;
+        conv.add = add;
+        conv.slope = 1;
+    } else {
+        conv.w = t->w->pack + l->pack;
+        conv.bias = t->w->params + l->bias;
+        conv.scale = t->bn ? t->w->scale + t->bn->stats : NULL;
+        conv.shift = t->bn ? t->w->shift + t->bn->stats : NULL;
+        conv.slope = (real)l->slope;
+    }
+    const int oc0 = (int)(i % t->oc_groups) * t->oc_group;
+    const int oc1 = oc0 + t->oc_group < conv.n_out ? oc0 + t->oc_group : conv.n_out;
+    const long tiles = ggn_wino_tiles(v->h, v->w), p0 = part * t->px_block;
+    if (t->wino)
+        t->e->kernels->wino(&conv, t->wino, (int)(tiles * part / t->px_blocks), (int)(tiles * (part + 1) / t->px_blocks),
+                            oc0, oc1, t->scratch);
+    else
+        t->e->kernels->conv(&conv, p0, p0 + t->px_block, oc0, oc1);
 }
 
 static void conv_forward(struct ggn_task *t)
@@ -97,50 +93,19 @@ static void conv_forward(struct ggn_task *t)
     ggn_task_run(t, cut_conv(t, ggn_task_c_in(t), ggn_task_out(t)->c, t->w->wino), conv_piece);
 }
 
-/* dX = the same convolution with inputs and outputs swapped and taps mirrored. */
-static void conv_back_piece(void *data, long i, int worker)
-{
-    const struct ggn_task *t = data;
-    const struct ggn_value *v = ggn_task_out(t);
-    long n = i / ((long)t->px_blocks * t->oc_groups);
-    real *dy[GGN_MAX_CHANNELS], *dx[GGN_MAX_CHANNELS];
-    unsigned char add[GGN_MAX_CHANNELS];
-    struct ggn_conv conv = {
-        .x = (const real *const *)dy,
-        .y = dx,
-        .w = t->w->pack_back + t->l->pack,
-        .add = add,
-        .n_in = v->c,
-        .taps = t->l->kernel * t->l->kernel,
-        .h = v->h,
-        .w_px = v->w,
-        .row = v->row,
-        .slope = 1,
-    };
-
-    conv.n_out = input_planes(dx, t, t->e->grads, n);
-    for (int c = 0; c < conv.n_out; c++)
-        add[c] = (unsigned char)(c < ggn_task_in(t)->c ? t->l->add_in : t->l->add_in2);
-    for (int c = 0; c < v->c; c++)
-        dy[c] = ggn_grad(t, t->l->out, n, c);
-    run_conv_piece(t, &conv, i, worker);
-}
-
 /* Through the activation, in place, and db[c] += Σ dY[c]. */
-static void conv_act_back(void *data, long c, int worker)
+static void conv_act_back(const struct ggn_task *t, long c)
 {
-    const struct ggn_task *t = data;
     const struct ggn_value *v = ggn_task_out(t);
     double sum = 0;
 
     for (int n = 0; n < t->e->batch; n++) {
-        real *dy = ggn_grad(t, t->l->out, n, (int)c);
-        sum += t->l->slope == 1
-                   ? t->e->kernels->sum(dy, v->h, v->w, v->row)
-                   : t->e->kernels->act_grad(dy, ggn_act(t, t->l->out, n, (int)c), (real)t->l->slope, v->h, v->w, v->row);
+        real *dy = ggn_exec_grad(t->e, t->l->out, n, (int)c);
+        sum += t->l->slope == 1 ? t->e->kernels->sum(dy, v->h, v->w, v->row)
+                                : t->e->kernels->act_grad(dy, ggn_exec_plane(t->e, t->l->out, n, (int)c), (real)t->l->slope,
+                                                          v->h, v->w, v->row);
     }
     t->e->params_grad[t->l->bias + (size_t)c] += (real)sum;
-    (void)worker;
 }
 
 /* A part of dW: `ot` output channels from `oc` on, `nic` input channels from `ic0` on. */
@@ -172,7 +137,7 @@ static long cut_weights(struct ggn_task *t)
 }
 
 static void weights_by_definition(const struct ggn_task *t, const struct weight_part *p, real *const *x,
-                                  const real *const *dy, real *acc, real *leaf)
+                                  const real *const *dy, real *leaf)
 {
     const struct ggn_value *v = ggn_task_out(t);
     const struct ggn_kernels *k = t->e->kernels;
@@ -180,11 +145,11 @@ static void weights_by_definition(const struct ggn_task *t, const struct weight_
     const long px = (long)v->h * v->row;
     real sums[GGN_TILE_MAX * GGN_GRAD_IC * 9]; /* [nic][taps][ot] */
 
-    memset(acc, 0, (size_t)(values * k->lanes) * sizeof *acc);
+    memset(t->scratch, 0, (size_t)(values * k->lanes) * sizeof *t->scratch);
     for (long at = 0; at < px; at += GRAD_CHUNK)
-        k->conv_grad(acc, (const real *const *)x, p->nic, dy, p->ot, taps, v->row, at,
+        k->conv_grad(t->scratch, (const real *const *)x, p->nic, dy, p->ot, taps, v->row, at,
                      at + GRAD_CHUNK < px ? at + GRAD_CHUNK : px);
-    k->lane_sums(sums, acc, values);
+    k->lane_sums(sums, t->scratch, values);
     for (int ic = 0; ic < p->nic; ic++)
         for (int o = 0; o < p->ot; o++) {
             real *to = leaf + weight_at(t, p->oc + o, p->ic0 + ic);
@@ -194,7 +159,7 @@ static void weights_by_definition(const struct ggn_task *t, const struct weight_
 }
 
 static void weights_by_wino(const struct ggn_task *t, const struct weight_part *p, real *const *x, const real *const *dy,
-                            real *scratch, real *leaf)
+                            real *leaf)
 {
     const struct ggn_value *v = ggn_task_out(t);
     const struct ggn_conv_grad grad = {
@@ -210,18 +175,16 @@ static void weights_by_wino(const struct ggn_task *t, const struct weight_part *
         .i_step = (long)weight_at(t, 0, 1),
         .mirrored = t->l->transposed,
     };
-    t->e->kernels->wino_grad(&grad, scratch);
+    t->e->kernels->wino_grad(&grad, t->scratch);
 }
 
 /* dW of one image and one group of output and of input channels, into the image's leaf. */
-static void conv_weight_back(void *data, long i, int worker)
+static void conv_weight_back(const struct ggn_task *t, long i)
 {
-    const struct ggn_task *t = data;
     const int n_in = ggn_task_c_in(t), c_out = ggn_task_out(t)->c;
     const long n = i / (t->oc_groups * t->ic_groups);
     struct weight_part p = {.oc = (int)(i / t->ic_groups % t->oc_groups) * t->oc_group,
                             .ic0 = (int)(i % t->ic_groups) * t->ic_group};
-    real *scratch = t->e->scratch + (size_t)worker * t->e->scratch_size;
     real *x[GGN_MAX_CHANNELS];
     const real *dy[GGN_WINO_GRAD];
 
@@ -229,20 +192,18 @@ static void conv_weight_back(void *data, long i, int worker)
     p.nic = n_in - p.ic0 < t->ic_group ? n_in - p.ic0 : t->ic_group;
     input_planes(x, t, t->e->acts, n);
     for (int o = 0; o < p.ot; o++)
-        dy[o] = ggn_grad(t, t->l->out, n, p.oc + o);
-    (t->weights_by_wino ? weights_by_wino : weights_by_definition)(t, &p, x + p.ic0, dy, scratch, ggn_leaf(t, n));
+        dy[o] = ggn_exec_grad(t->e, t->l->out, n, p.oc + o);
+    (t->weights_by_wino ? weights_by_wino : weights_by_definition)(t, &p, x + p.ic0, dy, ggn_leaf(t, n));
 }
 
 /* Some elements of the leaves into the gradient. */
-static void conv_weight_sum(void *data, long i, int worker)
+static void conv_weight_sum(const struct ggn_task *t, long i)
 {
-    const struct ggn_task *t = data;
     const size_t from = (size_t)i * SUM_CHUNK, count = ggn_conv_weights(t->e->graph, t->l);
     const long n = (long)(count - from < SUM_CHUNK ? count - from : SUM_CHUNK);
 
     for (int image = 0; image < t->e->batch; image++)
         t->e->kernels->axpy(t->e->params_grad + t->l->weight + from, 1, ggn_leaf(t, image) + from, n);
-    (void)worker;
 }
 
 static int needs_input_grad(const struct ggn_task *t) { return t->l->in != 0 || (t->e->flags & GGN_EXEC_INPUT_GRAD); }
@@ -257,20 +218,19 @@ static void conv_backward(struct ggn_task *t)
     ggn_task_run(t, cut_weights(t), conv_weight_back);
     ggn_task_run(t, (long)((ggn_conv_weights(g, t->l) + SUM_CHUNK - 1) / SUM_CHUNK), conv_weight_sum);
     if (needs_input_grad(t))
-        ggn_task_run(t, cut_conv(t, c_out, c_in, t->w->wino_back), conv_back_piece);
+        ggn_task_run(t, cut_conv(t, c_out, c_in, t->w->wino_back), conv_piece);
 }
 
 const struct ggn_layer_passes GGN_LAYER(conv) = {conv_forward, conv_backward};
 
 /* Columns of a strided 3×3 convolution: plane 9c + tap holds channel c at that tap, 0 outside. */
-static void im2col_piece(void *data, long i, int worker)
+static void im2col_piece(const struct ggn_task *t, long i)
 {
-    const struct ggn_task *t = data;
     const struct ggn_value *in = ggn_task_in(t), *out = ggn_task_out(t);
     long n = i / out->c;
     int c = (int)(i % out->c), dy = c % 9 / 3 - t->l->pad, dx = c % 3 - t->l->pad;
-    const real *x = ggn_act(t, t->l->in, n, c / 9);
-    real *y = ggn_act(t, t->l->out, n, c);
+    const real *x = ggn_exec_plane(t->e, t->l->in, n, c / 9);
+    real *y = ggn_exec_plane(t->e, t->l->out, n, c);
 
     int s0 = 0, s1 = out->w; /* columns [s0, s1) lie inside */
     while (s0 < s1 && s0 * t->l->stride + dx < 0)
@@ -286,23 +246,21 @@ static void im2col_piece(void *data, long i, int worker)
         for (int s = s0; s < s1; s++, from += t->l->stride)
             y[s] = *from;
     }
-    (void)worker;
 }
 
 static void im2col_forward(struct ggn_task *t) { ggn_task_run(t, (long)t->e->batch * ggn_task_out(t)->c, im2col_piece); }
 
-static void im2col_back_piece(void *data, long i, int worker)
+static void im2col_back_piece(const struct ggn_task *t, long i)
 {
-    const struct ggn_task *t = data;
     const struct ggn_value *in = ggn_task_in(t), *out = ggn_task_out(t);
     long n = i / in->c;
     int c = (int)(i % in->c);
-    real *dx = ggn_grad(t, t->l->in, n, c);
+    real *dx = ggn_exec_grad(t->e, t->l->in, n, c);
 
     for (int r = 0; r < in->h && !t->l->add_in; r++)
         memset(dx + (long)r * in->row, 0, (size_t)in->w * sizeof *dx);
     for (int tap = 0; tap < 9; tap++) {
-        const real *d = ggn_grad(t, t->l->out, n, 9 * c + tap);
+        const real *d = ggn_exec_grad(t->e, t->l->out, n, 9 * c + tap);
         for (int r = 0; r < out->h; r++)
             for (int s = 0; s < out->w; s++) {
                 int yy = r * t->l->stride + tap / 3 - t->l->pad, xx = s * t->l->stride + tap % 3 - t->l->pad;
@@ -310,7 +268,6 @@ static void im2col_back_piece(void *data, long i, int worker)
                     dx[(long)yy * in->row + xx] += d[r * out->row + s];
             }
     }
-    (void)worker;
 }
 
 static void im2col_backward(struct ggn_task *t)

@@ -16,17 +16,15 @@ static double *bn_sums_of(const struct ggn_task *t, int n, int c)
 static double *bn_total(const struct ggn_task *t, int k) { return t->e->sums + (size_t)k * (size_t)ggn_task_out(t)->c; }
 
 /* Mean of one channel of one image, and the sum of squares around it. */
-static void bn_image(void *data, long i, int worker)
+static void bn_image(const struct ggn_task *t, long i)
 {
-    const struct ggn_task *t = data;
     const struct ggn_value *v = ggn_task_out(t);
     const int n = (int)(i / v->c), c = (int)(i % v->c);
-    const real *x = ggn_act(t, t->l->in, n, c);
+    const real *x = ggn_exec_plane(t->e, t->l->in, n, c);
     double *sums = bn_sums_of(t, n, c);
 
     sums[0] = t->e->kernels->sum(x, v->h, v->w, v->row) / ((double)v->h * v->w);
     sums[1] = t->e->kernels->sum_sq(x, sums[0], v->h, v->w, v->row);
-    (void)worker;
 }
 
 /* Batch statistics from those of the images (Chan, Golub & LeVeque 1979): sums of means and of squares around the mean. */
@@ -62,9 +60,8 @@ static void bn_statistics(const struct ggn_task *t, long c)
     t->w->var[s] = (real)((1 - GGN_BN_MOMENTUM) * (double)t->w->var[s] + GGN_BN_MOMENTUM * unbiased);
 }
 
-static void bn_channel(void *data, long c, int worker)
+static void bn_channel(const struct ggn_task *t, long c)
 {
-    const struct ggn_task *t = data;
     const struct ggn_value *v = ggn_task_out(t);
     const size_t s = t->l->stats + (size_t)c;
     real scale = t->w->scale[s], shift = t->w->shift[s];
@@ -78,9 +75,8 @@ static void bn_channel(void *data, long c, int worker)
         t->e->bn_inv[s] = (real)(1 / sqrt((double)t->w->var[s] + GGN_BN_EPS));
     }
     for (int n = 0; n < t->e->batch; n++)
-        t->e->kernels->affine(ggn_act(t, t->l->out, n, (int)c), ggn_act(t, t->l->in, n, (int)c), scale, shift, v->h, v->w,
-                              v->row);
-    (void)worker;
+        t->e->kernels->affine(ggn_exec_plane(t->e, t->l->out, n, (int)c), ggn_exec_plane(t->e, t->l->in, n, (int)c), scale,
+                              shift, v->h, v->w, v->row);
 }
 
 static void bn_forward(struct ggn_task *t)
@@ -96,20 +92,17 @@ static void bn_forward(struct ggn_task *t)
 
 /* x̂ = (x − μ)·inv. dγ = Σ dY·x̂, dβ = Σ dY, dX = γ·inv·(dY − mean(dY) − x̂·mean(dY·x̂)); with running statistics the two
  * means are constants of the pass and dX = γ·inv·dY. */
-static void bn_back_image(void *data, long i, int worker)
+static void bn_back_image(const struct ggn_task *t, long i)
 {
-    const struct ggn_task *t = data;
     const struct ggn_value *v = ggn_task_out(t);
     const int n = (int)(i / v->c), c = (int)(i % v->c);
 
-    t->e->kernels->bn_sums(bn_sums_of(t, n, c), ggn_grad(t, t->l->out, n, c), ggn_act(t, t->l->in, n, c),
+    t->e->kernels->bn_sums(bn_sums_of(t, n, c), ggn_exec_grad(t->e, t->l->out, n, c), ggn_exec_plane(t->e, t->l->in, n, c),
                            t->e->bn_mean[t->l->stats + (size_t)c], v->h, v->w, v->row);
-    (void)worker;
 }
 
-static void bn_back_channel(void *data, long c, int worker)
+static void bn_back_channel(const struct ggn_task *t, long c)
 {
-    const struct ggn_task *t = data;
     const struct ggn_value *v = ggn_task_out(t);
     const size_t s = t->l->stats + (size_t)c;
     const double count = (double)v->h * v->w * t->e->batch;
@@ -122,10 +115,9 @@ static void bn_back_channel(void *data, long c, int worker)
     double b = t->e->mode == GGN_TRAIN ? -gamma * inv * inv * inv * sum[1] / count : 0;
     double shift = t->e->mode == GGN_TRAIN ? -gamma * inv * sum[0] / count - b * mean : 0;
     for (int n = 0; n < t->e->batch; n++)
-        t->e->kernels->bn_grad(ggn_grad(t, t->l->in, n, (int)c), ggn_grad(t, t->l->out, n, (int)c),
-                               ggn_act(t, t->l->in, n, (int)c), (real)(gamma * inv), (real)b, (real)shift, t->l->add_in,
-                               v->h, v->w, v->row);
-    (void)worker;
+        t->e->kernels->bn_grad(ggn_exec_grad(t->e, t->l->in, n, (int)c), ggn_exec_grad(t->e, t->l->out, n, (int)c),
+                               ggn_exec_plane(t->e, t->l->in, n, (int)c), (real)(gamma * inv), (real)b, (real)shift,
+                               t->l->add_in, v->h, v->w, v->row);
 }
 
 static void bn_backward(struct ggn_task *t)
@@ -158,11 +150,11 @@ static struct pair pair_of(const struct ggn_task *t, long i)
     p.n = i / p.in->c;
     p.c = (int)(i % p.in->c);
     int c_out = p.c % p.out->c; /* FLATTEN has its own loop */
-    p.x = ggn_act(t, t->l->in, p.n, p.c);
-    p.y = ggn_act(t, t->l->out, p.n, c_out);
+    p.x = ggn_exec_plane(t->e, t->l->in, p.n, p.c);
+    p.y = ggn_exec_plane(t->e, t->l->out, p.n, c_out);
     if (t->e->grads) {
-        p.dx = ggn_grad(t, t->l->in, p.n, p.c);
-        p.dy = ggn_grad(t, t->l->out, p.n, c_out);
+        p.dx = ggn_exec_grad(t->e, t->l->in, p.n, p.c);
+        p.dy = ggn_exec_grad(t->e, t->l->out, p.n, c_out);
     }
     return p;
 }
@@ -174,13 +166,11 @@ static struct pair pair_of(const struct ggn_task *t, long i)
     const struct ggn_layer_passes GGN_LAYER(name) = {name##_forward, name##_backward};
 
 #define PLANE_PASS(name, body) \
-    static void name##_plane(void *data, long i, int worker) \
+    static void name##_plane(const struct ggn_task *t, long i) \
     { \
-        const struct ggn_task *t = data; \
         const struct ggn_kernels *k = t->e->kernels; \
         struct pair p = pair_of(t, i); \
         body; \
-        (void)worker; \
         (void)k; \
     } \
     static void name(struct ggn_task *t) { ggn_task_run(t, (long)t->e->batch *ggn_task_in(t)->c, name##_plane); }
@@ -260,7 +250,7 @@ PLANE_LAYER(maxpool, pool_plane(t, &p), pool_back_plane(t, &p))
 
 static void flatten_plane(const struct ggn_task *t, const struct pair *p, int back)
 {
-    real *flat = ggn_plane_in(t->e, back ? t->e->grads : t->e->acts, t->l->out, p->n, p->c * p->in->h * p->in->w);
+    real *flat = ggn_exec_at(t->e, back ? t->e->grads : t->e->acts, t->l->out, p->n, p->c * p->in->h * p->in->w);
 
     for (int r = 0; r < p->in->h; r++, flat += p->in->w)
         for (int s = 0; s < p->in->w; s++) {
@@ -286,38 +276,34 @@ PLANE_LAYER(dropout, *p.y = *p.x * dropout_factor(t, i), *p.dx = (t->l->add_in ?
 
 /* Linear: Y = W·X + b, X the vector `in` and behind it that of `in2`. */
 
-static void linear_unit(void *data, long o, int worker)
+static void linear_unit(const struct ggn_task *t, long o)
 {
-    const struct ggn_task *t = data;
     const long c_in = ggn_task_in(t)->c, c_all = ggn_task_c_in(t);
     const real *w = t->w->params + t->l->weight + (size_t)(o * c_all);
 
     for (int n = 0; n < t->e->batch; n++) {
-        real *y = &ggn_act(t, t->l->out, n, 0)[o];
-        *y = t->w->params[t->l->bias + (size_t)o] + t->e->kernels->dot(w, ggn_act(t, t->l->in, n, 0), c_in);
+        real *y = &ggn_exec_plane(t->e, t->l->out, n, 0)[o];
+        *y = t->w->params[t->l->bias + (size_t)o] + t->e->kernels->dot(w, ggn_exec_plane(t->e, t->l->in, n, 0), c_in);
         if (t->l->in2 >= 0)
-            *y += t->e->kernels->dot(w + c_in, ggn_act(t, t->l->in2, n, 0), c_all - c_in);
+            *y += t->e->kernels->dot(w + c_in, ggn_exec_plane(t->e, t->l->in2, n, 0), c_all - c_in);
     }
-    (void)worker;
 }
 
 static void linear_forward(struct ggn_task *t) { ggn_task_run(t, ggn_task_out(t)->c, linear_unit); }
 
 /* dW[o] += Σ_n dY[n][o]·X[n], db[o] += Σ_n dY[n][o] */
-static void linear_weight_back(void *data, long o, int worker)
+static void linear_weight_back(const struct ggn_task *t, long o)
 {
-    const struct ggn_task *t = data;
     const long c_in = ggn_task_in(t)->c, c_all = ggn_task_c_in(t);
     real *dw = t->e->params_grad + t->l->weight + (size_t)(o * c_all);
 
     for (int n = 0; n < t->e->batch; n++) {
-        const real d = ggn_grad(t, t->l->out, n, 0)[o];
-        t->e->kernels->axpy(dw, d, ggn_act(t, t->l->in, n, 0), c_in);
+        const real d = ggn_exec_grad(t->e, t->l->out, n, 0)[o];
+        t->e->kernels->axpy(dw, d, ggn_exec_plane(t->e, t->l->in, n, 0), c_in);
         if (t->l->in2 >= 0)
-            t->e->kernels->axpy(dw + c_in, d, ggn_act(t, t->l->in2, n, 0), c_all - c_in);
+            t->e->kernels->axpy(dw + c_in, d, ggn_exec_plane(t->e, t->l->in2, n, 0), c_all - c_in);
         t->e->params_grad[t->l->bias + (size_t)o] += d;
     }
-    (void)worker;
 }
 
 /* dX = Wᵀ·dY for the inputs from `first` on that value `in` holds. */
@@ -325,23 +311,21 @@ static void linear_value_back(const struct ggn_task *t, long n, int in, long fir
 {
     const struct ggn_graph *g = t->e->graph;
     const long c_in = g->value[in].c, c_all = ggn_task_c_in(t);
-    real *dx = ggn_grad(t, in, n, 0);
+    real *dx = ggn_exec_grad(t->e, in, n, 0);
 
     if (!add)
         memset(dx, 0, (size_t)c_in * sizeof *dx);
     for (int o = 0; o < ggn_task_out(t)->c; o++)
-        t->e->kernels->axpy(dx, ggn_grad(t, t->l->out, n, 0)[o], t->w->params + t->l->weight + (size_t)(o * c_all + first),
-                            c_in);
+        t->e->kernels->axpy(dx, ggn_exec_grad(t->e, t->l->out, n, 0)[o],
+                            t->w->params + t->l->weight + (size_t)(o * c_all + first), c_in);
 }
 
-static void linear_input_back(void *data, long n, int worker)
+static void linear_input_back(const struct ggn_task *t, long n)
 {
-    const struct ggn_task *t = data;
 
     linear_value_back(t, n, t->l->in, 0, t->l->add_in);
     if (t->l->in2 >= 0)
         linear_value_back(t, n, t->l->in2, ggn_task_in(t)->c, t->l->add_in2);
-    (void)worker;
 }
 
 static void linear_backward(struct ggn_task *t)

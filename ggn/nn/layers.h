@@ -12,6 +12,9 @@ struct ggn_task {
     struct ggn_exec *e;
     struct ggn_weights *w;
     const struct ggn_layer *l;
+    int back;                                           /* the backward pass */
+    void (*piece)(const struct ggn_task *task, long i); /* what is being run */
+    real *scratch;                                      /* of the thread that runs a piece */
     const struct ggn_layer *bn;         /* CONV: the batch norm that follows and is applied on the way, or NULL */
     int px_blocks, oc_groups, oc_group; /* how a convolution is cut */
     int ic_groups, ic_group;            /* of its weights' gradient */
@@ -28,10 +31,18 @@ struct ggn_layer_passes {
 #define GGN_LAYER_DECLARE(op, name, text) extern const struct ggn_layer_passes GGN_LAYER(name);
 GGN_OPS(GGN_LAYER_DECLARE)
 
-/* Runs fn(task, i, worker) for i < n. */
-static inline void ggn_task_run(const struct ggn_task *t, long n, void (*fn)(void *task, long i, int worker))
+static inline void ggn_task_piece(void *data, long i, int worker)
 {
-    base_threads_for(t->e->threads, n, fn, (void *)(size_t)t);
+    struct ggn_task t = *(const struct ggn_task *)data;
+    t.scratch = t.e->scratch + (size_t)worker * t.e->scratch_size;
+    t.piece(&t, i);
+}
+
+/* Runs piece(task, i) for i < n, with the scratch memory of the thread in the task. */
+static inline void ggn_task_run(struct ggn_task *t, long n, void (*piece)(const struct ggn_task *task, long i))
+{
+    t->piece = piece;
+    base_threads_for(t->e->threads, n, ggn_task_piece, t);
 }
 
 /* The layer's first input and its output. */
@@ -39,23 +50,6 @@ static inline const struct ggn_value *ggn_task_in(const struct ggn_task *t) { re
 static inline const struct ggn_value *ggn_task_out(const struct ggn_task *t) { return &t->e->graph->value[t->l->out]; }
 /* Channels of both inputs together. */
 static inline int ggn_task_c_in(const struct ggn_task *t) { return ggn_layer_c_in(t->e->graph, t->l); }
-
-/* Element (0,0) of plane c of a value of image n, among the activations or their gradients. */
-static inline real *ggn_plane_in(const struct ggn_exec *e, real *base, int value, long n, int c)
-{
-    const struct ggn_value *v = &e->graph->value[value];
-    return base + (size_t)n * e->n_acts + e->offset[value] + v->origin + (size_t)c * v->plane;
-}
-
-static inline real *ggn_act(const struct ggn_task *t, int value, long n, int c)
-{
-    return ggn_plane_in(t->e, t->e->acts, value, n, c);
-}
-
-static inline real *ggn_grad(const struct ggn_task *t, int value, long n, int c)
-{
-    return ggn_plane_in(t->e, t->e->grads, value, n, c);
-}
 
 /* How many weights a convolution has. */
 static inline size_t ggn_conv_weights(const struct ggn_graph *g, const struct ggn_layer *l)

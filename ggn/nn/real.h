@@ -26,24 +26,16 @@ typedef double real;
 #define ggn_kernels_avx512 GGN_TYPED(ggn_kernels_avx512)
 
 #define ggn_weights_create GGN_TYPED(ggn_weights_create)
-#define ggn_weights_destroy GGN_TYPED(ggn_weights_destroy)
 #define ggn_weights_init GGN_TYPED(ggn_weights_init)
 #define ggn_weights_copy GGN_TYPED(ggn_weights_copy)
 #define ggn_weights_pack GGN_TYPED(ggn_weights_pack)
 
 #define ggn_exec_bytes GGN_TYPED(ggn_exec_bytes)
 #define ggn_exec_create GGN_TYPED(ggn_exec_create)
-#define ggn_exec_destroy GGN_TYPED(ggn_exec_destroy)
-#define ggn_exec_plane GGN_TYPED(ggn_exec_plane)
-#define ggn_exec_output GGN_TYPED(ggn_exec_output)
-#define ggn_exec_grad GGN_TYPED(ggn_exec_grad)
-#define ggn_plane_copy GGN_TYPED(ggn_plane_copy)
-#define ggn_exec_load GGN_TYPED(ggn_exec_load)
 #define ggn_exec_forward GGN_TYPED(ggn_exec_forward)
 #define ggn_exec_backward GGN_TYPED(ggn_exec_backward)
 
 #define ggn_ssim_create GGN_TYPED(ggn_ssim_create)
-#define ggn_ssim_destroy GGN_TYPED(ggn_ssim_destroy)
 #define ggn_ssim_mean GGN_TYPED(ggn_ssim_mean)
 
 #define ggn_trainer_create GGN_TYPED(ggn_trainer_create)

@@ -21,13 +21,13 @@ struct ggn_ssim {
     size_t map;    /* elements of one map */
     real taps[N_TAPS];
     float taps_2d[N_TAPS * N_TAPS];
-    real *maps; /* [workers][N_MAPS][map]; owns */
     /* of the call in progress */
     const real *const *x, *const *y;
     real *const *dx;
     int in_row;
     double grad_scale;       /* per pixel */
     double plane_sum[BATCH]; /* of the planes that are at work */
+    real maps[];             /* [workers][N_MAPS][map] */
 };
 
 /* The published window is an 11×11 array of single-precision products whose sum is 1 − 7e-8. Since σ² = E[x²] − μ² is a
@@ -52,8 +52,10 @@ static void make_taps(struct ggn_ssim *s)
 
 struct ggn_ssim *ggn_ssim_create(int h, int w, struct base_threads *threads, struct base_err *err)
 {
-    struct ggn_ssim *s = calloc(1, sizeof *s);
-    size_t workers = threads ? (size_t)base_threads_count(threads) : 1;
+    const size_t workers = threads ? (size_t)base_threads_count(threads) : 1;
+    const int row = (w + 2 * BORDER + 15) / 16 * 16 + 16;
+    const size_t map = (size_t)row * (size_t)(h + 2 * GGN_SSIM_RADIUS + 2);
+    struct ggn_ssim *s = calloc(1, sizeof *s + workers * N_MAPS * map * sizeof s->maps[0]);
 
     if (!s) {
         base_fail_nomem(err, "SSIM");
@@ -63,27 +65,14 @@ struct ggn_ssim *ggn_ssim_create(int h, int w, struct base_threads *threads, str
     s->threads = threads;
     s->h = h;
     s->w = w;
-    s->row = (w + 2 * BORDER + 15) / 16 * 16 + 16;
-    s->map = (size_t)s->row * (size_t)(h + 2 * GGN_SSIM_RADIUS + 2);
-    s->maps = calloc(workers * N_MAPS * s->map, sizeof *s->maps);
-    if (!s->maps) {
-        free(s);
-        base_fail_nomem(err, "SSIM");
-        return NULL;
-    }
+    s->row = row;
+    s->map = map;
     make_taps(s);
     return s;
 }
 
-void ggn_ssim_destroy(struct ggn_ssim *s)
-{
-    if (s)
-        free(s->maps);
-    free(s);
-}
-
 /* Element (0,0) of map m of a worker. */
-static real *map_of(const struct ggn_ssim *s, int worker, int m)
+static real *map_of(struct ggn_ssim *s, int worker, int m)
 {
     return s->maps + ((size_t)worker * N_MAPS + (size_t)m) * s->map + (size_t)(GGN_SSIM_RADIUS * s->row) + BORDER;
 }
@@ -101,7 +90,7 @@ static void blur_2d(const struct ggn_ssim *s, real *map, real *tmp)
         memcpy(map + (long)r * s->row, tmp + (long)r * s->row, (size_t)s->w * sizeof *map);
 }
 
-static void blur_in_place(const struct ggn_ssim *s, int worker, real *map)
+static void blur_in_place(struct ggn_ssim *s, int worker, real *map)
 {
     real *tmp = map_of(s, worker, TMP);
 
@@ -116,7 +105,7 @@ static void blur_in_place(const struct ggn_ssim *s, int worker, real *map)
 }
 
 /* One row: the SSIM of each pixel is A1·A2 / (B1·B2); the maps become ∂S/∂μx, ∂S/∂E[x²], ∂S/∂E[xy]. */
-static double ssim_row(const struct ggn_ssim *s, int worker, long at)
+static double ssim_row(struct ggn_ssim *s, int worker, long at)
 {
     real *mx = map_of(s, worker, X) + at, *my = map_of(s, worker, Y) + at, *exx = map_of(s, worker, XX) + at;
     real *eyy = map_of(s, worker, YY) + at, *exy = map_of(s, worker, XY) + at;

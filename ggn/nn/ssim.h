@@ -5,13 +5,15 @@
 #ifndef GGN_NN_SSIM_H
 #define GGN_NN_SSIM_H
 
+#include <stdlib.h>
+
 #include "base/threads.h"
 #include "nn/real.h"
 
 /* Memory for pictures up to h × w and up to `workers` threads; owned. One call at a time. */
 struct ggn_ssim;
 struct ggn_ssim *ggn_ssim_create(int h, int w, struct base_threads *threads, struct base_err *err);
-void ggn_ssim_destroy(struct ggn_ssim *ssim);
+static inline void ggn_ssim_destroy(struct ggn_ssim *ssim) { free(ssim); }
 
 /* The mean of SSIM over n planes of h × w: x[i] and y[i] point at element (0,0), rows are `row` apart. When dx is not NULL,
  * dx[i] (same layout) = grad_scale · d mean / d x[i]. */

@@ -19,19 +19,17 @@ static size_t padded(size_t n)
 struct ggn_weights *ggn_weights_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int flags,
                                        struct base_err *err)
 {
-    struct ggn_weights *w = calloc(1, sizeof *w);
     size_t learned = padded(graph->n_learned), stats = padded(graph->n_stats), pack = padded(graph->n_pack);
     const struct ggn_kernels *k = kernels ? kernels : ggn_kernels_best();
     size_t wino = k->wino ? 4 * pack : 0;
     size_t bytes = (learned + 2 * stats + (flags & GGN_WEIGHTS_BACKWARD ? 2 : 1) * (pack + wino)) * sizeof(real);
-    char *memory = w ? calloc(1, bytes + ALIGN) : NULL;
+    struct ggn_weights *w = calloc(1, sizeof *w + ALIGN + bytes);
 
-    if (!memory) {
-        free(w);
+    if (!w) {
         base_fail_nomem(err, "network weights");
         return NULL;
     }
-    w->memory = memory;
+    char *memory = (char *)(w + 1);
     w->graph = graph;
     w->kernels = k;
     w->params = (real *)(void *)(memory + (ALIGN - (size_t)memory % ALIGN) % ALIGN);
@@ -46,13 +44,6 @@ struct ggn_weights *ggn_weights_create(const struct ggn_graph *graph, const stru
     for (size_t i = 0; i < graph->n_stats; i++)
         w->var[i] = 1;
     return w;
-}
-
-void ggn_weights_destroy(struct ggn_weights *w)
-{
-    if (w)
-        free(w->memory);
-    free(w);
 }
 
 /* Box–Muller from two hashes. */

@@ -6,6 +6,8 @@
 #ifndef GGN_NN_WEIGHTS_H
 #define GGN_NN_WEIGHTS_H
 
+#include <stdlib.h>
+
 #include "base/threads.h"
 #include "nn/graph.h"
 #include "nn/kernels.h"
@@ -26,8 +28,7 @@ enum ggn_init {
 struct ggn_weights {
     const struct ggn_graph *graph;     /* borrows until destroy */
     const struct ggn_kernels *kernels; /* static */
-    void *memory;                      /* of all arrays; owns */
-    real *params;                      /* [n_learned]: parameters, then mean, then var */
+    real *params;                      /* behind this struct, as all arrays are; [n_learned]: parameters, mean, var */
     real *mean, *var;                  /* [n_stats] running statistics; inside params */
     real *pack, *pack_back;            /* [n_pack] for the forward and the backward pass; pack_back may be NULL */
     real *wino, *wino_back;            /* [4·n_pack] transformed for nn/winograd.h; NULL where it is not used */
@@ -38,7 +39,7 @@ struct ggn_weights {
  * `kernels` NULL = the best ones. NULL on failure. */
 struct ggn_weights *ggn_weights_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int flags,
                                        struct base_err *err);
-void ggn_weights_destroy(struct ggn_weights *weights);
+static inline void ggn_weights_destroy(struct ggn_weights *weights) { free(weights); }
 
 /* Fills params; the same seed gives the same numbers everywhere. Resets the running statistics. */
 void ggn_weights_init(struct ggn_weights *weights, enum ggn_init init, uint32_t seed);

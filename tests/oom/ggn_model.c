@@ -118,13 +118,13 @@ static void test_files(void **state)
 static void test_judge(void **state)
 {
     (void)state;
-    fail_each(judge, 10, 0);
+    fail_each(judge, 9, 0);
 }
 
 static void test_train(void **state)
 {
     (void)state;
-    fail_each(train, 25, 0);
+    fail_each(train, 11, 0);
 }
 
 static void test_baseline(void **state)
