@@ -271,7 +271,8 @@ static void extract_tile(struct ggn_baseline_reader *r, const uint8_t *rgb, doub
 void ggn_baseline_extract(struct ggn_baseline_reader *r, const uint8_t *rgb, int width, int height, double *features)
 {
     const struct ggn_baseline *b = r->b;
-    const size_t row = (size_t)b->width, values = 3 * row * (size_t)b->height;
+    const size_t plane = (size_t)b->width * (size_t)b->height, values = 3 * plane;
+    const struct ggn_value tile = {.h = b->height, .w = b->width, .row = b->width, .plane = plane};
     const int across = ggn_tile_count(width, b->width), n = tiles(b, width, height);
 
     if (width == b->width && height == b->height) {
@@ -279,8 +280,8 @@ void ggn_baseline_extract(struct ggn_baseline_reader *r, const uint8_t *rgb, int
         return;
     }
     for (int i = 0; i < n; i++, features += b->features) {
-        ggn_tile_load_u8(rgb, width, height, ggn_tile_start(width, b->width, i % across),
-                         ggn_tile_start(height, b->height, i / across), b->width, b->height, 1, r->tile, row, values / 3);
+        ggn_tile_load_u8(rgb, 3, width, height, ggn_tile_start(width, b->width, i % across),
+                         ggn_tile_start(height, b->height, i / across), 1, r->tile, &tile);
         for (size_t k = 0; k < values; k++)
             r->codes[k] = (uint8_t)r->tile[k];
         extract_tile(r, r->codes, features);

@@ -95,11 +95,9 @@ void ggn_inference_denoise(struct ggn_inference *j, const uint8_t *noisy, uint16
 
     for (int t = 0; t < nx * ny; t++) {
         int x0 = ggn_tile_start(width, in->w, t % nx), y0 = ggn_tile_start(height, in->h, t / nx);
-        ggn_tile_load_u8(noisy, width, height, x0, y0, in->w, in->h, (real)1 / 255,
-                         ggn_exec_plane(j->exec[GGN_NET_R], 0, 0, 0), (size_t)in->row, in->plane);
+        ggn_tile_load_u8(noisy, 3, width, height, x0, y0, (real)1 / 255, ggn_exec_plane(j->exec[GGN_NET_R], 0, 0, 0), in);
         forward(j, GGN_NET_R);
-        ggn_tile_store_u16(denoised, width, height, x0, y0, in->w, in->h, output_plane(j, GGN_NET_R), (size_t)out->row,
-                           out->plane);
+        ggn_tile_store_u16(denoised, width, height, x0, y0, output_plane(j, GGN_NET_R), out);
     }
 }
 
@@ -118,10 +116,10 @@ static void load_noise_map(struct ggn_inference *j, const uint8_t *noise_map, in
     real *plane = ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, 2), *flag = ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, 3);
 
     if (noise_map)
-        ggn_tile_load_plane(noise_map, width, height, x0, y0, to->w, to->h, GGN_NOISE_MAP_GAIN, plane, (size_t)to->row);
+        ggn_tile_load_u8(noise_map, 1, width, height, x0, y0, GGN_NOISE_MAP_GAIN, plane, to);
     else
-        ggn_tile_load_plane(&there[0], 1, 1, 0, 0, to->w, to->h, 1, plane, (size_t)to->row);
-    ggn_tile_load_plane(&there[noise_map != NULL], 1, 1, 0, 0, to->w, to->h, 1, flag, (size_t)to->row);
+        ggn_tile_load_u8(&there[0], 1, 1, 1, 0, 0, 1, plane, to);
+    ggn_tile_load_u8(&there[noise_map != NULL], 1, 1, 1, 0, 0, 1, flag, to);
 }
 
 static double tile_logit(struct ggn_inference *j, const uint8_t *const *noisy, const uint16_t *const *denoised,
@@ -130,12 +128,12 @@ static double tile_logit(struct ggn_inference *j, const uint8_t *const *noisy, c
     const struct ggn_value *in = input(j, GGN_NET_M);
 
     for (int k = 0; k < j->hyper.window; k++)
-        ggn_tile_load_u16(denoised[k], width, height, x0, y0, in->w, in->h, (real)1 / 65535,
-                          ggn_exec_plane(j->exec[GGN_NET_M], 0, 0, 3 * k), (size_t)in->row, in->plane);
+        ggn_tile_load_u16(denoised[k], 3, width, height, x0, y0, (real)1 / 65535,
+                          ggn_exec_plane(j->exec[GGN_NET_M], 0, 0, 3 * k), in);
     map_into(j, 0);
     for (int k = 0; k < j->hyper.window; k++)
-        ggn_tile_load_u8(noisy[k], width, height, x0, y0, in->w, in->h, (real)1 / 255,
-                         ggn_exec_plane(j->exec[GGN_NET_M], 0, 0, 3 * k), (size_t)in->row, in->plane);
+        ggn_tile_load_u8(noisy[k], 3, width, height, x0, y0, (real)1 / 255, ggn_exec_plane(j->exec[GGN_NET_M], 0, 0, 3 * k),
+                         in);
     map_into(j, 1);
     if (j->hyper.noise_map)
         load_noise_map(j, noise_map, width, height, x0, y0);

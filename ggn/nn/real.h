@@ -48,13 +48,9 @@ typedef double real;
 #define ggn_trainer_answers GGN_TYPED(ggn_trainer_answers)
 #define ggn_trainer_paper_step GGN_TYPED(ggn_trainer_paper_step)
 
-#define ggn_tile_count GGN_TYPED(ggn_tile_count)
-#define ggn_tile_start GGN_TYPED(ggn_tile_start)
 #define ggn_tile_load_u8 GGN_TYPED(ggn_tile_load_u8)
 #define ggn_tile_load_u16 GGN_TYPED(ggn_tile_load_u16)
-#define ggn_tile_load_plane GGN_TYPED(ggn_tile_load_plane)
 #define ggn_tile_store_u16 GGN_TYPED(ggn_tile_store_u16)
-#define ggn_fixed_is_finite GGN_TYPED(ggn_fixed_is_finite)
 #define ggn_inference_destroy GGN_TYPED(ggn_inference_destroy)
 #define ggn_inference_denoise GGN_TYPED(ggn_inference_denoise)
 #define ggn_inference_logit GGN_TYPED(ggn_inference_logit)

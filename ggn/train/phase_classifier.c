@@ -121,12 +121,12 @@ static void denoise_images(const struct ggn_session *s, struct ggn_exec *exec, s
     const size_t values = ggn_series_set_values(&s->set);
 
     for (int i = 0; i < count; i++)
-        ggn_tile_load_u8(c->noisy + (size_t)(first + i) * values, width, height, 0, 0, width, height, 1.0F / 255,
-                         ggn_exec_plane(exec, 0, i, 0), (size_t)in->row, in->plane);
+        ggn_tile_load_u8(c->noisy + (size_t)(first + i) * values, 3, width, height, 0, 0, 1.0F / 255,
+                         ggn_exec_plane(exec, 0, i, 0), in);
     ggn_exec_forward(exec, s->r, count, GGN_EVAL);
     for (int i = 0; i < count; i++)
-        ggn_tile_store_u16(c->denoised + (size_t)(first + i) * values, width, height, 0, 0, width, height,
-                           ggn_exec_output(exec, i, 0), (size_t)out->row, out->plane);
+        ggn_tile_store_u16(c->denoised + (size_t)(first + i) * values, width, height, 0, 0, ggn_exec_output(exec, i, 0),
+                           out);
 }
 
 static int denoise_series(const struct ggn_session *s, struct ggn_exec *exec, struct ggn_level_series *c,

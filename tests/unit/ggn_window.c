@@ -17,6 +17,8 @@
 #include "model/window.h"
 #include "nn/hash.h"
 
+static const struct ggn_value small = {.h = 5, .w = 8, .row = 8, .plane = 40};
+
 static void one_plane_is_cut_as_three(void **state)
 {
     uint8_t image[6] = {0, 1, 2, 3, 4, 5};
@@ -24,8 +26,8 @@ static void one_plane_is_cut_as_three(void **state)
     uint8_t thrice[18];
     for (int i = 0; i < 18; i++)
         thrice[i] = image[i % 6];
-    ggn_tile_load_plane(image, 3, 2, 0, 0, 8, 5, 3, tile, 8);
-    ggn_tile_load_u8(thrice, 3, 2, 0, 0, 8, 5, 3, three, 8, 40);
+    ggn_tile_load_u8(image, 1, 3, 2, 0, 0, 3, tile, &small);
+    ggn_tile_load_u8(thrice, 3, 3, 2, 0, 0, 3, three, &small);
     assert_memory_equal(tile, three + 80, sizeof tile);
     (void)state;
 }
@@ -45,7 +47,7 @@ static void tiles_cover_and_reflect(void **state)
     float tile[3 * 5 * 8];
     for (int i = 0; i < 18; i++)
         image[i] = (uint8_t)i;
-    ggn_tile_load_u8(image, 3, 2, 0, 0, 8, 5, 1, tile, 8, 40);
+    ggn_tile_load_u8(image, 3, 3, 2, 0, 0, 1, tile, &small);
     const float row[8] = {0, 1, 2, 2, 1, 0, 0, 1};
     const int rows[5] = {0, 3, 3, 0, 0};
     for (int c = 0; c < 3; c++)
@@ -55,13 +57,13 @@ static void tiles_cover_and_reflect(void **state)
     uint16_t back[18];
     for (int i = 0; i < 120; i++)
         tile[i] = i % 8 == 0 ? (float)NAN : (float)i / 119;
-    ggn_tile_store_u16(back, 3, 2, 0, 0, 8, 5, tile, 8, 40);
+    ggn_tile_store_u16(back, 3, 2, 0, 0, tile, &small);
     assert_int_equal(back[0], GGN_FIXED_NAN);
     assert_false(ggn_fixed_is_finite(back, 18));
     assert_int_equal(back[4], (int)(9.0 / 119 * 65535 + 0.5));
     for (int i = 0; i < 120; i++)
         tile[i] = 1;
-    ggn_tile_store_u16(back, 3, 2, 0, 0, 8, 5, tile, 8, 40);
+    ggn_tile_store_u16(back, 3, 2, 0, 0, tile, &small);
     assert_int_equal(back[0], GGN_FIXED_NAN - 1);
     assert_true(ggn_fixed_is_finite(back, 18));
     (void)state;
@@ -155,11 +157,13 @@ static void codes_are_those_of_the_pictures(void **state)
 static void tiles_begin_anywhere(void **state)
 {
     enum { W = 7, H = 5, TW = 4, TH = 3, ROW = 6, PLANE = 20 };
-    uint8_t small[3 * W * H];
+    const struct ggn_value tile = {.h = TH, .w = TW, .row = ROW, .plane = PLANE},
+                           line = {.h = 1, .w = 9, .row = 9, .plane = 9};
+    uint8_t bytes[3 * W * H];
     uint16_t wide[3 * W * H], back[3 * W * H];
 
     for (int i = 0; i < 3 * W * H; i++) {
-        small[i] = (uint8_t)(2 * i);
+        bytes[i] = (uint8_t)(2 * i);
         wide[i] = (uint16_t)(600 * i);
     }
     for (int x0 = 0; x0 < W; x0++)
@@ -167,8 +171,8 @@ static void tiles_begin_anywhere(void **state)
             float a[3 * PLANE], b[3 * PLANE];
             for (int i = 0; i < 3 * PLANE; i++)
                 a[i] = b[i] = -1;
-            ggn_tile_load_u8(small, W, H, x0, y0, TW, TH, 0.5f, a, ROW, PLANE);
-            ggn_tile_load_u16(wide, W, H, x0, y0, TW, TH, 1.0f / 65535, b, ROW, PLANE);
+            ggn_tile_load_u8(bytes, 3, W, H, x0, y0, 0.5f, a, &tile);
+            ggn_tile_load_u16(wide, 3, W, H, x0, y0, 1.0f / 65535, b, &tile);
             for (int i = 0; i < 3 * PLANE; i++) {
                 const int c = i / PLANE, y = i % PLANE / ROW, x = i % PLANE % ROW, u = x0 + x, v = y0 + y;
                 const int at = (c * H + (v < H ? v : 2 * H - 1 - v)) * W + (u < W ? u : 2 * W - 1 - u);
@@ -176,7 +180,7 @@ static void tiles_begin_anywhere(void **state)
                 assert_true(b[i] == (x < TW && y < TH ? (float)(600 * at) * (1.0f / 65535) : -1));
             }
             memset(back, 0, sizeof back);
-            ggn_tile_store_u16(back, W, H, x0, y0, TW, TH, b, ROW, PLANE);
+            ggn_tile_store_u16(back, W, H, x0, y0, b, &tile);
             for (int i = 0; i < 3 * W * H; i++) {
                 const int x = i % W - x0, y = i / W % H - y0;
                 assert_int_equal(back[i], x >= 0 && x < TW && y >= 0 && y < TH ? wide[i] : 0);
@@ -195,7 +199,7 @@ static void tiles_begin_anywhere(void **state)
     static const uint16_t codes[] = {0, 1, 2, 0, 65534, 65534, 65535, 65534, 0};
     float planes[27] = {0};
     memcpy(planes, v, sizeof v);
-    ggn_tile_store_u16(back, 9, 1, 0, 0, 9, 1, planes, 9, 9);
+    ggn_tile_store_u16(back, 9, 1, 0, 0, planes, &line);
     assert_memory_equal(back, codes, sizeof codes);
     (void)state;
 }
