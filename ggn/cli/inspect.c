@@ -51,9 +51,8 @@ static int print_model(const struct ggn_model *m, const struct ggn_container *c,
            1e-6 * 9.0 * (h->window + 1) * h->width *
                h->height, /* of 3 channels 8 bits noisy and 16 denoised, and a spare slot */
            1e-6 * (double)ggn_inference_bytes(m, 1));
-    printf("calibration  p = sigmoid(%g * %s + %g), stops below %g in %d checks in a row, spacing %g\n",
-           m->calibration.scale, h->reach > 0 ? "octaves" : "logit", m->calibration.shift, m->calibration.threshold,
-           m->calibration.consecutive, m->calibration.spacing);
+    printf("calibration  p = sigmoid(%g * %s + %g), stops below %g in %d checks in a row, spacing %g\n", m->policy.scale,
+           h->reach > 0 ? "octaves" : "logit", m->policy.shift, m->policy.threshold, m->policy.passes, m->policy.ratio);
     printf("file         %zu bytes, version %d, %d tensors\n", c->size, GGN_CONTAINER_VERSION, c->n_entries);
     printf("provenance   %s\n", provenance);
     cJSON_free(provenance);

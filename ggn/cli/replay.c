@@ -11,7 +11,6 @@
 #include "base/options.h"
 #include "baselines/learned.h"
 #include "cli/commands.h"
-#include "model/setting.h"
 #include "observer/observer.h"
 
 enum { MAX_FILES = 16, MAX_ADJUSTED = 8, USUAL_WINDOW = 6 };
@@ -130,7 +129,7 @@ static void warn_of_setting(const struct replay *r, int index, const struct ggn_
     if (ggn_setting_difference(&learned, &here, text, sizeof text))
         fprintf(stderr, "ggn replay: %s: the model is asked about what it has not learned: %s\n", path, text);
     for (int i = 0; i < s->n; i++)
-        if (ggn_setting_levels_differ(policy, s->series[i].spp, s->series[i].n_levels, &asked, &nearest)) {
+        if (ggn_policy_levels_differ(policy, s->series[i].spp, s->series[i].n_levels, &asked, &nearest)) {
             fprintf(stderr,
                     "ggn replay: %s: a host asks at %g samples, %s has %g next to it: other windows than a "
                     "host's are judged\n",

@@ -8,7 +8,8 @@
 #include "base/options.h"
 #include "model/measure.h"
 
-/* Hyper-parameters and calibration as tables, so that reading and writing cannot disagree. */
+/* Hyper-parameters and calibration as tables, so that reading and writing cannot disagree. spacing: 1 where levels are not
+ * told by a ratio. */
 static const struct {
     const char *name;
     size_t at;
@@ -20,10 +21,10 @@ static const struct {
     const char *name;
     size_t at;
     double min, max;
-} calibration_field[] = {{"scale", offsetof(struct ggn_calibration, scale), -1e6, 1e6},
-                         {"shift", offsetof(struct ggn_calibration, shift), -1e6, 1e6},
-                         {"threshold", offsetof(struct ggn_calibration, threshold), 0, 1},
-                         {"spacing", offsetof(struct ggn_calibration, spacing), 1, 16}};
+} calibration_field[] = {{"scale", offsetof(struct ggn_policy, scale), -1e6, 1e6},
+                         {"shift", offsetof(struct ggn_policy, shift), -1e6, 1e6},
+                         {"threshold", offsetof(struct ggn_policy, threshold), 0, 1},
+                         {"spacing", offsetof(struct ggn_policy, ratio), 1, 16}};
 
 enum {
     N_HYPER = sizeof hyper_field / sizeof hyper_field[0],
@@ -55,16 +56,16 @@ static int parse_root(const cJSON *root, struct ggn_description *d, struct base_
         rc = base_json_need_int(root, "scalars", 0, GGN_SCALARS, &d->hyper.scalars, err);
     for (size_t i = 0; i < N_CALIBRATION && !rc; i++)
         rc = base_json_need(calibration, calibration_field[i].name, calibration_field[i].min, calibration_field[i].max,
-                            (double *)(void *)((char *)&d->calibration + calibration_field[i].at), err);
+                            (double *)(void *)((char *)&d->policy + calibration_field[i].at), err);
     if (!rc)
-        rc = base_json_need_int(calibration, "consecutive", 1, 16, &d->calibration.consecutive, err);
+        rc = base_json_need_int(calibration, "consecutive", 1, 16, &d->policy.passes, err);
     return rc;
 }
 
 int ggn_description_parse(const char *json, struct ggn_description *out, struct base_err *err)
 {
     cJSON *root = cJSON_Parse(json);
-    struct ggn_description d = {0};
+    struct ggn_description d = {.policy = ggn_policy_default()};
 
     if (!root)
         return base_fail(err, BASE_EINVAL, "the description is not JSON");
@@ -101,8 +102,8 @@ static cJSON *to_json(const struct ggn_description *d, int *failed)
     cJSON *calibration = base_json_object(root, "calibration", failed);
     for (size_t i = 0; i < N_CALIBRATION; i++)
         base_json_number(calibration, calibration_field[i].name,
-                         *(const double *)(const void *)((const char *)&d->calibration + calibration_field[i].at), failed);
-    base_json_number(calibration, "consecutive", d->calibration.consecutive, failed);
+                         *(const double *)(const void *)((const char *)&d->policy + calibration_field[i].at), failed);
+    base_json_number(calibration, "consecutive", d->policy.passes, failed);
     base_json_item(root, "provenance", cJSON_Duplicate(d->provenance, 1), failed);
     return root;
 }

@@ -11,21 +11,11 @@
 #define GGN_MODEL_DESCRIPTION_H
 
 #include "model/networks.h"
-
-struct cJSON;
-
-struct ggn_calibration {
-    /* p = sigmoid(scale·logit + shift); 1 and 0 = not calibrated (Platt 1999). A residual model's logit is in octaves of
-     * noise over what is just visible: log2 of the law's error and the network's correction */
-    double scale, shift;
-    double threshold; /* a check votes for stopping when p < threshold; in (0, 1) */
-    int consecutive;  /* checks in a row that must vote so; 1..16 */
-    double spacing;   /* ratio of spp between consecutive images the model was trained on; 1..16 */
-};
+#include "model/policy.h"
 
 struct ggn_description {
     struct ggn_hyper hyper;
-    struct ggn_calibration calibration;
+    struct ggn_policy policy; /* "calibration": scale, shift, threshold, passes, ratio; the rest is default */
     struct cJSON *provenance; /* parse: the caller's to delete; print: borrows */
 };
 

@@ -14,7 +14,9 @@ struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct base_er
         return NULL;
     }
     m->hyper = *hyper;
-    m->calibration = (struct ggn_calibration){.scale = 1, .threshold = 0.5, .consecutive = 2, .spacing = 1.2};
+    m->policy = ggn_policy_default();
+    m->policy.ratio = 1.2;
+    m->policy.passes = 2;
     m->provenance = cJSON_CreateObject();
     int rc = m->provenance ? 0 : base_fail_nomem(err, "model");
     for (int net = 0; net < GGN_NETS && !rc; net++) {
@@ -130,7 +132,7 @@ static int from_container(const struct ggn_container *c, struct ggn_model **mode
         ggn_model_destroy(m);
         return rc;
     }
-    m->calibration = d.calibration;
+    m->policy = d.policy;
     cJSON_Delete(m->provenance);
     m->provenance = d.provenance;
     for (int net = 0; net < GGN_NETS; net++)
@@ -166,7 +168,7 @@ int ggn_model_save(const struct ggn_model *m, const char *path, enum ggn_type ty
     int rc = visit_all(&(struct visit){.to = &c, .type = type}, m, &count, err);
 
     if (!rc)
-        c.json = ggn_description_print(&(struct ggn_description){m->hyper, m->calibration, m->provenance});
+        c.json = ggn_description_print(&(struct ggn_description){m->hyper, m->policy, m->provenance});
     if (!rc && !c.json)
         rc = base_fail_nomem(err, "model file");
     if (!rc)

@@ -13,7 +13,7 @@
 
 struct ggn_model {
     struct ggn_hyper hyper;
-    struct ggn_calibration calibration;
+    struct ggn_policy policy; /* as ggn_description has it; ggn_policy_of tells the whole */
     struct ggn_graph graph[GGN_NETS];
     struct ggn_weights *weights[GGN_NETS]; /* owns */
     struct cJSON *provenance;              /* owns; a JSON object: data-set hash, code version, seed, metrics … */

@@ -2,9 +2,11 @@
 
 #include <cjson/cJSON.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/json.h"
+#include "model/model.h"
 #include "nn/loss.h"
 
 /* Every field with its range but passes, which is an integer. `own`: a model's calibration has no place for it. */
@@ -102,6 +104,41 @@ void ggn_policy_set_levels(struct ggn_policy *p, const double *spp, int n)
         p->level[i] = spp[i];
 }
 
+int ggn_policy_levels_differ(const struct ggn_policy *policy, const double *spp, int n, double *asked, double *nearest)
+{
+    int i = 0, differ = 0;
+
+    while (i < n && spp[i] < policy->first_spp)
+        i++;
+    while (i + 1 < n) {
+        const double next = ggn_policy_next(policy, spp[i]), step = next - spp[i];
+        int k = i + 1;
+        while (k + 1 < n && fabs(spp[k + 1] - next) <= fabs(spp[k] - next))
+            k++;
+        if (next < spp[n - 1] && fabs(spp[k] - next) >= fmax(0.5 * step, 1 + 1e-9) && differ++ == 0) {
+            *asked = next;
+            *nearest = spp[k];
+        }
+        i = k;
+    }
+    return differ > 1;
+}
+
+size_t ggn_setting_difference(const struct ggn_setting *learned, const struct ggn_setting *here, char *text, size_t room)
+{
+    static const char *const transfers[] = {"sRGB", "a gamma", "linear codes"};
+    size_t used = 0;
+
+    text[0] = '\0';
+    if (here->width != learned->width || here->height != learned->height)
+        used = (size_t)snprintf(text, room, "blocks of %dx%d pixels instead of %dx%d", here->width, here->height,
+                                learned->width, learned->height);
+    if (here->transfer != learned->transfer && used < room)
+        used += (size_t)snprintf(text + used, room - used, "%s%s instead of %s", used ? ", " : "", transfers[here->transfer],
+                                 transfers[learned->transfer]);
+    return used < room ? used : room - 1;
+}
+
 double ggn_policy_predict(const struct ggn_policy *policy, double p, double threshold, double spp)
 {
     if (!(policy->slope > 0) || !(p >= 0))
@@ -182,27 +219,16 @@ int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, str
     base_json_item(model->provenance, "policy", object, &failed);
     if (failed)
         return base_fail_nomem(err, "model policy");
-    model->calibration = (struct ggn_calibration){
-        .scale = policy->scale,
-        .shift = policy->shift,
-        .threshold = policy->threshold,
-        .consecutive = policy->passes,
-        .spacing = policy->ratio > 1 ? policy->ratio : 1,
-    };
+    model->policy = *policy;
+    model->policy.ratio = policy->ratio > 1 ? policy->ratio : 1;
+    model->policy.n_levels = 0;
     return 0;
 }
 
 int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct base_err *err)
 {
-    struct ggn_policy p = ggn_policy_default();
-    const struct ggn_calibration *c = &model->calibration;
+    struct ggn_policy p = model->policy;
     const cJSON *object = cJSON_GetObjectItemCaseSensitive(model->provenance, "policy");
-
-    p.scale = c->scale;
-    p.shift = c->shift;
-    p.threshold = c->threshold;
-    p.passes = c->consecutive;
-    p.ratio = c->spacing;
     int rc = get_fields(object, &p, 1, err);
     if (!rc)
         *policy = p;

@@ -4,7 +4,6 @@
 #include <dlfcn.h>
 #include <unistd.h>
 
-#include "model/setting.h"
 #include "plugin/translate.h"
 
 int gp_model_find(const char *name, const char *variable, char *path, size_t room)

@@ -87,10 +87,10 @@ static int write_card(const struct ggn_session *s, const struct ggn_model *model
     base_json_number(card, "k_r", s->hyper.k_r, &failed);
     base_json_number(card, "k_m", s->hyper.k_m, &failed);
     base_json_number(card, "k_d", s->hyper.k_d, &failed);
-    base_json_number(card, "scale", model->calibration.scale, &failed);
-    base_json_number(card, "shift", model->calibration.shift, &failed);
-    base_json_number(card, "threshold", model->calibration.threshold, &failed);
-    base_json_number(card, "consecutive", model->calibration.consecutive, &failed);
+    base_json_number(card, "scale", model->policy.scale, &failed);
+    base_json_number(card, "shift", model->policy.shift, &failed);
+    base_json_number(card, "threshold", model->policy.threshold, &failed);
+    base_json_number(card, "consecutive", model->policy.passes, &failed);
     base_json_number(card, "seconds_denoiser", floor(s->progress.seconds[0]), &failed);
     base_json_number(card, "seconds_judge", floor(s->progress.seconds[1]), &failed);
     snprintf(path, sizeof path, "%s.card.json", s->plan->out);

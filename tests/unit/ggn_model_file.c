@@ -38,7 +38,11 @@ static struct ggn_model *make(void)
     assert_non_null(m);
     for (int net = 0; net < GGN_NETS; net++)
         ggn_weights_init(m->weights[net], GGN_INIT_HASH, 5);
-    m->calibration = (struct ggn_calibration){1.5, -0.25, 0.3, 3, 1.25};
+    m->policy.scale = 1.5;
+    m->policy.shift = -0.25;
+    m->policy.threshold = 0.3;
+    m->policy.passes = 3;
+    m->policy.ratio = 1.25;
     assert_non_null(cJSON_AddStringToObject(m->provenance, "data", "0123abcd"));
     return m;
 }
@@ -64,7 +68,8 @@ static void test_round_trip(void **state)
         if (ggn_model_load(path, &got, &err))
             fail_msg("%s", err.text);
         assert_memory_equal(&got->hyper, &want->hyper, sizeof want->hyper);
-        assert_memory_equal(&got->calibration, &want->calibration, sizeof want->calibration);
+        assert_true(got->policy.scale == 1.5 && got->policy.shift == -0.25 && got->policy.threshold == 0.3);
+        assert_true(got->policy.passes == 3 && got->policy.ratio == 1.25 && got->policy.first_spp == 20);
         assert_string_equal(cJSON_GetObjectItem(got->provenance, "data")->valuestring, "0123abcd");
         for (int net = 0; net < GGN_NETS; net++) {
             for (size_t i = 0; i < want->graph[net].n_params; i++) {
@@ -559,8 +564,8 @@ static void test_descriptions(void **state)
     assert_int_equal(ggn_description_parse(described, &d, NULL), 0);
     assert_true(d.hyper.preset == GGN_PRESET_LULL && d.hyper.height == 16 && d.hyper.width == 17 && d.hyper.window == 2);
     assert_true(d.hyper.k_r == 3 && d.hyper.k_m == 4 && d.hyper.k_d == 5 && d.hyper.noise_map == 1);
-    assert_true(d.calibration.scale == 2 && d.calibration.shift == -1 && d.calibration.threshold == 0.25);
-    assert_true(d.calibration.spacing == 1.5 && d.calibration.consecutive == 3);
+    assert_true(d.policy.scale == 2 && d.policy.shift == -1 && d.policy.threshold == 0.25);
+    assert_true(d.policy.ratio == 1.5 && d.policy.passes == 3);
     char *text = ggn_description_print(&d), *flat = calloc(strlen(text) + 1, 1);
     for (char *from = text, *to = flat; *from; from++)
         if (!strchr("\n\t ", *from))

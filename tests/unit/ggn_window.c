@@ -12,7 +12,7 @@
 
 #include "sequence/tail.h"
 #include "model/policy.h"
-#include "model/setting.h"
+#include "model/model.h"
 #include "base/colour.h"
 #include "model/window.h"
 #include "nn/hash.h"
@@ -361,12 +361,12 @@ static void settings_are_compared(void **state)
     assert_string_equal(text, "blocks of 200x200 pixels instead of 64x32, sRGB instead of linear codes");
     p.first_spp = 16;
     p.ratio = 1.14;
-    assert_true(ggn_setting_levels_differ(&p, even, 6, &asked, &nearest) && asked == 18 && nearest == 32);
-    assert_false(ggn_setting_levels_differ(&p, geometric, 6, &asked, &nearest));
+    assert_true(ggn_policy_levels_differ(&p, even, 6, &asked, &nearest) && asked == 18 && nearest == 32);
+    assert_false(ggn_policy_levels_differ(&p, geometric, 6, &asked, &nearest));
     memcpy(p.level, even, sizeof even);
     p.n_levels = 6;
-    assert_false(ggn_setting_levels_differ(&p, even, 6, &asked, &nearest));
-    assert_true(ggn_setting_levels_differ(&p, geometric, 6, &asked, &nearest) == 0); /* its last level is before the next */
+    assert_false(ggn_policy_levels_differ(&p, even, 6, &asked, &nearest));
+    assert_true(ggn_policy_levels_differ(&p, geometric, 6, &asked, &nearest) == 0); /* its last level is before the next */
     (void)state;
 }
 
@@ -416,16 +416,16 @@ static void policies_of_models(void **state)
     struct ggn_model *m = ggn_model_create(&hyper, NULL);
 
     assert_non_null(m);
-    assert_true(m->calibration.scale == 1 && m->calibration.shift == 0 && m->calibration.threshold == 0.5);
-    assert_true(m->calibration.consecutive == 2 && m->calibration.spacing == 1.2);
+    assert_true(m->policy.scale == 1 && m->policy.shift == 0 && m->policy.threshold == 0.5);
+    assert_true(m->policy.passes == 2 && m->policy.ratio == 1.2);
     assert_int_equal(ggn_policy_of(m, &q, NULL), 0);
     assert_true(q.first_spp == 20 && q.ratio == 1.2 && q.threshold == 0.5 && q.passes == 2 && q.scale == 1);
     for (int twice = 0; twice < 2; twice++) {
         assert_int_equal(ggn_policy_set(m, &p, NULL), 0);
         assert_int_equal(cJSON_GetArraySize(m->provenance), 1);
     }
-    assert_true(m->calibration.scale == 2 && m->calibration.shift == -1 && m->calibration.threshold == 0.25);
-    assert_true(m->calibration.consecutive == 3 && m->calibration.spacing == 1);
+    assert_true(m->policy.scale == 2 && m->policy.shift == -1 && m->policy.threshold == 0.25);
+    assert_true(m->policy.passes == 3 && m->policy.ratio == 1);
     char *text = cJSON_PrintUnformatted(m->provenance);
     assert_string_equal(text, "{\"policy\":{\"first_spp\":12,\"ratio\":0,\"step_spp\":3,\"slope\":4}}");
     free(text);
@@ -433,8 +433,8 @@ static void policies_of_models(void **state)
     same_policy(&p, &q);
     p.ratio = 1.5;
     assert_int_equal(ggn_policy_set(m, &p, NULL), 0);
-    assert_true(m->calibration.spacing == 1.5);
-    m->calibration.threshold = 2;
+    assert_true(m->policy.ratio == 1.5);
+    m->policy.threshold = 2;
     assert_int_equal(ggn_policy_of(m, &q, NULL), BASE_EINVAL);
     ggn_model_destroy(m);
     (void)state;
