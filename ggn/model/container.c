@@ -191,8 +191,7 @@ static int read_entry(struct ggn_entry *e, const unsigned char *p, size_t size, 
     return 0;
 }
 
-/* Takes over c->data, c->size. */
-static int parse_owned(struct ggn_container *c, const char *name, struct base_err *err)
+static int parse(struct ggn_container *c, const char *name, struct base_err *err)
 {
     const unsigned char *p = (const unsigned char *)c->data;
     int rc = check_header(p, c->size, name, err);
@@ -212,15 +211,10 @@ static int parse_owned(struct ggn_container *c, const char *name, struct base_er
     return rc;
 }
 
-int ggn_container_parse(struct ggn_container *c, const char *name, const void *data, size_t size, struct base_err *err)
+int ggn_container_parse(struct ggn_container *c, const char *name, char *data, size_t size, struct base_err *err)
 {
-    memset(c, 0, sizeof *c);
-    c->data = malloc(size + 1);
-    if (!c->data)
-        return base_fail_nomem(err, "model file");
-    memcpy(c->data, data, size);
-    c->size = size;
-    int rc = parse_owned(c, name, err);
+    *c = (struct ggn_container){.data = data, .size = size};
+    int rc = parse(c, name, err);
     if (rc)
         ggn_container_release(c);
     return rc;
@@ -228,13 +222,9 @@ int ggn_container_parse(struct ggn_container *c, const char *name, const void *d
 
 int ggn_container_read(struct ggn_container *c, const char *path, struct base_err *err)
 {
-    memset(c, 0, sizeof *c);
+    *c = (struct ggn_container){0};
     int rc = base_file_read(path, (size_t)MAX_FILE, &c->data, &c->size, err);
-    if (!rc)
-        rc = parse_owned(c, path, err);
-    if (rc)
-        ggn_container_release(c);
-    return rc;
+    return rc ? rc : ggn_container_parse(c, path, c->data, c->size, err);
 }
 
 int ggn_container_get(const struct ggn_container *c, const char *name, int rank, const int *dim, float *out,

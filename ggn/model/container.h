@@ -61,8 +61,8 @@ int ggn_container_write(struct ggn_container *c, const char *path, struct base_e
 
 /* Reads and checks a file. On failure *c is empty and err names the file. */
 int ggn_container_read(struct ggn_container *c, const char *path, struct base_err *err);
-/* The same from memory (copied). `name` is for messages. */
-int ggn_container_parse(struct ggn_container *c, const char *name, const void *data, size_t size, struct base_err *err);
+/* The same from malloc'ed memory, which it owns from here on, also on failure. `name` is for messages. */
+int ggn_container_parse(struct ggn_container *c, const char *name, char *data, size_t size, struct base_err *err);
 /* Decodes the named tensor of exactly this shape into out; BASE_EINVAL when it is missing, shaped otherwise, not finite. */
 int ggn_container_get(const struct ggn_container *c, const char *name, int rank, const int *dim, float *out,
                       struct base_err *err);

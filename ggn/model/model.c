@@ -5,9 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct base_err *err)
+/* most: of the parameters, which must fit into a file before memory is asked for them. */
+static struct ggn_model *create(const struct ggn_hyper *hyper, size_t most, struct base_err *err)
 {
     struct ggn_model *m = calloc(1, sizeof *m);
+    size_t params = 0;
 
     if (!m) {
         base_fail_nomem(err, "model");
@@ -21,13 +23,22 @@ struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct base_er
     int rc = m->provenance ? 0 : base_fail_nomem(err, "model");
     for (int net = 0; net < GGN_NETS && !rc; net++) {
         rc = ggn_network_build(&m->graph[net], net, hyper, err);
-        if (!rc && !(m->weights[net] = ggn_weights_create(&m->graph[net], NULL, 0, err)))
-            rc = BASE_ENOMEM;
+        params += m->graph[net].n_params;
     }
+    if (!rc && params > most)
+        rc = base_fail(err, BASE_EINVAL, "the file is too small for networks of this size");
+    for (int net = 0; net < GGN_NETS && !rc; net++)
+        if (!(m->weights[net] = ggn_weights_create(&m->graph[net], NULL, 0, err)))
+            rc = BASE_ENOMEM;
     if (!rc)
         return m;
     ggn_model_destroy(m);
     return NULL;
+}
+
+struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct base_err *err)
+{
+    return create(hyper, SIZE_MAX, err);
 }
 
 void ggn_model_destroy(struct ggn_model *m)
@@ -89,25 +100,6 @@ static int check_statistics(const struct ggn_model *m, struct base_err *err)
     return 0;
 }
 
-/* The parameters must fit into the file before memory is asked for them. */
-static int check_size(const struct ggn_hyper *hyper, const struct ggn_container *c, struct base_err *err)
-{
-    struct ggn_graph *g = malloc(sizeof *g);
-    size_t params = 0;
-
-    if (!g)
-        return base_fail_nomem(err, "model");
-    int rc = 0;
-    for (int net = 0; net < GGN_NETS && !rc; net++) {
-        rc = ggn_network_build(g, net, hyper, err);
-        params += g->n_params;
-    }
-    free(g);
-    if (!rc && params * 2 > c->size)
-        rc = base_fail(err, BASE_EINVAL, "the file is too small for networks of this size");
-    return rc;
-}
-
 static int from_container(const struct ggn_container *c, struct ggn_model **model, struct base_err *err)
 {
     struct ggn_description d = {0};
@@ -115,12 +107,8 @@ static int from_container(const struct ggn_container *c, struct ggn_model **mode
     int count = 0;
     int rc = ggn_description_parse(c->json, &d, err);
 
-    if (!rc)
-        rc = ggn_hyper_check(&d.hyper, err);
-    if (!rc)
-        rc = check_size(&d.hyper, c, err);
-    if (!rc && !(m = ggn_model_create(&d.hyper, err)))
-        rc = BASE_ENOMEM;
+    if (!rc && !(m = create(&d.hyper, c->size / 2, err)))
+        rc = err->code;
     if (!rc)
         rc = visit_all(&(struct visit){.from = c}, m, &count, err);
     if (!rc && count != c->n_entries)

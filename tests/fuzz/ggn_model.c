@@ -93,7 +93,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     for (int mended = 0; mended < 2; mended++) {
         if (mended && size >= 64)
             mend(copy, size);
-        if (ggn_container_parse(&c, "fuzz", copy, size, NULL))
+        char *file = malloc(size + 1);
+        if (file)
+            memcpy(file, copy, size);
+        if (!file || ggn_container_parse(&c, "fuzz", file, size, NULL))
             continue;
         if (ggn_model_parse(&c, "fuzz", &m, NULL) == 0) {
             if (m->hyper.height * m->hyper.width <= 64 * 64)

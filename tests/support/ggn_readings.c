@@ -48,7 +48,6 @@ static double read_model(char *bytes, size_t size, size_t items)
     (void)items;
     ggn_container_release(&c);
     ggn_model_destroy(m);
-    free(bytes);
     return s;
 }
 
