@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "nn/hash.h"
 #include "nn/loss.h"
 #include "nn/ssim.h"
 #include "nn/real.h"
@@ -13,39 +14,51 @@ enum { SIDE = 200, AREA = SIDE * SIDE, IMAGES = 6, PLANES = 3 * IMAGES, W_COUNT 
 struct state {
     struct ggn_trainer *t;
     struct ggn_exec *r, *m, *d; /* evaluation, every value kept */
-    real *noisy, *reference;    /* [W][18][AREA], [W][3][AREA] */
+    real *pixels;               /* [W][18 noisy and 3 of the reference][AREA] */
     const real *noisy_plane[W_COUNT * PLANES], *reference_plane[W_COUNT * 3];
 };
 
 struct moments {
-    double sum, sum_sq, count;
+    double mean, std, rms;
 };
 
-static void add_plane(struct moments *m, const real *x, const struct ggn_value *v)
+/* Of all planes of a value of images [first, end). */
+static struct moments moments_of(const struct ggn_exec *e, int value, int first, int end)
 {
-    for (int y = 0; y < v->h; y++)
-        for (int i = 0; i < v->w; i++) {
-            double p = (double)x[(long)y * v->row + i];
-            m->sum += p;
-            m->sum_sq += p * p;
-            m->count++;
-        }
+    const struct ggn_value *v = &e->graph->value[value];
+    double sum = 0, sum_sq = 0, count = (double)(end - first) * v->c * v->h * v->w;
+
+    for (int k = first * v->c; k < end * v->c; k++)
+        for (int y = 0; y < v->h; y++)
+            for (int x = 0; x < v->w; x++) {
+                double p = (double)ggn_exec_plane(e, value, k / v->c, k % v->c)[(long)y * v->row + x];
+                sum += p;
+                sum_sq += p * p;
+            }
+    const double mean = sum / count, square = sum_sq / count;
+    return (struct moments){mean, sqrt(square - mean * mean), sqrt(square)};
 }
 
-static double mean_of(const struct moments *m) { return m->sum / m->count; }
+double ggn_golden_pixel(int w, int i, int c, int y, int x)
+{
+    double v = 0.5 + 0.4 * sin((0.02 + 0.01 * w) * x + (0.03 + 0.02 * w) * y + c + w);
 
-static double std_of(const struct moments *m) { return sqrt(m->sum_sq / m->count - mean_of(m) * mean_of(m)); }
+    if (i >= 0) {
+        double u = ggn_hash_unit((uint32_t)(c * 40000 + 200 * y + x), (uint32_t)(1000 * (w + 1) + i));
+        v += 0.3 / ((1 + w) * (i + 1)) * (2 * u - 1);
+    }
+    return fmin(fmax(v, 0), 1);
+}
 
 static void fill_windows(struct state *s)
 {
+    real *plane = s->pixels;
+
     for (int w = 0; w < W_COUNT; w++)
-        for (int c = 0; c < PLANES + 3; c++) {
-            int reference = c >= PLANES;
-            real *plane =
-                reference ? s->reference + (size_t)(w * 3 + c - PLANES) * AREA : s->noisy + (size_t)(w * PLANES + c) * AREA;
+        for (int c = 0; c < PLANES + 3; c++, plane += AREA) {
+            const int reference = c >= PLANES;
             for (int k = 0; k < AREA; k++)
-                plane[k] =
-                    (real)ggn_golden_pixel(w, reference ? -1 : c / 3, reference ? c - PLANES : c % 3, k / SIDE, k % SIDE);
+                plane[k] = (real)ggn_golden_pixel(w, reference ? -1 : c / 3, c % 3, k / SIDE, k % SIDE);
             *(reference ? &s->reference_plane[w * 3 + c - PLANES] : &s->noisy_plane[w * PLANES + c]) = plane;
         }
 }
@@ -59,9 +72,8 @@ static int setup(struct state *s, const struct ggn_golden_seeds *seeds, int trai
     options.parts = train_step ? GGN_TRAIN_ALL : 0;
     options.batch = W_COUNT;
     options.dropout = 0;
-    s->noisy = malloc((size_t)W_COUNT * PLANES * AREA * sizeof *s->noisy);
-    s->reference = malloc((size_t)W_COUNT * 3 * AREA * sizeof *s->reference);
-    if (!s->noisy || !s->reference)
+    s->pixels = malloc((size_t)W_COUNT * (PLANES + 3) * AREA * sizeof *s->pixels);
+    if (!s->pixels)
         return base_fail_nomem(err, "golden windows");
     s->t = ggn_trainer_create(&hyper, &options, threads, err);
     if (!s->t)
@@ -82,8 +94,7 @@ static void release(struct state *s)
     ggn_exec_destroy(s->r);
     ggn_exec_destroy(s->m);
     ggn_exec_destroy(s->d);
-    free(s->noisy);
-    free(s->reference);
+    free(s->pixels);
 }
 
 static double value_at(const struct ggn_exec *e, int n, int c, int y, int x)
@@ -93,16 +104,11 @@ static double value_at(const struct ggn_exec *e, int n, int c, int y, int x)
 
 static void record_stages(const struct ggn_exec *e, struct ggn_golden *out)
 {
-    for (int i = 0; i < e->graph->n_values; i++) {
-        const struct ggn_value *v = &e->graph->value[i];
-        struct moments m = {0};
-        for (int c = 0; v->stage && c < v->c; c++)
-            add_plane(&m, ggn_exec_plane(e, i, 0, c), v);
-        if (v->stage && out->n_stages < GGN_GOLDEN_STAGES) {
-            out->stage[out->n_stages].name = v->stage;
-            out->stage[out->n_stages++].rms = sqrt(m.sum_sq / m.count);
+    for (int i = 0; i < e->graph->n_values; i++)
+        if (e->graph->value[i].stage && out->n_stages < GGN_GOLDEN_STAGES) {
+            out->stage[out->n_stages].name = e->graph->value[i].stage;
+            out->stage[out->n_stages++].rms = moments_of(e, i, 0, 1).rms;
         }
-    }
 }
 
 /* All three networks on window w, as one decision without a history. */
@@ -127,53 +133,43 @@ static void evaluate_window(struct state *s, int w)
 /* Everything that is reported about window 0. */
 static int record_window0(struct state *s, struct ggn_golden *out, struct base_err *err)
 {
-    const struct ggn_value *r = ggn_graph_output(s->r->graph), *m = ggn_graph_output(s->m->graph);
-    const struct ggn_value plain = {.h = SIDE, .w = SIDE, .row = SIDE};
-    struct moments x = {0}, denoised = {0}, noisy_map = {0}, denoised_map = {0};
+    const int r = s->r->graph->n_values - 1, m = s->m->graph->n_values - 1;
+    const struct moments x = moments_of(s->r, 0, 0, IMAGES), denoised = moments_of(s->r, r, 0, IMAGES);
+    const struct moments denoised_map = moments_of(s->m, m, 0, 1), noisy_map = moments_of(s->m, m, 1, 2);
     struct ggn_ssim *ssim = ggn_ssim_create(SIDE, SIDE, NULL, err);
     static const int image[3] = {0, 2, 5};
+    const real *reference[3], *denoised0[3];
 
     if (!ssim)
         return BASE_ENOMEM;
-    for (int k = 0; k < PLANES; k++) {
-        add_plane(&x, s->noisy_plane[k], &plain);
-        add_plane(&denoised, ggn_exec_output(s->r, k / 3, k % 3), r);
-    }
-    add_plane(&denoised_map, ggn_exec_output(s->m, 0, 0), m);
-    add_plane(&noisy_map, ggn_exec_output(s->m, 1, 0), m);
     out->x_first = (double)s->noisy_plane[0][0];
     out->x_last = (double)s->noisy_plane[PLANES - 1][AREA - 1];
-    out->x_mean = mean_of(&x);
-    out->denoiser_mean = mean_of(&denoised);
-    out->denoiser_std = std_of(&denoised);
+    out->x_mean = x.mean;
+    out->denoiser_mean = denoised.mean;
+    out->denoiser_std = denoised.std;
     out->denoiser_at[0] = value_at(s->r, 0, 0, 0, 0);
     out->denoiser_at[1] = value_at(s->r, 0, 0, 100, 100);
     out->denoiser_at[2] = value_at(s->r, IMAGES - 1, 2, SIDE - 1, SIDE - 1);
-    out->generator_noisy_mean = mean_of(&noisy_map);
-    out->generator_noisy_std = std_of(&noisy_map);
+    out->generator_noisy_mean = noisy_map.mean;
+    out->generator_noisy_std = noisy_map.std;
     for (int i = 0; i < 3; i++)
         out->generator_noisy_at[i] = value_at(s->m, 1, 0, i * 100 - (i == 2), i * 100 - (i == 2));
-    out->generator_denoised_mean = mean_of(&denoised_map);
-    out->generator_denoised_std = std_of(&denoised_map);
+    out->generator_denoised_mean = denoised_map.mean;
+    out->generator_denoised_std = denoised_map.std;
     out->generator_denoised_at = value_at(s->m, 0, 0, 0, 0);
     record_stages(s->r, out);
     record_stages(s->d, out);
     for (int i = 0; i < 3; i++)
         out->ssim[i] = ggn_ssim_mean(ssim, s->noisy_plane + 3 * image[i], s->reference_plane, NULL, 3, SIDE, 0);
-    /* The denoiser's rows are padded for vector loads, and both pictures of one SSIM have rows of one length. */
-    real *padded = calloc((size_t)3 * SIDE * (size_t)r->row, sizeof *padded);
-    if (padded) {
-        const real *reference[3], *denoised0[3];
-        for (int c = 0; c < 3; c++) {
-            ggn_plane_copy(r, padded + (size_t)c * SIDE * (size_t)r->row, s->reference_plane[c], SIDE);
-            reference[c] = padded + (size_t)c * SIDE * (size_t)r->row;
-            denoised0[c] = ggn_exec_output(s->r, 0, c);
-        }
-        out->ssim[3] = ggn_ssim_mean(ssim, denoised0, reference, NULL, 3, r->row, 0);
+    /* Both pictures of one SSIM have rows of one length: the reference takes the place of an input that is done with. */
+    for (int c = 0; c < 3; c++) {
+        ggn_exec_load(s->r, 0, c, s->reference_plane[c], SIDE);
+        reference[c] = ggn_exec_plane(s->r, 0, 0, c);
+        denoised0[c] = ggn_exec_output(s->r, 0, c);
     }
+    out->ssim[3] = ggn_ssim_mean(ssim, denoised0, reference, NULL, 3, ggn_graph_output(s->r->graph)->row, 0);
     ggn_ssim_destroy(ssim);
-    free(padded);
-    return padded ? 0 : base_fail_nomem(err, "golden SSIM");
+    return 0;
 }
 
 static double sum_of(const real *x, size_t n)

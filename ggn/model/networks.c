@@ -39,31 +39,24 @@ int ggn_hyper_check(const struct ggn_hyper *p, struct base_err *err)
 static const char *const enc_name[5] = {"enc0", "enc1", "enc2", "enc3", "enc4"};
 static const char *const dec_name[5] = {"dec0", "dec1", "dec2", "dec3", "dec4"};
 
-/* Conv → LReLU → Conv → LReLU, with MaxPool first and BN between from stage 1 on (both networks' encoders). */
-static int encoder_stage(struct ggn_graph *g, int x, int stage, int width)
-{
-    ggn_graph_stage(g, enc_name[stage]);
-    if (stage)
-        x = ggn_graph_maxpool(g, x, 2);
-    x = ggn_graph_conv(g, x, -1, width << stage, 3, 0, SLOPE);
-    if (stage)
-        x = ggn_graph_bn(g, x);
-    x = ggn_graph_conv(g, x, -1, width << stage, 3, 0, SLOPE);
-    ggn_graph_mark(g, x, enc_name[stage]);
-    return x;
-}
-
-/* The encoder of both networks, up to the first convolution of its last stage. stages: [4] get the values before it. */
+/* The encoder of both networks, up to the first convolution of its last stage. A stage is Conv → LReLU → Conv → LReLU, with
+ * MaxPool first and BN between from stage 1 on. stages: [4] get the values before the last. */
 static int encode(struct ggn_graph *g, int width, int stages[4])
 {
     int x = 0;
 
-    for (int i = 0; i < 4; i++)
-        x = stages[i] = encoder_stage(g, x, i, width);
-    ggn_graph_stage(g, enc_name[4]);
-    x = ggn_graph_maxpool(g, x, 2);
-    x = ggn_graph_conv(g, x, -1, 16 * width, 3, 0, SLOPE);
-    return ggn_graph_bn(g, x);
+    for (int i = 0;; i++) {
+        ggn_graph_stage(g, enc_name[i]);
+        if (i)
+            x = ggn_graph_maxpool(g, x, 2);
+        x = ggn_graph_conv(g, x, -1, width << i, 3, 0, SLOPE);
+        if (i)
+            x = ggn_graph_bn(g, x);
+        if (i == 4)
+            return x;
+        x = stages[i] = ggn_graph_conv(g, x, -1, width << i, 3, 0, SLOPE);
+        ggn_graph_mark(g, x, enc_name[i]);
+    }
 }
 
 /* Up to the size of value `like`: one zero row or column where that size is odd. */

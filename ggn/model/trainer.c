@@ -12,6 +12,26 @@
 
 enum { N_STATE = 5 };
 
+struct ggn_train_options ggn_train_options_default(enum ggn_preset preset)
+{
+    int lull = preset == GGN_PRESET_LULL;
+    enum ggn_init plain = lull ? GGN_INIT_HE : GGN_INIT_PAPER;
+
+    return (struct ggn_train_options){
+        .parts = GGN_TRAIN_ALL,
+        .batch = lull ? 16 : 64,
+        .lr = {2e-4, 2e-4, 2e-4},
+        .beta1 = 0.5,
+        .beta2 = 0.999,
+        .eps = 1e-8,
+        .clip = lull ? 1 : 0,
+        .explode = 1e6,
+        .dropout = 1,
+        .init = {plain, plain, lull ? GGN_INIT_HE : GGN_INIT_GAN},
+        .seed = 1,
+    };
+}
+
 static int part_of(int net) { return net == GGN_NET_R ? GGN_TRAIN_R : GGN_TRAIN_MD; }
 
 real *ggn_trainer_state(struct ggn_trainer *t, int net, int i, size_t *count)
@@ -73,12 +93,14 @@ static int create_net(struct ggn_trainer *t, int net, struct base_err *err)
     ggn_weights_pack(t->weights[net], NULL);
     if (!trained)
         return 0;
-    size_t n = t->graph[net].n_params;
-    t->grad[net] = calloc(n, sizeof(real));
-    t->adam_m[net] = calloc(n, sizeof(real));
-    t->adam_v[net] = calloc(n, sizeof(real));
-    t->good[net] = calloc(3 * n + 2 * t->graph[net].n_stats, sizeof(real));
-    return t->grad[net] && t->adam_m[net] && t->adam_v[net] && t->good[net] ? 0 : base_fail_nomem(err, "optimiser");
+    const size_t n = t->graph[net].n_params;
+    t->grad[net] = calloc(5 * n + t->graph[net].n_learned, sizeof(real));
+    if (!t->grad[net])
+        return base_fail_nomem(err, "optimiser");
+    t->adam_m[net] = t->grad[net] + n;
+    t->adam_v[net] = t->adam_m[net] + n;
+    t->good[net] = t->adam_v[net] + n;
+    return 0;
 }
 
 static int create_execs(struct ggn_trainer *t, struct base_err *err)
@@ -142,9 +164,6 @@ void ggn_trainer_destroy(struct ggn_trainer *t)
     for (int net = 0; net < GGN_NETS; net++) {
         ggn_weights_destroy(t->weights[net]);
         free(t->grad[net]);
-        free(t->adam_m[net]);
-        free(t->adam_v[net]);
-        free(t->good[net]);
     }
     ggn_exec_destroy(t->r);
     ggn_exec_destroy(t->m);
@@ -210,11 +229,14 @@ static int update(struct ggn_trainer *t, int net, size_t n, struct base_err *err
     return 0;
 }
 
-/* Copies `n` gap-free planes into the first channels of image i of the executor's input. */
-static void set_input(const struct ggn_exec *e, int i, const real *const *planes, int n)
+/* Gap-free planes into the input of image step · i + first of the executor, i < count; those of image i at planes[i·stride]. */
+static void set_inputs(const struct ggn_exec *e, int step, int first, const real *const *planes, int stride, int count)
 {
-    for (int c = 0; c < n; c++)
-        ggn_exec_load(e, i, c, planes[c], e->graph->value[0].w);
+    const struct ggn_value *v = &e->graph->value[0];
+
+    for (int i = 0; i < count; i++)
+        for (int c = 0; c < v->c; c++)
+            ggn_exec_load(e, step * i + first, c, planes[(size_t)i * (size_t)stride + (size_t)c], v->w);
 }
 
 /* SSIM of R's answer to image i and its reference, of three planes; back: `share` of its gradient into R's output. */
@@ -240,8 +262,7 @@ static double denoised_ssim(struct ggn_trainer *t, int i, const real *const *ref
 static int denoiser_forward(struct ggn_trainer *t, const real *const *x, int x_stride, const real *const *reference,
                             int count, double *loss, struct base_err *err)
 {
-    for (int i = 0; i < count; i++)
-        set_input(t->r, i, x + (size_t)i * (size_t)x_stride, 3);
+    set_inputs(t->r, 1, 0, x, x_stride, count);
     ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_TRAIN);
     double total = 0;
     for (int i = 0; i < count; i++)
@@ -285,8 +306,7 @@ int ggn_trainer_denoiser_step(struct ggn_trainer *t, const real *const *x, const
 void ggn_trainer_denoiser_losses(struct ggn_trainer *t, const real *const *x, const real *const *reference, int count,
                                  double *loss)
 {
-    for (int i = 0; i < count; i++)
-        set_input(t->r, i, x + 3 * i, 3);
+    set_inputs(t->r, 1, 0, x, 3, count);
     ggn_exec_forward(t->r, t->weights[GGN_NET_R], count, GGN_EVAL);
     for (int i = 0; i < count; i++)
         loss[i] = 1 - denoised_ssim(t, i, reference + 3 * i, 0, 0);
@@ -298,8 +318,10 @@ struct maps {
     int step, first;
 };
 
-/* D's input (NFM of denoised, NFM of noisy) from generator outputs, or back for the gradients. */
-static void exchange_maps(struct ggn_trainer *t, const struct maps of[2], int count, int back)
+/* D's input (NFM of denoised, NFM of noisy) from generator outputs; or `back` with the gradients, which with `add` are added
+ * to those of the maps: between two backward passes of D, M is the same, so that both can go back through it at once:
+ * Jᵀg + Jᵀg' = Jᵀ(g + g'). */
+static void exchange_maps(struct ggn_trainer *t, const struct maps of[2], int count, int back, int add)
 {
     const int out = t->graph[GGN_NET_M].n_values - 1;
     const struct ggn_value *v = &t->graph[GGN_NET_M].value[out];
@@ -307,10 +329,15 @@ static void exchange_maps(struct ggn_trainer *t, const struct maps of[2], int co
     for (int i = 0; i < 2 * count; i++) {
         const int channel = i % 2, image = i / 2, n = of[channel].step * image + of[channel].first;
         const struct ggn_exec *m = of[channel].m;
-        if (back)
-            ggn_plane_copy(v, ggn_exec_grad(m, out, n, 0), ggn_exec_grad(t->d, 0, image, channel), v->row);
-        else
+        if (!back) {
             ggn_exec_load(t->d, image, channel, ggn_exec_output(m, n, 0), v->row);
+            continue;
+        }
+        real *to = ggn_exec_grad(m, out, n, 0), *from = ggn_exec_grad(t->d, 0, image, channel);
+        if (!add)
+            ggn_plane_copy(v, to, from, v->row);
+        for (int y = 0; y < v->h && add; y++)
+            m->kernels->axpy(to + (long)y * v->row, 1, from + (long)y * v->row, v->w);
     }
 }
 
@@ -341,12 +368,8 @@ static double answer(const struct ggn_trainer *t, int i, double law)
 
 void ggn_trainer_answers(struct ggn_trainer *t, const struct ggn_batch *b, double *answers)
 {
-    const int planes = 3 * t->hyper.window;
-
     for (int channel = 0; channel < 2; channel++) { /* one window after the other: preset paper has no room for both */
-        const real *const *windows = channel ? b->noisy : b->denoised;
-        for (int i = 0; i < b->count; i++)
-            set_input(t->m, i, windows + (size_t)i * (size_t)planes, planes);
+        set_inputs(t->m, 1, 0, channel ? b->noisy : b->denoised, 3 * t->hyper.window, b->count);
         ggn_exec_forward(t->m, t->weights[GGN_NET_M], b->count, GGN_EVAL);
         for (int i = 0; i < b->count; i++)
             ggn_exec_load(t->d, i, channel, ggn_exec_output(t->m, i, 0), ggn_graph_output(t->m->graph)->row);
@@ -396,20 +419,18 @@ int ggn_trainer_classifier_step(struct ggn_trainer *t, const struct ggn_batch *b
     if (t->hyper.preset == GGN_PRESET_PAPER)
         return base_fail(err, BASE_EINVAL, "the published preset trains in its own order");
     const struct maps maps[2] = {{t->m, 2, 0}, {t->m, 2, 1}}; /* a sample's two windows lie side by side */
-    for (int i = 0; i < b->count; i++) {
-        set_input(t->m, 2 * i, b->denoised + (size_t)i * (size_t)planes, planes);
-        set_input(t->m, 2 * i + 1, b->noisy + (size_t)i * (size_t)planes, planes);
-    }
+    set_inputs(t->m, 2, 0, b->denoised, planes, b->count);
+    set_inputs(t->m, 2, 1, b->noisy, planes, b->count);
     zero_grad(t, GGN_NET_M);
     zero_grad(t, GGN_NET_D);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], 2 * b->count, GGN_TRAIN);
-    exchange_maps(t, maps, b->count, 0);
+    exchange_maps(t, maps, b->count, 0, 0);
     set_measured(t, b);
     *bce = classify(t, b, logits);
     rc = check(t, GGN_NET_D, *bce, "loss", err);
     if (rc)
         return rc;
-    exchange_maps(t, maps, b->count, 1);
+    exchange_maps(t, maps, b->count, 1, 0);
     ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
     rc = update(t, GGN_NET_D, t->graph[GGN_NET_D].n_params, err);
     if (!rc)
@@ -419,52 +440,29 @@ int ggn_trainer_classifier_step(struct ggn_trainer *t, const struct ggn_batch *b
     return rc;
 }
 
-/* R's answer to image k of the windows, with a step of Adam. */
-static int paper_denoise_image(struct ggn_trainer *t, const struct ggn_batch *b, int k, struct ggn_paper_record *record,
-                               struct base_err *err)
-{
-    const int planes = 3 * t->hyper.window;
-    int rc = denoiser_forward(t, b->noisy + 3 * k, planes, b->reference, b->count, &record->denoiser_loss[k], err);
-
-    if (rc)
-        return rc;
-    denoiser_backward(t);
-    if (k == 0)
-        record->denoiser_grad_l2 = grad_l2(t, GGN_NET_R, t->graph[GGN_NET_R].n_params);
-    return update(t, GGN_NET_R, t->graph[GGN_NET_R].n_params, err);
-}
-
-/* Step 1 of the published order: R on each image of the window, its output kept as the generator's denoised input. */
+/* Step 1 of the published order: R on each image of the windows, with a step of Adam; its output is kept as the generator's
+ * denoised input. */
 static int paper_denoise(struct ggn_trainer *t, const struct ggn_batch *b, struct ggn_paper_record *record,
                          struct base_err *err)
 {
-    const int row = ggn_graph_output(&t->graph[GGN_NET_R])->row;
+    const struct ggn_graph *r = &t->graph[GGN_NET_R];
 
     for (int k = 0; k < t->hyper.window; k++) {
-        int rc = paper_denoise_image(t, b, k, record, err);
+        int rc = denoiser_forward(t, b->noisy + 3 * k, 3 * t->hyper.window, b->reference, b->count,
+                                  &record->denoiser_loss[k], err);
+        if (rc)
+            return rc;
+        denoiser_backward(t);
+        if (k == 0)
+            record->denoiser_grad_l2 = grad_l2(t, GGN_NET_R, r->n_params);
+        rc = update(t, GGN_NET_R, r->n_params, err);
         if (rc)
             return rc;
         for (int i = 0; i < b->count; i++)
             for (int c = 0; c < 3; c++)
-                ggn_exec_load(t->m, i, 3 * k + c, ggn_exec_output(t->r, i, c), row);
+                ggn_exec_load(t->m, i, 3 * k + c, ggn_exec_output(t->r, i, c), ggn_graph_output(r)->row);
     }
     return 0;
-}
-
-/* Adds D's input gradients to those of the maps: between two backward passes of D, M is the same, so that both can go back
- * through it at once: Jᵀg + Jᵀg' = Jᵀ(g + g'). */
-static void add_map_gradients(struct ggn_trainer *t, const struct maps maps[2], int count)
-{
-    const int out = t->graph[GGN_NET_M].n_values - 1;
-    const struct ggn_value *v = &t->graph[GGN_NET_M].value[out];
-
-    for (int i = 0; i < 2 * count; i++) {
-        real *sum = ggn_exec_grad(maps[i % 2].m, out, i / 2, 0);
-        const real *more = ggn_exec_grad(t->d, 0, i / 2, i % 2);
-        for (int y = 0; y < v->h; y++)
-            for (int x = 0; x < v->w; x++)
-                sum[y * v->row + x] += more[y * v->row + x];
-    }
 }
 
 int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, struct ggn_paper_record *record,
@@ -472,7 +470,7 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
 {
     const struct ggn_graph *m = &t->graph[GGN_NET_M], *d = &t->graph[GGN_NET_D];
     const size_t m_trained = m->tensor[m->n_tensors - 2].offset; /* all but the last convolution's weight and bias */
-    const int planes = 3 * t->hyper.window, record_all = b->count <= 64;
+    const int record_all = b->count <= 64;
     int rc = check_batch(t, b->count, GGN_TRAIN_ALL, err);
 
     if (rc)
@@ -486,17 +484,16 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
     const struct maps maps[2] = {{t->m, 1, 0}, {t->m2, 1, 0}};
     zero_grad(t, GGN_NET_M);
     zero_grad(t, GGN_NET_D);
-    for (int i = 0; i < b->count; i++)
-        set_input(t->m2, i, b->noisy + (size_t)i * (size_t)planes, planes);
+    set_inputs(t->m2, 1, 0, b->noisy, 3 * t->hyper.window, b->count);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
     ggn_exec_forward(t->m2, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
-    exchange_maps(t, maps, b->count, 0);
+    exchange_maps(t, maps, b->count, 0, 0);
 
     record->bce_before = classify(t, b, record_all ? record->logit_before : NULL);
     rc = check(t, GGN_NET_D, record->bce_before, "loss", err);
     if (rc)
         return rc;
-    exchange_maps(t, maps, b->count, 1);
+    exchange_maps(t, maps, b->count, 1, 0);
     record->d_grad_l2 = grad_l2(t, GGN_NET_D, d->n_params);
     rc = update(t, GGN_NET_D, d->n_params, err);
     if (rc)
@@ -504,7 +501,7 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
 
     zero_grad(t, GGN_NET_D);
     record->bce_after = classify(t, b, record_all ? record->logit_after : NULL);
-    add_map_gradients(t, maps, b->count);
+    exchange_maps(t, maps, b->count, 1, 1);
     ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
     ggn_exec_backward(t->m2, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
     record->m_grad_l2_accumulated = grad_l2(t, GGN_NET_M, m_trained);

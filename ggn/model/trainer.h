@@ -53,7 +53,7 @@ struct ggn_trainer {
     struct base_threads *threads; /* borrows */
     struct ggn_graph graph[GGN_NETS];
     struct ggn_weights *weights[GGN_NETS];     /* owns */
-    real *grad[GGN_NETS];                      /* [n_params] of the last step */
+    real *grad[GGN_NETS];                      /* [n_params] of the last step; owns the three below, too */
     real *adam_m[GGN_NETS], *adam_v[GGN_NETS]; /* [n_params] */
     uint64_t adam_t[GGN_NETS];                 /* updates made */
     uint64_t steps;                            /* steps made; seeds dropout */

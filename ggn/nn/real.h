@@ -38,6 +38,7 @@ typedef double real;
 #define ggn_ssim_create GGN_TYPED(ggn_ssim_create)
 #define ggn_ssim_mean GGN_TYPED(ggn_ssim_mean)
 
+#define ggn_train_options_default GGN_TYPED(ggn_train_options_default)
 #define ggn_trainer_create GGN_TYPED(ggn_trainer_create)
 #define ggn_trainer_destroy GGN_TYPED(ggn_trainer_destroy)
 #define ggn_trainer_keep GGN_TYPED(ggn_trainer_keep)
@@ -55,6 +56,7 @@ typedef double real;
 #define ggn_inference_denoise GGN_TYPED(ggn_inference_denoise)
 #define ggn_inference_logit GGN_TYPED(ggn_inference_logit)
 
+#define ggn_golden_pixel GGN_TYPED(ggn_golden_pixel)
 #define ggn_golden_run GGN_TYPED(ggn_golden_run)
 
 #endif
