@@ -1,6 +1,7 @@
 /* The end of a training: calibration and stopping policy on the validation scenes, the model file and its card. */
 #include <cjson/cJSON.h>
 #include <math.h>
+#include <stdlib.h>
 
 #include "base/json.h"
 #include "model/policy.h"
@@ -66,12 +67,12 @@ static cJSON *describe_data(const struct ggn_session *s, int *failed)
     return o;
 }
 
-static cJSON *describe_validation(const struct ggn_stopping *st, double auc, double accuracy, int *failed)
+static cJSON *describe_validation(const struct ggn_classified *v, const struct ggn_stopping *st, int *failed)
 {
     cJSON *o = cJSON_CreateObject();
 
-    base_json_number(o, "auc", auc, failed);
-    base_json_number(o, "accuracy", accuracy, failed);
+    base_json_number(o, "auc", v->auc, failed);
+    base_json_number(o, "accuracy", v->accuracy, failed);
     base_json_number(o, "early_stop_rate", st->early_rate, failed);
     base_json_number(o, "samples_ratio", st->samples_ratio, failed);
     base_json_number(o, "median_abs_log2", st->median_abs_log2, failed);
@@ -99,94 +100,77 @@ static int write_card(const struct ggn_session *s, const struct ggn_model *model
     return rc;
 }
 
-static void say(const struct ggn_session *s, const struct ggn_policy *policy, const struct ggn_stopping *st, double auc,
-                double accuracy)
+static void say(const struct ggn_session *s, const struct ggn_classified *v, const struct ggn_stopping *st)
 {
     if (s->plan->progress)
         fprintf(
             s->plan->progress,
             "%s: validation AUC %.4f, accuracy %.3f; threshold %.2f stops %.1f %% of %d blocks early, %.2f of the samples "
             "needed, median |log2| %.2f\n",
-            s->plan->out, auc, accuracy, policy->threshold, 100 * st->early_rate, st->blocks, st->samples_ratio,
+            s->plan->out, v->auc, v->accuracy, v->policy.threshold, 100 * st->early_rate, st->blocks, st->samples_ratio,
             st->median_abs_log2);
 }
 
-static int export(struct ggn_session *s, const struct ggn_policy *policy, const struct ggn_stopping *stopping, double auc,
-                  double accuracy, struct base_err *err)
+static int export(const struct ggn_session *s, const struct ggn_classified *v, const struct ggn_stopping *stopping,
+                  struct base_err *err)
 {
-    struct ggn_model *model = ggn_model_create(&s->hyper, err);
+    struct ggn_model *model = s->model;
 
-    if (!model)
-        return BASE_ENOMEM;
-    for (int net = 0; net < GGN_NETS; net++)
-        ggn_weights_copy(model->weights[net], net == GGN_NET_R ? s->r->params : s->trainer->weights[net]->params);
     if (s->hyper.preset == GGN_PRESET_LULL)
         ggn_train_fold(&model->graph[GGN_NET_M], model->weights[GGN_NET_M]->params, s->hyper.window, s->plan->difference, 0);
     int failed = 0;
     base_json_item(model->provenance, "training", describe_run(s, &failed), &failed);
     base_json_item(model->provenance, "data", describe_data(s, &failed), &failed);
-    base_json_item(model->provenance, "validation", describe_validation(stopping, auc, accuracy, &failed), &failed);
-    int rc = failed ? base_fail_nomem(err, "description of the run") : ggn_policy_set(model, policy, err);
+    base_json_item(model->provenance, "validation", describe_validation(v, stopping, &failed), &failed);
+    int rc = failed ? base_fail_nomem(err, "description of the run") : ggn_policy_set(model, &v->policy, err);
     /* f32: half floats change a verdict now and then (ggn/models/README.md counts them); `ggn convert` makes them. */
     if (!rc)
         rc = ggn_model_save(model, s->plan->out, GGN_F32, err);
-    if (!rc)
-        rc = write_card(s, model, err);
-    ggn_model_destroy(model);
-    return rc;
+    return rc ? rc : write_card(s, model, err);
 }
 
-static int choose_threshold(const struct ggn_session *s, const struct ggn_classified *v, struct ggn_policy *policy,
-                            struct ggn_stopping *stopping, struct base_err *err)
+static int choose_threshold(const struct ggn_session *s, struct ggn_classified *v, struct ggn_stopping *stopping,
+                            struct base_err *err)
 {
     struct ggn_checks checks;
 
-    if (!v->n)
+    if (!s->validation.n)
         return 0;
-    int rc = ggn_checks_create(&checks, &s->validation, v->logit, policy, err);
+    int rc = ggn_checks_create(&checks, &s->validation, v->logit, &v->policy, err);
     if (rc)
         return rc;
-    if (s->hyper.reach > 0)
-        rc = ggn_calibrate_stopping(&checks, policy->threshold, stopping, err);
-    else
-        rc = ggn_calibrate_threshold(&checks, s->plan->early_rate, policy, stopping, err);
+    *stopping = s->hyper.reach > 0 ? ggn_calibrate_stopping(&checks, v->policy.threshold)
+                                   : ggn_calibrate_threshold(&checks, s->plan->early_rate, &v->policy.threshold);
     ggn_checks_release(&checks);
-    return rc;
+    return 0;
 }
 
 static const double FIRST_SPP = 16; /* of the criterion `observer` */
 
 int ggn_session_finish(struct ggn_session *s, struct base_err *err)
 {
-    struct ggn_policy policy = ggn_policy_default();
     struct ggn_stopping stopping = {0};
     struct ggn_classified v;
-    double accuracy = (double)NAN;
-    int rc = ggn_classify_validation(s, s->validation.n, &v, err), right = 0;
+    struct ggn_policy *policy = &v.policy;
+    int rc = ggn_classify_validation(s, s->validation.n, &v, err);
 
     if (rc) {
-        ggn_classified_release(&v);
+        free(v.logit);
         return rc;
     }
-    if (v.n) {
-        ggn_session_calibrate(s, &v, &policy);
-        for (int i = 0; i < v.n; i++)
-            right += (ggn_policy_p(&policy, v.logit[i]) >= 0.5) == v.noisy[i];
-        accuracy = (double)right / v.n;
-        policy.slope = ggn_calibrate_slope(&s->validation, v.logit, &policy);
-    }
-    ggn_series_set_pace(&s->set, &policy);
+    policy->slope = ggn_calibrate_slope(&s->validation, v.logit, policy);
+    ggn_series_set_pace(&s->set, policy);
     if (s->hyper.reach > 0) { /* like the law that it corrects: whose spread is known, where a few scenes tell little */
-        policy.first_spp = fmax(policy.first_spp, FIRST_SPP);
-        policy.threshold = GGN_OBSERVER_VISIBLE;
-        policy.slope = 0.5 * s->scale;
+        policy->first_spp = fmax(policy->first_spp, FIRST_SPP);
+        policy->threshold = GGN_OBSERVER_VISIBLE;
+        policy->slope = 0.5 * s->scale;
     }
     /* the threshold last: it is chosen for the cadence that will stand beside it */
-    rc = choose_threshold(s, &v, &policy, &stopping, err);
+    rc = choose_threshold(s, &v, &stopping, err);
     if (!rc)
-        rc = export(s, &policy, &stopping, v.auc, accuracy, err);
+        rc = export(s, &v, &stopping, err);
     if (!rc)
-        say(s, &policy, &stopping, v.auc, accuracy);
-    ggn_classified_release(&v);
+        say(s, &v, &stopping);
+    free(v.logit);
     return rc;
 }

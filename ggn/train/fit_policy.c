@@ -65,9 +65,14 @@ int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *w, co
 
     for (int c = 0; c < w->set->n; c++)
         levels += (size_t)w->set->series[c].n_levels;
-    *checks = (struct ggn_checks){.windows = w, .policy = *policy, .seen = malloc(levels * sizeof *checks->seen)};
-    if (!checks->seen)
+    *checks = (struct ggn_checks){.windows = w,
+                                  .policy = *policy,
+                                  .seen = malloc(levels * sizeof *checks->seen),
+                                  .error = malloc(((size_t)w->set->n + 1) * sizeof *checks->error)};
+    if (!checks->seen || !checks->error) {
+        ggn_checks_release(checks);
         return base_fail_nomem(err, "thresholds");
+    }
     struct ggn_seen *seen = checks->seen;
     for (int c = 0; c < w->set->n; c++) {
         struct known known = {w, logit, w->first[c], w->first[c + 1]};
@@ -81,19 +86,18 @@ int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *w, co
 void ggn_checks_release(struct ggn_checks *checks)
 {
     free(checks->seen);
+    free(checks->error);
     *checks = (struct ggn_checks){0};
 }
 
-int ggn_calibrate_stopping(const struct ggn_checks *checks, double t, struct ggn_stopping *out, struct base_err *err)
+struct ggn_stopping ggn_calibrate_stopping(const struct ggn_checks *checks, double t)
 {
     const struct ggn_windows *w = checks->windows;
     const struct ggn_seen *seen = checks->seen;
-    double *error = malloc(((size_t)w->set->n + 1) * sizeof *error), spent = 0, needed = 0;
+    struct ggn_stopping out = {0};
+    double spent = 0, needed = 0;
     int early = 0;
 
-    if (!error)
-        return base_fail_nomem(err, "thresholds");
-    *out = (struct ggn_stopping){0};
     for (int c = 0; c < w->set->n; c++) {
         const struct ggn_level_series *series = &w->set->series[c];
         const struct ggn_seen *own = seen;
@@ -107,38 +111,31 @@ int ggn_calibrate_stopping(const struct ggn_checks *checks, double t, struct ggn
         early += stop < 0.8 * truth;
         spent += stop;
         needed += truth;
-        error[out->blocks] = fabs(log2(stop / truth));
-        out->mean_abs_log2 += error[out->blocks++];
+        checks->error[out.blocks] = fabs(log2(stop / truth));
+        out.mean_abs_log2 += checks->error[out.blocks++];
     }
-    if (out->blocks) {
-        out->early_rate = (double)early / out->blocks;
-        out->samples_ratio = spent / needed;
-        out->mean_abs_log2 /= out->blocks;
-        out->median_abs_log2 = ggn_stats_quantile(error, (size_t)out->blocks, 0.5);
+    if (out.blocks) {
+        out.early_rate = (double)early / out.blocks;
+        out.samples_ratio = spent / needed;
+        out.mean_abs_log2 /= out.blocks;
+        out.median_abs_log2 = ggn_stats_quantile(checks->error, (size_t)out.blocks, 0.5);
     }
-    free(error);
-    return 0;
+    return out;
 }
 
-int ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, struct ggn_policy *policy,
-                            struct ggn_stopping *out, struct base_err *err)
+struct ggn_stopping ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, double *threshold)
 {
     struct ggn_stopping best = {0};
 
-    policy->threshold = 0;
+    *threshold = 0;
     for (int k = 1; k <= 99; k++) {
-        const double t = k / 100.0;
-        struct ggn_stopping now;
-        int rc = ggn_calibrate_stopping(checks, t, &now, err);
-        if (rc)
-            return rc;
-        if (policy->threshold > 0 && (now.early_rate > early_rate || now.mean_abs_log2 >= best.mean_abs_log2))
+        const struct ggn_stopping now = ggn_calibrate_stopping(checks, k / 100.0);
+        if (*threshold > 0 && (now.early_rate > early_rate || now.mean_abs_log2 >= best.mean_abs_log2))
             continue;
         best = now;
-        policy->threshold = t;
+        *threshold = k / 100.0;
     }
-    *out = best;
-    return 0;
+    return best;
 }
 
 double ggn_calibrate_slope(const struct ggn_windows *w, const double *logit, const struct ggn_policy *policy)

@@ -15,6 +15,7 @@ struct ggn_checks {
     const struct ggn_windows *windows; /* borrows */
     struct ggn_policy policy;
     struct ggn_seen *seen; /* owns; the levels of every series, one after the other */
+    double *error;         /* owns; [series] scratch */
 };
 /* logit: of each window of `windows`. */
 int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *windows, const double *logit,
@@ -28,14 +29,13 @@ struct ggn_stopping {
     double samples_ratio;                  /* samples spent / samples at the true thresholds */
     double median_abs_log2, mean_abs_log2; /* of stop / true threshold */
 };
-int ggn_calibrate_stopping(const struct ggn_checks *checks, double t, struct ggn_stopping *out, struct base_err *err);
+struct ggn_stopping ggn_calibrate_stopping(const struct ggn_checks *checks, double t);
 
 /* The threshold (in steps of 0.01) with the smallest mean |log2(stop / true)| of those that keep the early rate at or below
  * `early_rate`; 0.01 if none does. (The largest threshold that keeps the
  * rate would be 0.99 whenever the few blocks are easy. The labels are unsure themselves: a caller that wants a margin asks
- * for fewer viewers than half, and a margin here as well would count it twice.) Into *policy and *out. */
-int ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, struct ggn_policy *policy,
-                            struct ggn_stopping *out, struct base_err *err);
+ * for fewer viewers than half, and a margin here as well would count it twice.) Returns what it does. */
+struct ggn_stopping ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, double *threshold);
 
 /* Mean fall of the calibrated logit per octave of samples near the threshold. */
 double ggn_calibrate_slope(const struct ggn_windows *windows, const double *logit, const struct ggn_policy *policy);

@@ -1,4 +1,4 @@
-#include "train/log.h"
+#include "train/session.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -36,12 +36,10 @@ int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct base_e
           out.file);
     for (int i = 0; i < log->n; i++) {
         const struct ggn_log_row *r = &log->rows[i];
-        const double values[] = {r->step,           r->loss, r->accuracy, r->validation_loss, r->validation_accuracy,
-                                 r->validation_auc, r->lr};
         fprintf(out.file, "%s,", ggn_log_phases[r->phase]);
-        for (size_t k = 0; k < sizeof values / sizeof values[0]; k++) {
-            if (!isnan(values[k]))
-                fprintf(out.file, "%.9g", values[k]);
+        for (int k = 0; k < GGN_LOG_NUMBERS - 2; k++) {
+            if (!isnan(r->numbers[k]))
+                fprintf(out.file, "%.9g", r->numbers[k]);
             fputc(',', out.file);
         }
         fprintf(out.file, "%.1f,%.1f\n", r->seconds, r->processor_s);

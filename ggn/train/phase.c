@@ -3,7 +3,6 @@
 #include <math.h>
 
 #include "base/clock.h"
-#include "train/resume.h"
 
 enum { MOST_DIVERGENCES = 8 };
 

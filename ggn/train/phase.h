@@ -20,27 +20,31 @@ struct ggn_phase {
 /* From progress.step to the end. After a divergence the epoch is repeated with half the learning rates and other draws. */
 int ggn_phase_run(struct ggn_session *session, const struct ggn_phase *phase, struct base_err *err);
 
+/*
+ * OUT.ckpt: everything that continuing a run bit-exactly needs, as a .ggn file (model/container.h): the arrays that a phase
+ * changes as tensors "0", "1", …, progress, optimiser counts and learning curves as JSON of "kind": "training".
+ */
+int ggn_resume_save(struct ggn_session *session, const char *path, struct base_err *err);
+/* The phase first, so that the session can make the trainer of that phase; then the numbers. */
+int ggn_resume_phase(const char *path, int *phase, struct base_err *err);
+int ggn_resume_load(struct ggn_session *session, const char *path, struct base_err *err);
+
 /* Phase 0 of preset lull: the denoiser, on crops of noisy images and their references. checkpoint: where to continue from,
- * or NULL. Leaves the denoiser in session->r. */
+ * or NULL. Leaves the denoiser in session->model. */
 int ggn_phase_denoiser(struct ggn_session *session, const char *checkpoint, struct base_err *err);
 
 /* Phase 1: generator and discriminator, on windows whose denoised images are computed once; in preset paper all three
  * networks at once. Leaves the weights of the best epoch in place. */
 int ggn_phase_classifier(struct ggn_session *session, const char *checkpoint, struct base_err *err);
 
-/* Windows of a list as the networks see them. */
+/* Windows of the validation scenes as the networks see them. */
 struct ggn_classified {
-    int n;
-    double *logit, *label; /* [n] ggn_trainer_answers; label of the window; own */
-    unsigned char *noisy;  /* [n] own */
-    double auc;            /* NaN without both classes */
+    double *logit;            /* [windows] ggn_trainer_answers; owns */
+    double auc;               /* NaN without both classes */
+    double loss, accuracy;    /* of the calibrated probability; NaN without windows */
+    struct ggn_policy policy; /* calibrated: as the law, with a residual, else fitted to the labels */
 };
-/* Judges evenly strided windows of the validation scenes, at most `most`, with the weights as they are. Release it also
- * after a failure. */
+/* Judges evenly strided ones, at most `most`, with the weights as they are. The caller frees `logit`, also after a failure. */
 int ggn_classify_validation(struct ggn_session *session, int most, struct ggn_classified *out, struct base_err *err);
-/* The logistic of these: as the law's, with a residual, else fitted to the labels. */
-void ggn_session_calibrate(const struct ggn_session *session, const struct ggn_classified *judged,
-                           struct ggn_policy *policy);
-void ggn_classified_release(struct ggn_classified *judged);
 
 #endif

@@ -8,7 +8,6 @@
 #include "nn/loss.h"
 #include "train/fit_policy.h"
 #include "train/phase.h"
-#include "train/resume.h"
 #include "train/start.h"
 
 /* Of a sample: the window, the second window or reference, and noise map and scalars, which need no more than an image. */
@@ -112,45 +111,41 @@ static void logits(struct ggn_session *s, const struct ggn_windows *windows, con
 
 enum { DENOISED_AT_ONCE = 4 }; /* images */
 
-/* Levels [first, first + count) of a series, in evaluation mode. */
-static void denoise_images(const struct ggn_session *s, struct ggn_exec *exec, struct ggn_level_series *c, int first,
-                           int count)
+/* All levels of a series, in evaluation mode. */
+static int denoise_series(const struct ggn_session *s, struct ggn_exec *exec, struct ggn_weights *r,
+                          struct ggn_level_series *c, struct base_err *err)
 {
     const struct ggn_value *in = &exec->graph->value[0], *out = ggn_graph_output(exec->graph);
     const int width = s->set.width, height = s->set.height;
     const size_t values = ggn_series_set_values(&s->set);
 
-    for (int i = 0; i < count; i++)
-        ggn_tile_load_u8(c->noisy + (size_t)(first + i) * values, 3, width, height, 0, 0, 1.0F / 255,
-                         ggn_exec_plane(exec, 0, i, 0), in);
-    ggn_exec_forward(exec, s->r, count, GGN_EVAL);
-    for (int i = 0; i < count; i++)
-        ggn_tile_store_u16(c->denoised + (size_t)(first + i) * values, width, height, 0, 0, ggn_exec_output(exec, i, 0),
-                           out);
-}
-
-static int denoise_series(const struct ggn_session *s, struct ggn_exec *exec, struct ggn_level_series *c,
-                          struct base_err *err)
-{
     if (!c->denoised)
-        c->denoised = malloc((size_t)c->n_levels * ggn_series_set_values(&s->set) * sizeof *c->denoised + 1);
+        c->denoised = malloc((size_t)c->n_levels * values * sizeof *c->denoised + 1);
     if (!c->denoised)
         return base_fail_nomem(err, "denoised images");
-    for (int k = 0; k < c->n_levels; k += DENOISED_AT_ONCE)
-        denoise_images(s, exec, c, k, c->n_levels - k < DENOISED_AT_ONCE ? c->n_levels - k : DENOISED_AT_ONCE);
+    for (int first = 0; first < c->n_levels; first += DENOISED_AT_ONCE) {
+        const int count = c->n_levels - first < DENOISED_AT_ONCE ? c->n_levels - first : DENOISED_AT_ONCE;
+        const uint8_t *noisy = c->noisy + (size_t)first * values;
+        uint16_t *denoised = c->denoised + (size_t)first * values;
+        for (int i = 0; i < count; i++, noisy += values)
+            ggn_tile_load_u8(noisy, 3, width, height, 0, 0, 1.0F / 255, ggn_exec_plane(exec, 0, i, 0), in);
+        ggn_exec_forward(exec, r, count, GGN_EVAL);
+        for (int i = 0; i < count; i++, denoised += values)
+            ggn_tile_store_u16(denoised, width, height, 0, 0, ggn_exec_output(exec, i, 0), out);
+    }
     return 0;
 }
 
-/* Denoises the series of one split (GGN_SPLITS: all) with s->r. */
-static int denoise(struct ggn_session *s, enum ggn_split split, struct base_err *err)
+/* Denoises the series of one split (GGN_SPLITS: all). */
+static int denoise(struct ggn_session *s, struct ggn_weights *r, enum ggn_split split, struct base_err *err)
 {
-    struct ggn_exec *exec = ggn_exec_create(&s->r_graph, NULL, DENOISED_AT_ONCE, 0, s->threads, err);
+    struct ggn_exec *exec = ggn_exec_create(r->graph, NULL, DENOISED_AT_ONCE, 0, s->threads, err);
     int rc = exec ? 0 : BASE_ENOMEM;
 
-    ggn_weights_pack(s->r, NULL);
+    ggn_weights_pack(r, NULL);
     for (int i = 0; i < s->set.n && !rc; i++)
         if (split == GGN_SPLITS || s->set.series[i].split == split)
-            rc = denoise_series(s, exec, &s->set.series[i], err);
+            rc = denoise_series(s, exec, r, &s->set.series[i], err);
     ggn_exec_destroy(exec);
     return rc;
 }
@@ -215,12 +210,24 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
     return 0;
 }
 
-void ggn_classified_release(struct ggn_classified *o)
+/* Loss and accuracy are those of the calibrated probability, as the model will be used: from epoch to epoch the logits of
+ * all windows shift together, which says nothing about the model (loss 0.18 and 0.41 at an AUC of 0.992 and 0.995). */
+static void calibrate(const struct ggn_session *s, const double *label, const unsigned char *noisy, int n,
+                      struct ggn_classified *o)
 {
-    free(o->logit);
-    free(o->label);
-    free(o->noisy);
-    *o = (struct ggn_classified){0};
+    struct ggn_policy *p = &o->policy;
+    int right = 0;
+
+    if (s->hyper.reach <= 0)
+        ggn_calibrate_platt(o->logit, label, n, p);
+    else
+        p->scale = s->scale;
+    o->loss = 0;
+    for (int i = 0; i < n; i++) {
+        right += (ggn_policy_p(p, o->logit[i]) >= 0.5) == noisy[i];
+        o->loss += ggn_bce(p->scale * o->logit[i] + p->shift, label[i]) / n;
+    }
+    o->accuracy = (double)right / n;
 }
 
 int ggn_classify_validation(struct ggn_session *s, int most, struct ggn_classified *o, struct base_err *err)
@@ -228,64 +235,34 @@ int ggn_classify_validation(struct ggn_session *s, int most, struct ggn_classifi
     const int n = s->validation.n < most ? s->validation.n : most;
     const size_t room = (size_t)n + 1;
     int *index = malloc(room * sizeof *index), rc = 0;
+    double *label = malloc(room * sizeof *label);
+    unsigned char *noisy = malloc(room);
 
-    *o = (struct ggn_classified){.n = n,
-                                 .logit = malloc(room * sizeof *o->logit),
-                                 .label = malloc(room * sizeof *o->label),
-                                 .noisy = malloc(room),
-                                 .auc = (double)NAN};
-    if (!index || !o->logit || !o->label || !o->noisy)
+    *o = (struct ggn_classified){.logit = malloc(room * sizeof *o->logit),
+                                 .auc = (double)NAN,
+                                 .loss = (double)NAN,
+                                 .accuracy = (double)NAN,
+                                 .policy = ggn_policy_default()};
+    if (!index || !label || !noisy || !o->logit)
         rc = base_fail_nomem(err, "validation");
     for (int i = 0; !rc && i < n; i++) {
         index[i] = (int)((long)i * s->validation.n / n);
-        o->label[i] = s->validation.list[index[i]].label;
-        o->noisy[i] = (unsigned char)s->validation.list[index[i]].noisy;
+        label[i] = s->validation.list[index[i]].label;
+        noisy[i] = (unsigned char)s->validation.list[index[i]].noisy;
     }
     if (!rc && n) {
         logits(s, &s->validation, index, n, o->logit);
-        rc = ggn_stats_auc(o->logit, o->noisy, (size_t)n, &o->auc, err);
+        calibrate(s, label, noisy, n, o);
+        rc = ggn_stats_auc(o->logit, noisy, (size_t)n, &o->auc, err);
     }
     free(index);
+    free(label);
+    free(noisy);
     return rc;
 }
 
-void ggn_session_calibrate(const struct ggn_session *s, const struct ggn_classified *v, struct ggn_policy *policy)
-{
-    if (s->hyper.reach <= 0)
-        ggn_calibrate_platt(v->logit, v->label, v->n, policy);
-    else
-        policy->scale = s->scale;
-}
-
-/* Loss and accuracy are those of the calibrated probability, as the model will be used: from epoch to epoch the logits of
- * all windows shift together, which says nothing about the model (loss 0.18 and 0.41 at an AUC of 0.992 and 0.995). */
-static int measure(struct ggn_session *s, struct ggn_log_row *row, struct base_err *err)
-{
-    struct ggn_policy calibrated = ggn_policy_default();
-    struct ggn_classified v;
-    int rc = ggn_classify_validation(s, s->plan->validation_windows, &v, err), right = 0;
-
-    row->validation_auc = v.auc;
-    row->validation_loss = row->validation_accuracy = v.n ? 0 : (double)NAN;
-    if (!rc)
-        ggn_session_calibrate(s, &v, &calibrated);
-    for (int i = 0; !rc && i < v.n; i++) {
-        double z = calibrated.scale * v.logit[i] + calibrated.shift;
-        right += (z > 0) == v.noisy[i];
-        row->validation_loss += ggn_bce(z, v.label[i]) / v.n;
-    }
-    if (v.n)
-        row->validation_accuracy = (double)right / v.n;
-    ggn_classified_release(&v);
-    return rc;
-}
-
-/* Preset paper: the denoiser has moved on; its copy and the denoised validation images follow. */
-static int renew_denoiser(struct ggn_session *s, struct base_err *err)
-{
-    ggn_weights_copy(s->r, s->trainer->weights[GGN_NET_R]->params);
-    return denoise(s, GGN_SPLIT_VALIDATION, err);
-}
+/* The networks that the phase trains begin with this one. */
+static int first_net(const struct ggn_session *s) { return s->hyper.preset == GGN_PRESET_PAPER ? GGN_NET_R : GGN_NET_M; }
 
 /* The loss on the validation scenes chooses the epoch. The AUC does not: with few blocks it saturates within a hundred
  * steps, and the networks of that time are far from what they learn later (they stopped 18 % of the training blocks early).
@@ -301,15 +278,23 @@ static void note_best(struct ggn_session *s, const struct ggn_log_row *row)
         return;
     p->best_loss = row->validation_loss;
     p->best_step = p->step;
-    ggn_session_keep_best(s);
+    for (int net = first_net(s); net < GGN_NETS; net++)
+        ggn_weights_copy(s->model->weights[net], s->trainer->weights[net]->params);
 }
 
 static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_err *err)
 {
-    int rc = s->hyper.preset == GGN_PRESET_PAPER ? renew_denoiser(s, err) : 0;
+    struct ggn_classified v;
+    /* In preset paper the denoiser has moved on: the denoised validation images follow. */
+    int rc = s->hyper.preset == GGN_PRESET_PAPER ? denoise(s, s->trainer->weights[GGN_NET_R], GGN_SPLIT_VALIDATION, err) : 0;
 
-    if (!rc)
-        rc = measure(s, row, err);
+    if (rc)
+        return rc;
+    rc = ggn_classify_validation(s, s->plan->validation_windows, &v, err);
+    row->validation_auc = v.auc;
+    row->validation_loss = v.loss;
+    row->validation_accuracy = v.accuracy;
+    free(v.logit);
     if (!rc)
         note_best(s, row);
     return rc;
@@ -325,13 +310,8 @@ static int begin(struct ggn_session *s, struct base_err *err)
                                         .processor_s = {s->progress.processor_s[0], 0}};
     int rc =
         ggn_session_begin(s, paper ? GGN_TRAIN_ALL : GGN_TRAIN_MD, s->plan->batch, s->hyper.height, s->hyper.width, err);
-    for (int net = paper ? GGN_NET_R : GGN_NET_M; net < GGN_NETS && !rc; net++) {
-        s->best[net] = calloc(s->trainer->graph[net].n_learned, sizeof *s->best[net]);
-        if (!s->best[net])
-            return base_fail_nomem(err, "the best epoch");
+    for (int net = first_net(s); net < GGN_NETS && !rc && s->init; net++) {
         struct ggn_weights *w = s->trainer->weights[net];
-        if (!s->init)
-            continue;
         ggn_weights_copy(w, s->init->weights[net]->params);
         if (net == GGN_NET_M && !paper)
             ggn_train_fold(w->graph, w->params, s->hyper.window, s->plan->difference, 1);
@@ -358,11 +338,12 @@ int ggn_phase_classifier(struct ggn_session *s, const char *checkpoint, struct b
     if (!rc && checkpoint)
         rc = ggn_resume_load(s, checkpoint, err);
     if (!rc && !paper)
-        rc = denoise(s, GGN_SPLITS, err);
+        rc = denoise(s, s->model->weights[GGN_NET_R], GGN_SPLITS, err);
     if (!rc)
         rc = ggn_phase_run(s, &phase, err);
     if (rc)
         return rc;
-    ggn_session_load_best(s);
-    return paper ? denoise(s, GGN_SPLIT_VALIDATION, err) : 0;
+    for (int net = GGN_NET_M; net < GGN_NETS; net++)
+        ggn_weights_copy(s->trainer->weights[net], s->model->weights[net]->params);
+    return paper ? denoise(s, s->model->weights[GGN_NET_R], GGN_SPLIT_VALIDATION, err) : 0;
 }

@@ -3,7 +3,6 @@
 
 #include "nn/hash.h"
 #include "train/phase.h"
-#include "train/resume.h"
 #include "train/start.h"
 
 enum { VALIDATION_CROPS = 32 };
@@ -144,6 +143,6 @@ int ggn_phase_denoiser(struct ggn_session *s, const char *checkpoint, struct bas
         rc = ggn_phase_run(s, &phase, err);
     if (rc)
         return rc;
-    ggn_weights_copy(s->r, s->trainer->weights[GGN_NET_R]->params);
+    ggn_weights_copy(s->model->weights[GGN_NET_R], s->trainer->weights[GGN_NET_R]->params);
     return 0;
 }

@@ -1,4 +1,4 @@
-#include "train/resume.h"
+#include "train/phase.h"
 
 #include <cjson/cJSON.h>
 #include <math.h>
@@ -6,8 +6,6 @@
 
 #include "base/json.h"
 #include "model/container.h"
-
-enum { N_ROW = 10 };
 
 /* The plan's options and the data: a checkpoint of another run is refused. */
 static int identify(const struct ggn_session *s, struct base_identity *to, struct base_err *err)
@@ -22,23 +20,24 @@ static int identify(const struct ggn_session *s, struct base_identity *to, struc
 /* What the phase changes, as arrays in a fixed order; NULL past the end. */
 static float *state_array(struct ggn_session *s, int i, size_t *count)
 {
-    if (s->progress.phase == GGN_PHASE_DENOISER)
-        return ggn_trainer_state(s->trainer, GGN_NET_R, i, count);
-    if (i < 5 && s->hyper.preset == GGN_PRESET_PAPER)
+    static const int best[] = {GGN_NET_M, GGN_NET_D, GGN_NET_R}; /* the denoiser of preset paper only */
+    const int paper = s->hyper.preset == GGN_PRESET_PAPER;
+    const struct ggn_weights *r = s->model->weights[GGN_NET_R];
+
+    if (s->progress.phase == GGN_PHASE_DENOISER || (i < 5 && paper))
         return ggn_trainer_state(s->trainer, GGN_NET_R, i, count);
     if (i < 3) {
-        *count = i == 0 ? s->r_graph.n_params : s->r_graph.n_stats;
-        return i == 0 ? s->r->params : i == 1 ? s->r->mean : s->r->var;
+        *count = i == 0 ? r->graph->n_params : r->graph->n_stats;
+        return i == 0 ? r->params : i == 1 ? r->mean : r->var;
     }
-    i -= s->hyper.preset == GGN_PRESET_PAPER ? 5 : 3;
+    i -= paper ? 5 : 3;
     if (i < 10)
         return ggn_trainer_state(s->trainer, i < 5 ? GGN_NET_M : GGN_NET_D, i % 5, count);
-    static const int net_of[] = {GGN_NET_M, GGN_NET_D, GGN_NET_R}; /* the denoiser of preset paper only */
     i -= 10;
-    if (i >= GGN_NETS || !s->best[net_of[i]])
+    if (i >= 2 + paper)
         return NULL;
-    *count = s->trainer->graph[net_of[i]].n_learned;
-    return s->best[net_of[i]];
+    *count = s->model->graph[best[i]].n_learned;
+    return s->model->weights[best[i]]->params;
 }
 
 /* Adds all arrays to a container, or reads them from one. */
@@ -56,14 +55,6 @@ static int visit_arrays(struct ggn_session *s, struct ggn_container *c, int read
                   : ggn_container_add(c, name, GGN_F32, 1, &dim, array, err);
     }
     return rc;
-}
-
-static double *row_field(struct ggn_log_row *r, int i)
-{
-    double *const fields[N_ROW] = {
-        NULL,   &r->step,    &r->loss,       &r->accuracy, &r->validation_loss, &r->validation_accuracy, &r->validation_auc,
-        &r->lr, &r->seconds, &r->processor_s};
-    return fields[i];
 }
 
 static char *describe(struct ggn_session *s, const struct base_identity *identity)
@@ -97,8 +88,8 @@ static char *describe(struct ggn_session *s, const struct base_identity *identit
     for (int i = 0; i < s->log.n; i++) {
         cJSON *row = base_json_array(rows, NULL, &failed);
         base_json_number(row, NULL, s->log.rows[i].phase, &failed);
-        for (int k = 1; k < N_ROW; k++)
-            base_json_number(row, NULL, *row_field(&s->log.rows[i], k), &failed);
+        for (int k = 0; k < GGN_LOG_NUMBERS; k++)
+            base_json_number(row, NULL, s->log.rows[i].numbers[k], &failed);
     }
     char *text = failed ? NULL : cJSON_PrintUnformatted(root);
     cJSON_Delete(root);
@@ -133,8 +124,8 @@ static int restore(struct ggn_session *s, const cJSON *root, const char *path, s
     ggn_log_release(&s->log);
     cJSON_ArrayForEach (row, cJSON_GetObjectItemCaseSensitive(root, "log")) {
         struct ggn_log_row r = {.phase = (int)number(cJSON_GetArrayItem(row, 0)) != 0};
-        for (int k = 1; k < N_ROW; k++)
-            *row_field(&r, k) = number(cJSON_GetArrayItem(row, k));
+        for (int k = 0; k < GGN_LOG_NUMBERS; k++)
+            r.numbers[k] = number(cJSON_GetArrayItem(row, k + 1));
         int rc = ggn_log_add(&s->log, &r, err);
         if (rc)
             return rc;

@@ -5,7 +5,6 @@
 #include <sys/stat.h>
 
 #include "train/phase.h"
-#include "train/resume.h"
 
 struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset)
 {

@@ -2,7 +2,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "base/pi.h"
 #include "nn/hash.h"
@@ -26,20 +25,6 @@ double ggn_session_law(const struct ggn_session *s, const struct ggn_level_serie
     const size_t pixels = (size_t)s->set.width * (size_t)s->set.height;
 
     return ggn_measure_octaves(ggn_observer_error(&ggn_observer_default, c->measure[k].visible, pixels));
-}
-
-void ggn_session_keep_best(struct ggn_session *s)
-{
-    for (int net = 0; net < GGN_NETS; net++)
-        if (s->best[net])
-            memcpy(s->best[net], s->trainer->weights[net]->params, s->trainer->graph[net].n_learned * sizeof *s->best[net]);
-}
-
-void ggn_session_load_best(struct ggn_session *s)
-{
-    for (int net = 0; net < GGN_NETS; net++)
-        if (s->best[net])
-            ggn_weights_copy(net == GGN_NET_R ? s->r : s->trainer->weights[net], s->best[net]);
 }
 
 static int side_of(const struct ggn_session *s) { return s->set.width < s->set.height ? s->set.width : s->set.height; }
@@ -119,10 +104,9 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
                                   .noise_map = p->noise_map > 0,
                                   .reach = p->reach,
                                   .scalars = p->reach > 0 && p->scalars ? GGN_SCALARS : 0};
-    rc = ggn_network_build(&s->r_graph, GGN_NET_R, &s->hyper, err);
-    s->r = rc ? NULL : ggn_weights_create(&s->r_graph, NULL, 0, err);
-    if (!s->r)
-        return rc ? rc : BASE_ENOMEM;
+    s->model = ggn_model_create(&s->hyper, err);
+    if (!s->model)
+        return err->code;
     /* One buffer for both phases, which never run at the same time. */
     size_t crops = 6 * (size_t)p->batch_r * (size_t)s->crop * (size_t)s->crop;
     size_t windows = (size_t)p->batch * (2 * (size_t)p->window + 1) * ggn_series_set_values(&s->set);
@@ -135,10 +119,8 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
 void ggn_session_release(struct ggn_session *s)
 {
     ggn_trainer_destroy(s->trainer);
-    ggn_weights_destroy(s->r);
+    ggn_model_destroy(s->model);
     ggn_model_destroy(s->init);
-    for (int net = 0; net < GGN_NETS; net++)
-        free(s->best[net]);
     free(s->buffer);
     free((void *)s->planes);
     ggn_log_release(&s->log);

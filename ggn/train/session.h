@@ -7,8 +7,32 @@
 #include "data/windows.h"
 #include "model/model.h"
 #include "model/trainer.h"
-#include "train/log.h"
 #include "train/train.h"
+
+/* Learning curves: one row per epoch, kept in the checkpoint, written as CSV. */
+extern const char *const ggn_log_phases[]; /* "denoiser", "judge" (generator and discriminator) */
+
+enum { GGN_LOG_NUMBERS = 9 };
+
+struct ggn_log_row {
+    int phase; /* of ggn_log_phases */
+    union {
+        struct {
+            double step, loss, accuracy, validation_loss, validation_accuracy, validation_auc, lr; /* NaN = not measured */
+            double seconds, processor_s; /* since the phase began, on this machine; only here two runs may differ */
+        };
+        double numbers[GGN_LOG_NUMBERS]; /* all of them, as files have them */
+    };
+};
+
+struct ggn_log {
+    int n;
+    struct ggn_log_row *rows; /* owns */
+};
+
+int ggn_log_add(struct ggn_log *log, const struct ggn_log_row *row, struct base_err *err);
+void ggn_log_release(struct ggn_log *log);
+int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct base_err *err);
 
 enum { GGN_PHASE_DENOISER, GGN_PHASE_CLASSIFIER };
 
@@ -29,13 +53,11 @@ struct ggn_session {
     struct ggn_series_set set;
     uint32_t data_crc; /* of the set */
     struct ggn_windows train, validation;
-    int crop;                    /* side of the denoiser's samples */
-    struct ggn_hyper hyper;      /* of the model */
-    struct ggn_model *init;      /* where to start from, or NULL */
-    struct ggn_graph r_graph;    /* the denoiser at full size */
-    struct ggn_weights *r;       /* its weights once phase 0 is over (preset paper: a copy, renewed each epoch) */
+    int crop;                /* side of the denoiser's samples */
+    struct ggn_hyper hyper;  /* of the model */
+    struct ggn_model *init;  /* where to start from, or NULL */
+    struct ggn_model *model; /* to be: the denoiser once its phase is over, of the last phase the best epoch's networks */
     struct ggn_trainer *trainer; /* of the present phase */
-    float *best[GGN_NETS];       /* the best epoch's networks that the phase trains, as ggn_weights_copy takes them */
     struct ggn_progress progress;
     struct ggn_log log;
     float *buffer;        /* pixels of a batch */
@@ -51,10 +73,6 @@ int ggn_session_load_init(struct ggn_session *session, struct base_err *err);
 
 /* Makes the trainer of a phase with the networks GGN_TRAIN_* for blocks of height × width, in the place of the former. */
 int ggn_session_begin(struct ggn_session *session, int parts, int batch, int height, int width, struct base_err *err);
-
-/* To and from `best`. */
-void ggn_session_keep_best(struct ggn_session *session);
-void ggn_session_load_best(struct ggn_session *session);
 
 /* Cosine from lr down to a fiftieth, after a short warm-up; divergences halve it. */
 double ggn_session_lr(const struct ggn_session *session, double lr, uint64_t step, uint64_t steps);

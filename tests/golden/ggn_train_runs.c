@@ -26,7 +26,7 @@
 #include "support/approve.h"
 #include "support/ggn_heap.h"
 #include "support/ggn_noise.h"
-#include "train/resume.h"
+#include "train/phase.h"
 #include "train/train.h"
 
 enum { WIDTH = 24, HEIGHT = 20 };

@@ -53,10 +53,10 @@ static void the_threshold_respects_the_early_rate(void **state)
     policy.ratio = set.ratio;
     struct ggn_checks checks;
     assert_int_equal(ggn_checks_create(&checks, &w, logit, &policy, &err), 0);
-    assert_int_equal(ggn_calibrate_stopping(&checks, 0.5, &at, &err), 0);
+    at = ggn_calibrate_stopping(&checks, 0.5);
     assert_int_equal(at.blocks, 9);
     assert_true(at.early_rate == 0 && at.samples_ratio >= 1);
-    assert_int_equal(ggn_calibrate_threshold(&checks, 0, &policy, &chosen, &err), 0);
+    chosen = ggn_calibrate_threshold(&checks, 0, &policy.threshold);
     assert_true(chosen.early_rate == 0);
     assert_true(policy.threshold > 0.05 && policy.threshold < 0.9);
     double slope = ggn_calibrate_slope(&w, logit, &policy);
@@ -154,15 +154,15 @@ static void stopping_by_hand(void **state)
                                 {.p = 0.6}, {.p = 0.6}, {.p = 0.2}, {.p = 0.1}};
     static const double truth[] = {25, 200, 30, 30};
     int first[] = {0, 1, 2, 2, 3};
+    double error[4];
     struct ggn_stopping got;
-    struct base_err err = {0};
 
     for (int c = 0; c < 4; c++)
         series[c] = (struct ggn_level_series){.n_levels = 4, .spp = spp, .label.threshold = truth[c]};
     struct ggn_series_set set = {.n = 4, .series = series};
     struct ggn_windows w = {.set = &set, .n = 3, .first = first};
-    struct ggn_checks checks = {.windows = &w, .policy = ggn_policy_default(), .seen = seen};
-    assert_int_equal(ggn_calibrate_stopping(&checks, 0.5, &got, &err), 0);
+    struct ggn_checks checks = {.windows = &w, .policy = ggn_policy_default(), .seen = seen, .error = error};
+    got = ggn_calibrate_stopping(&checks, 0.5);
     /* stops at 20, 200 (past the end, seen until its threshold) and 40: log2 0.322 (not early at 0.8 of it), 0, 0.415 */
     assert_int_equal(got.blocks, 3);
     assert_true(got.early_rate == 0 && fabs(got.samples_ratio - 260.0 / 255) < 1e-12);
@@ -170,10 +170,10 @@ static void stopping_by_hand(void **state)
     assert_true(fabs(got.mean_abs_log2 - (log2(25.0 / 20) + log2(40.0 / 30)) / 3) < 1e-12);
     series[0].label.threshold = 25.1; /* now 20 is early */
     series[1].label.threshold = 50;   /* and the end of the recording late */
-    assert_int_equal(ggn_calibrate_stopping(&checks, 0.5, &got, &err), 0);
+    got = ggn_calibrate_stopping(&checks, 0.5);
     assert_true(got.early_rate == 1.0 / 3 && fabs(got.samples_ratio - 140.0 / 105.1) < 1e-12);
     checks.policy.passes = 2;
-    assert_int_equal(ggn_calibrate_stopping(&checks, 0.5, &got, &err), 0); /* 40, never, 80 */
+    got = ggn_calibrate_stopping(&checks, 0.5); /* 40, never, 80 */
     assert_true(got.early_rate == 0 && fabs(got.samples_ratio - 200.0 / 105.1) < 1e-12);
     /* one pass below 0.5 is right for the first and too early for none of the others: the best that is allowed */
     series[0].label.threshold = 20;
@@ -181,10 +181,10 @@ static void stopping_by_hand(void **state)
     series[3].label.threshold = 40;
     struct ggn_policy p = ggn_policy_default();
     checks.policy.passes = 1;
-    assert_int_equal(ggn_calibrate_threshold(&checks, 0, &p, &got, &err), 0);
+    got = ggn_calibrate_threshold(&checks, 0, &p.threshold);
     assert_true(p.threshold == 0.41 && got.mean_abs_log2 == 0 && got.samples_ratio == 1); /* p < t, not p <= t */
     series[0].label.threshold = 50; /* 40 is four fifths of it, which is not early */
-    assert_int_equal(ggn_calibrate_threshold(&checks, 0, &p, &got, &err), 0);
+    got = ggn_calibrate_threshold(&checks, 0, &p.threshold);
     assert_true(p.threshold == 0.31 && fabs(got.mean_abs_log2 - log2(1.25) / 3) < 1e-12);
     (void)state;
 }
