@@ -28,11 +28,12 @@ static const struct base_option list[] = {
     {"seed", 's', "N", TO(plan.seed), 0, UINT32_MAX, .role = BASE_DECIDES, .help = "seed of everything random (1)"},
     {"quiet", 'q', NULL, TO(quiet), .help = "no progress on standard error"},
     {.help = "Defaults by preset:"},
-    {"window", 0, "N", TO(plan.window), 2, 16, .role = BASE_DECIDES, .help = "images per window (6)"},
-    {"kr", 0, "N", TO(plan.k_r), 3, 128, .role = BASE_DECIDES, .help = "width of the denoiser (lull 8, paper 16)"},
-    {"km", 0, "N", TO(plan.k_m), 1, 128, .role = BASE_DECIDES,
+    {"window", 0, "N", TO(plan.hyper.window), 2, 16, .role = BASE_DECIDES, .help = "images per window (6)"},
+    {"kr", 0, "N", TO(plan.hyper.k_r), 3, 128, .role = BASE_DECIDES, .help = "width of the denoiser (lull 8, paper 16)"},
+    {"km", 0, "N", TO(plan.hyper.k_m), 1, 128, .role = BASE_DECIDES,
      .help = "width of the feature map generator (lull 10, paper 20)"},
-    {"kd", 0, "N", TO(plan.k_d), 1, 64, .role = BASE_DECIDES, .help = "width of the discriminator (lull 32, paper 64)"},
+    {"kd", 0, "N", TO(plan.hyper.k_d), 1, 64, .role = BASE_DECIDES,
+     .help = "width of the discriminator (lull 32, paper 64)"},
     {"crop", 0, "N", TO(plan.crop), 16, 1024,
      .help = "side of the denoiser's training crops, pixels (lull 96, or the side of smaller blocks)"},
     {"batch-denoiser", 0, "N", TO(plan.batch_r), 1, 1024, .role = BASE_DECIDES, .help = "crops per denoiser step (16)"},
@@ -57,7 +58,7 @@ static const struct base_option list[] = {
     {"picture", 0, "SHARE", TO(plan.noise_map), 0, 1, .role = BASE_DECIDES,
      .help = "with --residual: share of windows that come with the picture of their visible noise, 0 = networks without "
              "that input (0)"},
-    {"residual", 0, "OCTAVES", TO(plan.reach), 0, GGN_REACH_MAX, .role = BASE_DECIDES,
+    {"residual", 0, "OCTAVES", TO(plan.hyper.reach), 0, GGN_REACH_MAX, .role = BASE_DECIDES,
      .help =
          "learn to correct what the observer measures by up to so many octaves of noise, 0 = judge without it; needs half "
          "buffers at the recorded levels; preset lull only (0)"},

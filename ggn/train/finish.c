@@ -40,8 +40,8 @@ static cJSON *describe_run(const struct ggn_session *s, int *failed)
 
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
         base_json_number(o, numbers[i].name, numbers[i].value, failed);
-    if (p->reach > 0)
-        base_json_number(o, "residual", p->reach, failed);
+    if (p->hyper.reach > 0)
+        base_json_number(o, "residual", p->hyper.reach, failed);
     return o;
 }
 

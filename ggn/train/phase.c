@@ -86,6 +86,9 @@ static int hours_spent(const struct ggn_session *s)
 
 int ggn_phase_run(struct ggn_session *s, const struct ggn_phase *phase, struct base_err *err)
 {
+    for (int net = 0; net < GGN_NETS; net++)
+        ggn_weights_pack(s->trainer->weights[net], NULL);
+    ggn_trainer_keep(s->trainer);
     while (s->progress.step < phase->steps && !hours_spent(s)) {
         int rc = epoch(s, phase, err);
         if (rc == GGN_EDIVERGED && ++s->progress.divergences <= MOST_DIVERGENCES) {

@@ -17,7 +17,7 @@ struct ggn_phase {
     int (*validate)(struct ggn_session *session, struct ggn_log_row *row, struct base_err *err);
 };
 
-/* From progress.step to the end. After a divergence the epoch is repeated with half the learning rates and other draws. */
+/* From progress.step and the weights as they are to the end. After a divergence the epoch is repeated with half the learning rates and other draws. */
 int ggn_phase_run(struct ggn_session *session, const struct ggn_phase *phase, struct base_err *err);
 
 /*

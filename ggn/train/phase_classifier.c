@@ -39,7 +39,7 @@ static void fill_window(void *data, long i, int worker)
     const struct ggn_window *w = &f->windows->list[f->index[i]];
     const struct ggn_level_series *c = &s->set.series[w->series];
     const struct ggn_augment_options how = {s->plan->flips, s->set.width == s->set.height,
-                                            s->plan->reach > 0 ? 0 : s->plan->jitter, s->plan->noise_map};
+                                            s->plan->hyper.reach > 0 ? 0 : s->plan->jitter, s->plan->noise_map};
     struct ggn_augment augment =
         f->augment ? ggn_augment_draw(f->step, (int)i, ggn_session_seed(s) ^ 2, &how) : ggn_augment_none();
     float *at = s->buffer + (size_t)i * sample_values(s), *noise_map = at + 2 * window_values(s);
@@ -310,22 +310,18 @@ static int begin(struct ggn_session *s, struct base_err *err)
                                         .processor_s = {s->progress.processor_s[0], 0}};
     int rc =
         ggn_session_begin(s, paper ? GGN_TRAIN_ALL : GGN_TRAIN_MD, s->plan->batch, s->hyper.height, s->hyper.width, err);
-    for (int net = first_net(s); net < GGN_NETS && !rc && s->init; net++) {
-        struct ggn_weights *w = s->trainer->weights[net];
-        ggn_weights_copy(w, s->init->weights[net]->params);
-        if (net == GGN_NET_M && !paper)
-            ggn_train_fold(w->graph, w->params, s->hyper.window, s->plan->difference, 1);
-        ggn_weights_pack(w, NULL);
-    }
-    if (!rc)
-        ggn_trainer_keep(s->trainer);
+    for (int net = first_net(s); net < GGN_NETS && !rc && s->init; net++)
+        ggn_weights_copy(s->trainer->weights[net], s->init->weights[net]->params);
+    if (!rc && s->init && !paper)
+        ggn_train_fold(&s->trainer->graph[GGN_NET_M], s->trainer->weights[GGN_NET_M]->params, s->hyper.window,
+                       s->plan->difference, 1);
     return rc;
 }
 
 int ggn_phase_classifier(struct ggn_session *s, const char *checkpoint, struct base_err *err)
 {
     const struct ggn_train_plan *p = s->plan;
-    const int paper = p->preset == GGN_PRESET_PAPER;
+    const int paper = p->hyper.preset == GGN_PRESET_PAPER;
     const struct ggn_phase phase = {.steps = p->steps ? (uint64_t)p->steps : (uint64_t)p->epochs * epoch_length(s),
                                     .epoch_steps = p->epoch_steps ? (uint64_t)p->epoch_steps : epoch_length(s),
                                     .batch = p->batch,

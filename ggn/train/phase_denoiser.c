@@ -109,22 +109,6 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_
     return 0;
 }
 
-static int begin(struct ggn_session *s, struct base_err *err)
-{
-    s->progress.phase = GGN_PHASE_DENOISER;
-    int rc = ggn_session_begin(s, GGN_TRAIN_R, s->plan->batch_r, s->crop, s->crop, err);
-    if (rc)
-        return rc;
-    struct ggn_weights *w = s->trainer->weights[GGN_NET_R];
-    if (s->init)
-        ggn_weights_copy(w, s->init->weights[GGN_NET_R]->params);
-    else
-        ggn_train_identity(w->graph, w->params);
-    ggn_weights_pack(w, NULL);
-    ggn_trainer_keep(s->trainer);
-    return 0;
-}
-
 int ggn_phase_denoiser(struct ggn_session *s, const char *checkpoint, struct base_err *err)
 {
     const struct ggn_phase phase = {.steps = (uint64_t)s->plan->steps_r,
@@ -136,8 +120,16 @@ int ggn_phase_denoiser(struct ggn_session *s, const char *checkpoint, struct bas
 
     if (!nth_series(s, GGN_SPLIT_TRAIN, -1) && phase.steps)
         return base_fail(err, BASE_EINVAL, "%s: no training block has a reference for the denoiser", s->plan->data.dir);
-    int rc = begin(s, err);
-    if (!rc && checkpoint)
+    s->progress.phase = GGN_PHASE_DENOISER;
+    int rc = ggn_session_begin(s, GGN_TRAIN_R, phase.batch, s->crop, s->crop, err);
+    if (rc)
+        return rc;
+    struct ggn_weights *w = s->trainer->weights[GGN_NET_R];
+    if (s->init)
+        ggn_weights_copy(w, s->init->weights[GGN_NET_R]->params);
+    else
+        ggn_train_identity(w->graph, w->params);
+    if (checkpoint)
         rc = ggn_resume_load(s, checkpoint, err);
     if (!rc)
         rc = ggn_phase_run(s, &phase, err);

@@ -210,10 +210,6 @@ int ggn_resume_load(struct ggn_session *s, const char *path, struct base_err *er
         rc = visit_arrays(s, &c, 1, err);
     if (!rc)
         rc = restore(s, root, path, err);
-    for (int net = 0; net < GGN_NETS && !rc; net++)
-        ggn_weights_pack(s->trainer->weights[net], NULL);
-    if (!rc)
-        ggn_trainer_keep(s->trainer);
     cJSON_Delete(root);
     ggn_container_release(&c);
     return rc;

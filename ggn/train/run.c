@@ -12,11 +12,7 @@ struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset)
 
     return (struct ggn_train_plan){
         .data = {.ratio = lull ? 1.1 : 0},
-        .preset = preset,
-        .window = 6,
-        .k_r = lull ? 8 : 16,
-        .k_m = lull ? 10 : 20,
-        .k_d = lull ? 32 : 64,
+        .hyper = {.preset = preset, .window = 6, .k_r = lull ? 8 : 16, .k_m = lull ? 10 : 20, .k_d = lull ? 32 : 64},
         .batch_r = 16,
         .batch = lull ? 16 : 64,
         .steps_r = lull ? 2000 : 0,
@@ -36,7 +32,6 @@ struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset)
         .validation_windows = 400,
         .early_rate = 0.02,
         .seed = 1,
-        .threads = 0,
     };
 }
 
@@ -56,27 +51,19 @@ static void announce(const struct ggn_session *s)
         fprintf(s->plan->progress, "no validation windows: the last epoch counts and p stays uncalibrated\n");
 }
 
-/* *path is set to NULL where there is none. */
-static int find_checkpoint(const struct ggn_train_plan *plan, const char **path, int *phase, struct base_err *err)
-{
-    struct stat st;
-
-    if (plan->resume && stat(*path, &st) == 0)
-        return ggn_resume_phase(*path, phase, err);
-    *path = NULL;
-    return 0;
-}
-
 int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
 {
     /* A checkpoint says in which phase to go on, and that phase reads it once it has its trainer. */
     struct ggn_session s = {.plan = plan};
+    struct stat st;
     char path[4096];
-    const char *checkpoint = path;
-    int phase = plan->preset == GGN_PRESET_PAPER ? GGN_PHASE_CLASSIFIER : GGN_PHASE_DENOISER;
+    const char *checkpoint = NULL;
+    int phase = plan->hyper.preset == GGN_PRESET_PAPER ? GGN_PHASE_CLASSIFIER : GGN_PHASE_DENOISER;
 
     snprintf(path, sizeof path, "%s.ckpt", plan->out);
-    int rc = find_checkpoint(plan, &checkpoint, &phase, err);
+    if (plan->resume && stat(path, &st) == 0)
+        checkpoint = path;
+    int rc = checkpoint ? ggn_resume_phase(path, &phase, err) : 0;
     if (!rc)
         rc = ggn_session_init(&s, err);
     if (!rc)

@@ -32,27 +32,27 @@ static int side_of(const struct ggn_session *s) { return s->set.width < s->set.h
 static int check_plan(const struct ggn_session *s, struct base_err *err)
 {
     const struct ggn_train_plan *p = s->plan;
-    const int paper = p->preset == GGN_PRESET_PAPER;
+    const int paper = p->hyper.preset == GGN_PRESET_PAPER;
 
     if (p->batch < 1 || p->batch > GGN_BATCH_MAX || p->batch_r < 1 || p->batch_r > GGN_BATCH_MAX)
         return base_fail(err, BASE_EINVAL, "a batch has 1 to 1024 samples");
     if (!paper && (s->crop < 16 || s->crop > s->set.width || s->crop > s->set.height))
         return base_fail(err, BASE_EINVAL, "crop %d is not in 16..%d, the side of the blocks", s->crop, side_of(s));
-    if (paper && (p->noise_map > 0 || p->reach > 0))
+    if (paper && (p->noise_map > 0 || p->hyper.reach > 0))
         return base_fail(err, BASE_EINVAL, "preset paper has neither noise pictures nor a residual");
-    if (p->noise_map > 0 && !(p->reach > 0))
+    if (p->noise_map > 0 && !(p->hyper.reach > 0))
         return base_fail(err, BASE_EINVAL, "a noise picture is of the visible noise: --picture goes with --residual");
-    if (p->k_r < 3)
+    if (p->hyper.k_r < 3)
         return base_fail(err, BASE_EINVAL, "the denoiser needs a width of at least 3");
     if (!s->train.n)
         return base_fail(err, BASE_EINVAL, "%s: no training block has a label and %d levels; run `ggn label` first",
-                         p->data.dir, p->window);
+                         p->data.dir, p->hyper.window);
     int noisy = 0;
     for (int i = 0; i < s->train.n; i++) {
         noisy += s->train.list[i].noisy;
         if (paper && !s->set.series[s->train.list[i].series].reference)
             return base_fail(err, BASE_EINVAL, "%s: preset paper needs a reference for each training block", p->data.dir);
-        if (p->reach > 0 && isnan(s->set.series[s->train.list[i].series].measure[s->train.list[i].last].visible))
+        if (p->hyper.reach > 0 && isnan(s->set.series[s->train.list[i].series].measure[s->train.list[i].last].visible))
             return base_fail(err, BASE_EINVAL, "%s: --residual needs half buffers at every recorded level", p->data.dir);
     }
     if (noisy == 0 || noisy == s->train.n)
@@ -65,12 +65,12 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
 {
     /* The data first: they say how large networks and crops are, and what of the plan can be done. */
     const struct ggn_train_plan *p = s->plan;
-    const int paper = p->preset == GGN_PRESET_PAPER;
+    const int paper = p->hyper.preset == GGN_PRESET_PAPER;
 
     s->threads = base_threads_create(p->threads > 0 ? p->threads : base_threads_available(), err);
     struct ggn_series_set_options data = p->data;
     data.noise_maps = p->noise_map > 0;
-    data.measures = data.keep_recorded = p->reach > 0;
+    data.measures = data.keep_recorded = p->hyper.reach > 0;
     s->scale = ggn_observer_slope(&ggn_observer_default);
     int rc = s->threads ? ggn_series_set_load(&s->set, &data, err) : BASE_ENOMEM;
 
@@ -83,9 +83,9 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     if (rc)
         return rc;
     struct ggn_window_options train = {
-        .split = GGN_SPLIT_TRAIN, .length = p->window, .synthetic = 1, .label_first = paper, .soft = p->soft_labels};
+        .split = GGN_SPLIT_TRAIN, .length = p->hyper.window, .synthetic = 1, .label_first = paper, .soft = p->soft_labels};
     struct ggn_window_options validation = {
-        .split = GGN_SPLIT_VALIDATION, .length = p->window, .synthetic = p->reach > 0, .soft = p->soft_labels};
+        .split = GGN_SPLIT_VALIDATION, .length = p->hyper.window, .synthetic = p->hyper.reach > 0, .soft = p->soft_labels};
     rc = ggn_windows_create(&s->train, &s->set, &train, err);
     if (!rc)
         rc = ggn_windows_create(&s->validation, &s->set, &validation, err);
@@ -94,23 +94,18 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
         rc = check_plan(s, err);
     if (rc)
         return rc;
-    s->hyper = (struct ggn_hyper){.preset = p->preset,
-                                  .height = s->set.height,
-                                  .width = s->set.width,
-                                  .window = p->window,
-                                  .k_r = p->k_r,
-                                  .k_m = p->k_m,
-                                  .k_d = p->k_d,
-                                  .noise_map = p->noise_map > 0,
-                                  .reach = p->reach,
-                                  .scalars = p->reach > 0 && p->scalars ? GGN_SCALARS : 0};
+    s->hyper = p->hyper;
+    s->hyper.height = s->set.height;
+    s->hyper.width = s->set.width;
+    s->hyper.noise_map = p->noise_map > 0;
+    s->hyper.scalars = p->hyper.reach > 0 && p->scalars ? GGN_SCALARS : 0;
     s->model = ggn_model_create(&s->hyper, err);
     if (!s->model)
         return err->code;
     /* One buffer for both phases, which never run at the same time. */
     size_t crops = 6 * (size_t)p->batch_r * (size_t)s->crop * (size_t)s->crop;
-    size_t windows = (size_t)p->batch * (2 * (size_t)p->window + 1) * ggn_series_set_values(&s->set);
-    size_t pointers = 6 * (size_t)p->batch_r + (6 * (size_t)p->window + 2) * (size_t)p->batch;
+    size_t windows = (size_t)p->batch * (2 * (size_t)p->hyper.window + 1) * ggn_series_set_values(&s->set);
+    size_t pointers = 6 * (size_t)p->batch_r + (6 * (size_t)p->hyper.window + 2) * (size_t)p->batch;
     s->buffer = malloc((crops > windows ? crops : windows) * sizeof *s->buffer);
     s->planes = malloc(pointers * sizeof *s->planes);
     return s->buffer && s->planes ? 0 : base_fail_nomem(err, "a batch");
@@ -146,7 +141,7 @@ int ggn_session_load_init(struct ggn_session *s, struct base_err *err)
 
 int ggn_session_begin(struct ggn_session *s, int parts, int batch, int height, int width, struct base_err *err)
 {
-    struct ggn_train_options o = ggn_train_options_default(s->plan->preset);
+    struct ggn_train_options o = ggn_train_options_default(s->plan->hyper.preset);
     struct ggn_hyper hyper = s->hyper;
 
     hyper.height = height;

@@ -26,28 +26,26 @@ enum { GGN_TRAIN_INTERRUPTED = 1 }; /* returned by ggn_train and its phases besi
 /* What a run is to do. */
 struct ggn_train_plan {
     struct ggn_series_set_options data;
-    const char *out;  /* model file; OUT.ckpt, OUT.csv and OUT.card.json lie beside it */
-    const char *init; /* model file to start from, or NULL */
-    int resume;       /* continue from OUT.ckpt if it is there */
-    enum ggn_preset preset;
-    int window, k_r, k_m, k_d; /* network sizes; the block size comes from the data */
-    int crop;                  /* side of the denoiser's samples; 0: GGN_TRAIN_CROP, or the side of smaller blocks */
-    int batch_r, batch;        /* samples per step */
-    int steps_r, steps;        /* steps of the two phases; preset paper: of its one phase, 0 = epochs · windows / batch */
-    int epochs;                /* preset paper */
-    int epoch_steps;           /* steps between validations and checkpoints */
-    double hours;              /* of processors; once spent, a validation of the last phase ends it. 0: no limit */
-    int patience;              /* epochs without a lower calibrated validation loss before the end; 0 = never */
+    const char *out;        /* model file; OUT.ckpt, OUT.csv and OUT.card.json lie beside it */
+    const char *init;       /* model file to start from, or NULL */
+    int resume;             /* continue from OUT.ckpt if it is there */
+    struct ggn_hyper hyper; /* height, width, noise_map and scalars come from the data and what follows */
+    int crop;               /* side of the denoiser's samples; 0: GGN_TRAIN_CROP, or the side of smaller blocks */
+    int batch_r, batch;     /* samples per step */
+    int steps_r, steps;     /* steps of the two phases; preset paper: of its one phase, 0 = epochs · windows / batch */
+    int epochs;             /* preset paper */
+    int epoch_steps;        /* steps between validations and checkpoints */
+    double hours;           /* of processors; once spent, a validation of the last phase ends it. 0: no limit */
+    int patience;           /* epochs without a lower calibrated validation loss before the end; 0 = never */
     double lr_r, lr;
     double difference; /* preset lull: see ggn_train_fold */
     int soft_labels;
-    int flips;        /* see ggn_augment_options */
-    double jitter;    /* octaves of exposure; see ggn_augment_options */
-    double noise_map; /* preset lull: share of windows that come with the noise map; 0: networks without it */
-    double reach;     /* preset lull: of a residual model, octaves of noise (model/networks.h); 0: the networks alone */
-    int scalars;      /* with reach: the discriminator is given what was measured */
-    int synthetic;    /* synthetic series per block */
-    int extend;       /* continue recorded series beyond their last level, see ggn_series_set_extend */
+    int flips;              /* see ggn_augment_options */
+    double jitter;          /* octaves of exposure; see ggn_augment_options */
+    double noise_map;       /* preset lull: share of windows that come with the noise map; 0: networks without it */
+    int scalars;            /* with hyper.reach: the discriminator is given what was measured */
+    int synthetic;          /* synthetic series per block */
+    int extend;             /* continue recorded series beyond their last level, see ggn_series_set_extend */
     int validation_windows; /* most windows per validation */
     double early_rate;      /* share of validation blocks that may be stopped early (ggn_stopping.early_rate) */
     uint32_t seed;

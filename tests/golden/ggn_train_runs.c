@@ -204,9 +204,9 @@ static struct ggn_train_plan small(const char *name, enum ggn_preset preset)
 
     p.data = (struct ggn_series_set_options){.dir = data, .split.validation = "scene1"};
     p.out = path_of(name, "");
-    p.window = 3;
-    p.k_r = p.k_m = 3;
-    p.k_d = 4;
+    p.hyper.window = 3;
+    p.hyper.k_r = p.hyper.k_m = 3;
+    p.hyper.k_d = 4;
     p.crop = 17;
     p.batch_r = 3;
     p.batch = 4;
@@ -485,10 +485,10 @@ static void plans(void **state)
     TRY(good, crop = 16);
     TRY(good, crop = HEIGHT);
     TRY(good, crop = HEIGHT + 1);
-    TRY(good, k_r = 2);
-    TRY(good, window = 8);
-    TRY(good, window = 9);
-    TRY(good, k_d = 65);
+    TRY(good, hyper.k_r = 2);
+    TRY(good, hyper.window = 8);
+    TRY(good, hyper.window = 9);
+    TRY(good, hyper.k_d = 65);
     TRY(good, data.dir = bare);
     TRY(good, data.dir = quiet);
     TRY(good, data.dir = loud);
@@ -499,10 +499,10 @@ static void plans(void **state)
     TRY(good, noise_map = 0.5);
     TRY(paper, crop = 1);
     of_all.init = path_of("all", "");
-    TRY(of_all, k_r = 4);
-    TRY(of_all, k_m = 4);
-    TRY(of_all, k_d = 3);
-    TRY(of_all, window = 4);
+    TRY(of_all, hyper.k_r = 4);
+    TRY(of_all, hyper.k_m = 4);
+    TRY(of_all, hyper.k_d = 3);
+    TRY(of_all, hyper.window = 4);
     TRY(of_all, init = path_of("paper", ""));
     TRY(of_all, init = "/nonexistent");
 }

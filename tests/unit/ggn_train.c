@@ -110,10 +110,11 @@ static void default_plans(void **state)
 
     for (int preset = 0; preset < 2; preset++) {
         const struct ggn_train_plan p = ggn_train_plan_default((enum ggn_preset)preset);
-        assert_true(p.preset == (enum ggn_preset)preset && p.data.ratio == want[preset].ratio && !p.data.dir);
+        assert_true(p.hyper.preset == (enum ggn_preset)preset && p.data.ratio == want[preset].ratio && !p.data.dir);
         assert_true(!p.out && !p.init && !p.resume && !p.progress && !p.interrupted);
-        assert_true(p.window == want[preset].window && p.k_r == want[preset].k[0] && p.k_m == want[preset].k[1]);
-        assert_true(p.k_d == want[preset].k[2] && p.crop == want[preset].crop && p.batch_r == want[preset].batch_r);
+        assert_true(p.hyper.window == want[preset].window && p.hyper.k_r == want[preset].k[0] &&
+                    p.hyper.k_m == want[preset].k[1]);
+        assert_true(p.hyper.k_d == want[preset].k[2] && p.crop == want[preset].crop && p.batch_r == want[preset].batch_r);
         assert_true(p.batch == want[preset].batch && p.steps == want[preset].steps && p.steps_r == p.steps);
         assert_true(p.epochs == want[preset].epochs && p.epoch_steps == want[preset].epoch_steps);
         assert_true(p.patience == want[preset].patience && p.lr == want[preset].lr && p.lr_r == p.lr);
