@@ -33,10 +33,7 @@ static int write_files(struct ggn_session *s, struct base_err *err)
 
     snprintf(path, sizeof path, "%s.csv", s->plan->out);
     int rc = ggn_log_write_csv(&s->log, path, err);
-    if (rc)
-        return rc;
-    snprintf(path, sizeof path, "%s.ckpt", s->plan->out);
-    return ggn_resume_save(s, path, err);
+    return rc ? rc : ggn_resume_save(s, err);
 }
 
 /* One epoch; on divergence the trainer is back at the epoch's start and so is the step. */

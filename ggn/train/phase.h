@@ -24,18 +24,18 @@ int ggn_phase_run(struct ggn_session *session, const struct ggn_phase *phase, st
  * OUT.ckpt: everything that continuing a run bit-exactly needs, as a .ggn file (model/container.h): the arrays that a phase
  * changes as tensors "0", "1", …, progress, optimiser counts and learning curves as JSON of "kind": "training".
  */
-int ggn_resume_save(struct ggn_session *session, const char *path, struct base_err *err);
-/* The phase first, so that the session can make the trainer of that phase; then the numbers. */
-int ggn_resume_phase(const char *path, int *phase, struct base_err *err);
-int ggn_resume_load(struct ggn_session *session, const char *path, struct base_err *err);
+int ggn_resume_save(struct ggn_session *session, struct base_err *err);
+/* With plan->resume: reads it, if it is there, and sets the phase, so that the session can make the trainer of that phase. */
+int ggn_resume_open(struct ggn_session *session, struct base_err *err);
+/* Then takes over the numbers, if it was there. */
+int ggn_resume_load(struct ggn_session *session, struct base_err *err);
 
-/* Phase 0 of preset lull: the denoiser, on crops of noisy images and their references. checkpoint: where to continue from,
- * or NULL. Leaves the denoiser in session->model. */
-int ggn_phase_denoiser(struct ggn_session *session, const char *checkpoint, struct base_err *err);
+/* Phase 0 of preset lull: the denoiser, on crops of noisy images and their references. Leaves it in session->model. */
+int ggn_phase_denoiser(struct ggn_session *session, struct base_err *err);
 
 /* Phase 1: generator and discriminator, on windows whose denoised images are computed once; in preset paper all three
  * networks at once. Leaves the weights of the best epoch in place. */
-int ggn_phase_classifier(struct ggn_session *session, const char *checkpoint, struct base_err *err);
+int ggn_phase_classifier(struct ggn_session *session, struct base_err *err);
 
 /* Windows of the validation scenes as the networks see them. */
 struct ggn_classified {

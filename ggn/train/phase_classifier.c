@@ -318,7 +318,7 @@ static int begin(struct ggn_session *s, struct base_err *err)
     return rc;
 }
 
-int ggn_phase_classifier(struct ggn_session *s, const char *checkpoint, struct base_err *err)
+int ggn_phase_classifier(struct ggn_session *s, struct base_err *err)
 {
     const struct ggn_train_plan *p = s->plan;
     const int paper = p->hyper.preset == GGN_PRESET_PAPER;
@@ -331,8 +331,8 @@ int ggn_phase_classifier(struct ggn_session *s, const char *checkpoint, struct b
     /* The checkpoint first: it holds the denoiser that all images are denoised with. */
     int rc = begin(s, err);
 
-    if (!rc && checkpoint)
-        rc = ggn_resume_load(s, checkpoint, err);
+    if (!rc)
+        rc = ggn_resume_load(s, err);
     if (!rc && !paper)
         rc = denoise(s, s->model->weights[GGN_NET_R], GGN_SPLITS, err);
     if (!rc)

@@ -109,7 +109,7 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_
     return 0;
 }
 
-int ggn_phase_denoiser(struct ggn_session *s, const char *checkpoint, struct base_err *err)
+int ggn_phase_denoiser(struct ggn_session *s, struct base_err *err)
 {
     const struct ggn_phase phase = {.steps = (uint64_t)s->plan->steps_r,
                                     .epoch_steps = (uint64_t)s->plan->epoch_steps,
@@ -129,8 +129,7 @@ int ggn_phase_denoiser(struct ggn_session *s, const char *checkpoint, struct bas
         ggn_weights_copy(w, s->init->weights[GGN_NET_R]->params);
     else
         ggn_train_identity(w->graph, w->params);
-    if (checkpoint)
-        rc = ggn_resume_load(s, checkpoint, err);
+    rc = ggn_resume_load(s, err);
     if (!rc)
         rc = ggn_phase_run(s, &phase, err);
     if (rc)

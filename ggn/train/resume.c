@@ -3,9 +3,9 @@
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "base/json.h"
-#include "model/container.h"
 
 /* The plan's options and the data: a checkpoint of another run is refused. */
 static int identify(const struct ggn_session *s, struct base_identity *to, struct base_err *err)
@@ -100,14 +100,14 @@ static double number(const cJSON *item) { return cJSON_IsNumber(item) ? item->va
 
 static double field(const cJSON *root, const char *name) { return number(cJSON_GetObjectItemCaseSensitive(root, name)); }
 
-static int restore(struct ggn_session *s, const cJSON *root, const char *path, struct base_err *err)
+static int restore(struct ggn_session *s, const cJSON *root, struct base_err *err)
 {
     struct ggn_progress *p = &s->progress;
     const cJSON *row;
     double step = field(root, "step"), steps = field(root, "steps");
 
     if (!(step >= 0) || !(steps >= 0) || !(field(root, "t0") >= 0) || !(field(root, "t1") >= 0) || !(field(root, "t2") >= 0))
-        return base_fail(err, BASE_EINVAL, "%s: progress is missing", path);
+        return base_fail(err, BASE_EINVAL, "%s: progress is missing", s->checkpoint_path);
     p->step = (uint64_t)step;
     p->stale = (int)fmax(field(root, "stale"), 0);
     p->divergences = (int)fmax(field(root, "divergences"), 0);
@@ -133,7 +133,7 @@ static int restore(struct ggn_session *s, const cJSON *root, const char *path, s
     return 0;
 }
 
-int ggn_resume_save(struct ggn_session *s, const char *path, struct base_err *err)
+int ggn_resume_save(struct ggn_session *s, struct base_err *err)
 {
     struct ggn_container c = {0};
     struct base_identity identity = {0};
@@ -144,73 +144,62 @@ int ggn_resume_save(struct ggn_session *s, const char *path, struct base_err *er
     if (!rc)
         rc = visit_arrays(s, &c, 0, err);
     if (!rc)
-        rc = ggn_container_write(&c, path, err);
+        rc = ggn_container_write(&c, s->checkpoint_path, err);
     base_identity_release(&identity);
     ggn_container_release(&c);
     return rc;
 }
 
-static int read_file(const char *path, struct ggn_container *c, cJSON **root, struct base_err *err)
+int ggn_resume_open(struct ggn_session *s, struct base_err *err)
 {
-    int rc = ggn_container_read(c, path, err);
+    struct stat st;
 
-    if (rc)
-        return rc;
-    *root = cJSON_Parse(c->json);
-    const cJSON *kind = cJSON_GetObjectItemCaseSensitive(*root, "kind");
-    if (cJSON_IsString(kind) && !strcmp(kind->valuestring, "training"))
+    if (!s->plan->resume || stat(s->checkpoint_path, &st) != 0)
         return 0;
-    cJSON_Delete(*root);
-    ggn_container_release(c);
-    return base_fail(err, BASE_EINVAL, "%s: not a checkpoint of a training", path);
-}
-
-int ggn_resume_phase(const char *path, int *phase, struct base_err *err)
-{
-    struct ggn_container c = {0};
-    cJSON *root = NULL;
-    int rc = read_file(path, &c, &root, err);
-
+    int rc = ggn_container_read(&s->checkpoint, s->checkpoint_path, err);
     if (rc)
         return rc;
-    double v = field(root, "phase");
+    cJSON *root = cJSON_Parse(s->checkpoint.json);
+    const cJSON *kind = cJSON_GetObjectItemCaseSensitive(root, "kind");
+    const double phase = field(root, "phase");
+    if (!cJSON_IsString(kind) || strcmp(kind->valuestring, "training") != 0)
+        rc = base_fail(err, BASE_EINVAL, "%s: not a checkpoint of a training", s->checkpoint_path);
+    else if (phase != GGN_PHASE_DENOISER && phase != GGN_PHASE_CLASSIFIER)
+        rc = base_fail(err, BASE_EINVAL, "%s: of an unknown phase", s->checkpoint_path);
+    else
+        s->progress.phase = (int)phase;
     cJSON_Delete(root);
-    ggn_container_release(&c);
-    if (v != GGN_PHASE_DENOISER && v != GGN_PHASE_CLASSIFIER)
-        return base_fail(err, BASE_EINVAL, "%s: of an unknown phase", path);
-    *phase = (int)v;
-    return 0;
+    return rc;
 }
 
-static int compare(const struct ggn_session *s, const cJSON *root, const char *path, struct base_err *err)
+static int compare(const struct ggn_session *s, const cJSON *root, struct base_err *err)
 {
     static const struct base_identity_words words = {": made with", ": made without", "this run"};
     const cJSON *saved = cJSON_GetObjectItemCaseSensitive(root, "identity");
     struct base_identity identity = {0};
 
     if (!cJSON_IsString(saved))
-        return base_fail(err, BASE_EINVAL, "%s: made by an earlier version of Lull: train anew, without --resume", path);
+        return base_fail(err, BASE_EINVAL, "%s: made by an earlier version of Lull: train anew, without --resume",
+                         s->checkpoint_path);
     int rc = identify(s, &identity, err);
     if (!rc)
-        rc = base_identity_compare(&identity, saved->valuestring, strlen(saved->valuestring), path, &words, NULL, err);
+        rc = base_identity_compare(&identity, saved->valuestring, strlen(saved->valuestring), s->checkpoint_path, &words,
+                                   NULL, err);
     base_identity_release(&identity);
     return rc;
 }
 
-int ggn_resume_load(struct ggn_session *s, const char *path, struct base_err *err)
+int ggn_resume_load(struct ggn_session *s, struct base_err *err)
 {
-    struct ggn_container c = {0};
-    cJSON *root = NULL;
-    int rc = read_file(path, &c, &root, err);
-
-    if (rc)
-        return rc;
-    rc = compare(s, root, path, err);
+    if (!s->checkpoint.data)
+        return 0;
+    cJSON *root = cJSON_Parse(s->checkpoint.json);
+    int rc = compare(s, root, err);
     if (!rc)
-        rc = visit_arrays(s, &c, 1, err);
+        rc = visit_arrays(s, &s->checkpoint, 1, err);
     if (!rc)
-        rc = restore(s, root, path, err);
+        rc = restore(s, root, err);
     cJSON_Delete(root);
-    ggn_container_release(&c);
+    ggn_container_release(&s->checkpoint);
     return rc;
 }

@@ -2,7 +2,6 @@
 #include "train/train.h"
 
 #include <stdio.h>
-#include <sys/stat.h>
 
 #include "train/phase.h"
 
@@ -53,29 +52,21 @@ static void announce(const struct ggn_session *s)
 
 int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
 {
-    /* A checkpoint says in which phase to go on, and that phase reads it once it has its trainer. */
-    struct ggn_session s = {.plan = plan};
-    struct stat st;
-    char path[4096];
-    const char *checkpoint = NULL;
-    int phase = plan->hyper.preset == GGN_PRESET_PAPER ? GGN_PHASE_CLASSIFIER : GGN_PHASE_DENOISER;
+    const int lull = plan->hyper.preset == GGN_PRESET_LULL;
+    struct ggn_session s = {.plan = plan, .progress.phase = lull ? GGN_PHASE_DENOISER : GGN_PHASE_CLASSIFIER};
 
-    snprintf(path, sizeof path, "%s.ckpt", plan->out);
-    if (plan->resume && stat(path, &st) == 0)
-        checkpoint = path;
-    int rc = checkpoint ? ggn_resume_phase(path, &phase, err) : 0;
+    snprintf(s.checkpoint_path, sizeof s.checkpoint_path, "%s.ckpt", plan->out);
+    int rc = ggn_resume_open(&s, err);
     if (!rc)
         rc = ggn_session_init(&s, err);
     if (!rc)
         announce(&s);
     if (!rc && plan->init)
         rc = ggn_session_load_init(&s, err);
-    if (!rc && phase == GGN_PHASE_DENOISER) {
-        rc = ggn_phase_denoiser(&s, checkpoint, err);
-        checkpoint = NULL;
-    }
+    if (!rc && s.progress.phase == GGN_PHASE_DENOISER)
+        rc = ggn_phase_denoiser(&s, err);
     if (!rc)
-        rc = ggn_phase_classifier(&s, checkpoint, err);
+        rc = ggn_phase_classifier(&s, err);
     if (!rc)
         rc = ggn_session_finish(&s, err);
     ggn_session_release(&s);

@@ -114,6 +114,7 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
 void ggn_session_release(struct ggn_session *s)
 {
     ggn_trainer_destroy(s->trainer);
+    ggn_container_release(&s->checkpoint);
     ggn_model_destroy(s->model);
     ggn_model_destroy(s->init);
     free(s->buffer);

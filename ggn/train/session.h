@@ -59,13 +59,15 @@ struct ggn_session {
     struct ggn_model *model; /* to be: the denoiser once its phase is over, of the last phase the best epoch's networks */
     struct ggn_trainer *trainer; /* of the present phase */
     struct ggn_progress progress;
+    char checkpoint_path[4096];
+    struct ggn_container checkpoint; /* owns; what the run goes on from, until its phase has read it */
     struct ggn_log log;
     float *buffer;        /* pixels of a batch */
     const float **planes; /* pointers into it */
     double scale;         /* with plan->reach: of the logistic, per octave of noise */
 };
 
-/* Loads the data and checks the plan against it. `session` starts as {.plan = plan}; release it also after a failure. */
+/* Loads the data and checks the plan against it. `session` starts with its plan, path and phase; release it also after a failure. */
 int ggn_session_init(struct ggn_session *session, struct base_err *err);
 void ggn_session_release(struct ggn_session *session);
 /* Loads plan->init: a model of the same networks. */
