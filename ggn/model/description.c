@@ -1,5 +1,4 @@
-#include "model/description.h"
-
+/* The description in a model file. */
 #include <cjson/cJSON.h>
 #include <stddef.h>
 #include <string.h>
@@ -7,6 +6,7 @@
 #include "base/json.h"
 #include "base/options.h"
 #include "model/measure.h"
+#include "model/model.h"
 
 /* Hyper-parameters and calibration as tables, so that reading and writing cannot disagree. spacing: 1 where levels are not
  * told by a ratio. */

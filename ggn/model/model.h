@@ -1,14 +1,22 @@
 /*
  * A trained criterion: the three networks, their hyper-parameters, the calibration of the probability, and where it all
- * comes from. Stored as a .ggn file (model/container.h) with the JSON object of model/description.h and the tensors
- * NETWORK/STAGE.INDEX.weight|bias|mean|var, NETWORK = denoiser, generator, discriminator.
+ * comes from. Stored as a .ggn file (model/container.h) with the tensors NETWORK/STAGE.INDEX.weight|bias|mean|var, NETWORK =
+ * denoiser, generator, discriminator, and a description, one JSON object:
+ *
+ *   {"kind": "model", "preset": "paper"|"lull", "height", "width", "window", "k_r", "k_m", "k_d",
+ *    "calibration": {"scale", "shift", "threshold", "consecutive", "spacing"}, "provenance": {...}}
+ *
+ * and "picture": 1 in a model that takes the noise map. A residual model has "residual", the octaves of noise by which its
+ * network may correct the law of visible noise, and "scalars", how many numbers the network is given (model/measure.h).
+ *
  * Read-only after loading: any number of threads and criteria may share one model.
  */
 #ifndef GGN_MODEL_MODEL_H
 #define GGN_MODEL_MODEL_H
 
 #include "model/container.h"
-#include "model/description.h"
+#include "model/networks.h"
+#include "model/policy.h"
 #include "nn/weights.h"
 
 struct ggn_model {
@@ -18,6 +26,15 @@ struct ggn_model {
     struct ggn_weights *weights[GGN_NETS]; /* owns */
     struct cJSON *provenance;              /* owns; a JSON object: data-set hash, code version, seed, metrics … */
 };
+
+struct ggn_description {
+    struct ggn_hyper hyper;
+    struct ggn_policy policy; /* "calibration": scale, shift, threshold, passes, ratio; the rest is default */
+    struct cJSON *provenance; /* parse: the caller's to delete; print: borrows */
+};
+int ggn_description_parse(const char *json, struct ggn_description *out, struct base_err *err);
+/* malloc'ed text, NULL without memory. */
+char *ggn_description_print(const struct ggn_description *description);
 
 /* A model with zero weights. NULL on failure. */
 struct ggn_model *ggn_model_create(const struct ggn_hyper *hyper, struct base_err *err);

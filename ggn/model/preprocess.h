@@ -11,10 +11,6 @@
 
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 #define GGN_PIXEL_HUGE 1e20f
 
 enum ggn_transfer { GGN_TRANSFER_SRGB /* IEC 61966-2-1 */, GGN_TRANSFER_GAMMA /* in^(1 / gamma) */, GGN_TRANSFER_LINEAR };
@@ -28,9 +24,5 @@ struct ggn_display {
 /* The code of one channel value. display: NULL is sRGB at exposure 1. *bad (may be NULL) counts values that are not finite
  * or absurdly large: a decision on such a block deserves a warning. */
 uint8_t ggn_preprocess(double linear, const struct ggn_display *display, long *bad);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -10,7 +10,6 @@
 
 #include "base/files.h"
 #include "model/container.h"
-#include "model/description.h"
 #include "model/measure.h"
 #include "model/model.h"
 #include "base/bytes.h"
