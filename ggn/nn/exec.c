@@ -19,21 +19,18 @@ static size_t place_values(const struct ggn_graph *g, int flags, size_t offset[G
 
 static size_t most(size_t a, size_t b) { return a > b ? a : b; }
 
-/* Elements of each kind, and the bytes of the executor with all of them. */
-struct room {
-    size_t acts, scratch, leaf, sums; /* of all images, one worker, one image, all images */
-    size_t bytes;
-};
-
-static struct room room_for(const struct ggn_graph *g, const struct ggn_kernels *k, int capacity, int flags, int workers)
+/* Of an executor whose graph, kernels, capacity and flags are set: where values start, and the sizes of arrays; returns the
+ * bytes of all. */
+static size_t size_up(struct ggn_exec *e, int workers, size_t *n_sums)
 {
-    const int back = flags & GGN_EXEC_GRADS;
-    const size_t images = (size_t)capacity;
-    size_t offset[GGN_MAX_LAYERS + 1], normed = 0;
-    /* of a worker: the lane sums of one weight gradient task, or one task of Winograd's form; vectors have <= 64 bytes */
-    struct room r = {.acts = place_values(g, flags, offset) * images,
-                     .scratch = (size_t)GGN_TILE_MAX * GGN_GRAD_IC * 9 * (64 / sizeof(real)) + 256};
+    const struct ggn_graph *g = e->graph;
+    const int back = e->flags & GGN_EXEC_GRADS;
+    const size_t images = (size_t)e->capacity;
+    size_t normed = 0;
 
+    e->n_acts = place_values(g, e->flags, e->offset);
+    /* of a worker: the lane sums of one weight gradient task, or one task of Winograd's form; vectors have <= 64 bytes */
+    e->scratch_size = (size_t)GGN_TILE_MAX * GGN_GRAD_IC * 9 * (64 / sizeof(real)) + 256;
     for (int i = 0; i < g->n_layers; i++) {
         const struct ggn_layer *l = &g->layer[i];
         const struct ggn_value *v = &g->value[l->out];
@@ -41,64 +38,58 @@ static struct room room_for(const struct ggn_graph *g, const struct ggn_kernels 
         if (l->op == GGN_OP_BN)
             normed = most(normed, (size_t)v->c);
         if (l->op == GGN_OP_CONV && back)
-            r.leaf = most(r.leaf, ggn_conv_weights(g, l));
-        if (l->op != GGN_OP_CONV || l->kernel != 3 || !k->wino)
+            e->leaf_size = most(e->leaf_size, ggn_conv_weights(g, l));
+        if (l->op != GGN_OP_CONV || l->kernel != 3 || !e->kernels->wino)
             continue;
-        if (ggn_wino_suits(c_in, v->c, v->h, v->w, k->lanes))
-            r.scratch = most(r.scratch, ggn_wino_scratch(back && v->c > c_in ? v->c : c_in));
+        if (ggn_wino_suits(c_in, v->c, v->h, v->w, e->kernels->lanes))
+            e->scratch_size = most(e->scratch_size, ggn_wino_scratch(back && v->c > c_in ? v->c : c_in));
         if (back)
-            r.scratch = most(r.scratch, GGN_WINO_GRAD_SCRATCH);
+            e->scratch_size = most(e->scratch_size, GGN_WINO_GRAD_SCRATCH);
     }
-    r.scratch = (r.scratch + 15) / 16 * 16;
-    r.sums = 2 * normed * (images + 1);
-    r.bytes =
-        sizeof(struct ggn_exec) + r.sums * sizeof(double) +
-        sizeof(real) * (r.acts * (back ? 2 : 1) + 2 * (g->n_stats + 16) + r.scratch * (size_t)workers + r.leaf * images);
-    return r;
+    e->scratch_size = (e->scratch_size + 15) / 16 * 16;
+    *n_sums = 2 * normed * (images + 1);
+    return sizeof *e + *n_sums * sizeof(double) +
+           sizeof(real) * (e->n_acts * images * (back ? 2 : 1) + 2 * (g->n_stats + 16) + e->scratch_size * (size_t)workers +
+                           e->leaf_size * images);
 }
 
 size_t ggn_exec_bytes(const struct ggn_graph *g, int capacity, int flags, int workers)
 {
-    return room_for(g, ggn_kernels_best(), capacity, flags, workers).bytes;
-}
-
-static void place_memory(struct ggn_exec *e, const struct room *r, int workers)
-{
-    e->sums = (double *)(void *)(e + 1);
-    char *memory = (char *)(e->sums + r->sums);
-    e->acts = (real *)(void *)(memory + (ALIGN_BYTES - (size_t)memory % ALIGN_BYTES) % ALIGN_BYTES);
-    e->n_acts = place_values(e->graph, e->flags, e->offset);
-    e->scratch = e->acts + r->acts;
-    if (e->flags & GGN_EXEC_GRADS) {
-        e->grads = e->scratch;
-        e->scratch += r->acts;
-    }
-    e->scratch_size = r->scratch;
-    e->bn_mean = e->scratch + r->scratch * (size_t)workers;
-    e->bn_inv = e->bn_mean + e->graph->n_stats + 16;
-    e->leaves = e->bn_inv + e->graph->n_stats + 16;
-    e->leaf_size = r->leaf;
+    struct ggn_exec e = {.graph = g, .kernels = ggn_kernels_best(), .capacity = capacity, .flags = flags};
+    size_t n_sums;
+    return size_up(&e, workers, &n_sums);
 }
 
 struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn_kernels *kernels, int capacity, int flags,
                                  struct base_threads *threads, struct base_err *err)
 {
     const int workers = threads ? base_threads_count(threads) : 1;
-    const struct ggn_kernels *k = kernels ? kernels : ggn_kernels_best();
-    const struct room room = room_for(graph, k, capacity, flags, workers);
+    struct ggn_exec plan = {.graph = graph,
+                            .kernels = kernels ? kernels : ggn_kernels_best(),
+                            .threads = threads,
+                            .capacity = capacity,
+                            .flags = flags};
+    size_t n_sums;
+    const size_t bytes = size_up(&plan, workers, &n_sums), acts = plan.n_acts * (size_t)capacity;
     /* calloc: fresh pages are zero already, and the zero padding of the layout is never written with anything else */
-    struct ggn_exec *e = calloc(1, room.bytes + ALIGN_BYTES);
+    struct ggn_exec *e = calloc(1, bytes + ALIGN_BYTES);
 
     if (!e) {
         base_fail_nomem(err, "network activations");
         return NULL;
     }
-    e->graph = graph;
-    e->kernels = k;
-    e->threads = threads;
-    e->capacity = capacity;
-    e->flags = flags;
-    place_memory(e, &room, workers);
+    *e = plan;
+    e->sums = (double *)(void *)(e + 1);
+    char *memory = (char *)(e->sums + n_sums);
+    e->acts = (real *)(void *)(memory + (ALIGN_BYTES - (size_t)memory % ALIGN_BYTES) % ALIGN_BYTES);
+    e->scratch = e->acts + acts;
+    if (flags & GGN_EXEC_GRADS) {
+        e->grads = e->scratch;
+        e->scratch += acts;
+    }
+    e->bn_mean = e->scratch + e->scratch_size * (size_t)workers;
+    e->bn_inv = e->bn_mean + graph->n_stats + 16;
+    e->leaves = e->bn_inv + graph->n_stats + 16;
     return e;
 }
 

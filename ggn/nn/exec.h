@@ -60,7 +60,7 @@ static inline real *ggn_exec_at(const struct ggn_exec *exec, real *all, int valu
     return all + (size_t)n * exec->n_acts + exec->offset[value] + v->origin + (size_t)c * v->plane;
 }
 
-/* Value 0 is the input, which the caller writes (h × w elements of each plane and nothing else); n_values − 1 is the output. */
+/* Value 0 is the input, which the caller writes (h × w elements of each plane, nothing else); n_values − 1 is the output. */
 static inline real *ggn_exec_plane(const struct ggn_exec *exec, int value, long n, int c)
 {
     return ggn_exec_at(exec, exec->acts, value, n, c);

@@ -108,33 +108,26 @@ static void pack_conv(real *out, const struct ggn_weights *w, const struct ggn_l
     }
 }
 
-/* The faster form, from the packed one. */
-static void pack_forms(struct ggn_weights *w, const struct ggn_layer *l)
-{
-    const struct ggn_kernels *k = w->kernels;
-    const struct ggn_value *v = &w->graph->value[l->out];
-    const int c_in = ggn_layer_c_in(w->graph, l);
-
-    if (l->kernel != 3 || !w->wino || !ggn_wino_suits(c_in, v->c, v->h, v->w, k->lanes))
-        return;
-    k->wino_pack(w->wino + 4 * l->pack, w->pack + l->pack, c_in, v->c, k->tile_oc);
-    if (w->wino_back)
-        k->wino_pack(w->wino_back + 4 * l->pack, w->pack_back + l->pack, v->c, c_in, k->tile_oc);
-}
-
 static void pack_layer(void *data, long i, int worker)
 {
     struct ggn_weights *w = data;
     const struct ggn_graph *g = w->graph;
     const struct ggn_layer *l = &g->layer[i];
+    const struct ggn_kernels *k = w->kernels;
+    const struct ggn_value *v = &g->value[l->out];
+    const int c_in = ggn_layer_c_in(g, l);
 
     if (l->op == GGN_OP_CONV) {
         pack_conv(w->pack + l->pack, w, l, 0);
         if (w->pack_back)
             pack_conv(w->pack_back + l->pack, w, l, 1);
-        pack_forms(w, l);
+        if (l->kernel == 3 && w->wino && ggn_wino_suits(c_in, v->c, v->h, v->w, k->lanes)) {
+            k->wino_pack(w->wino + 4 * l->pack, w->pack + l->pack, c_in, v->c, k->tile_oc);
+            if (w->wino_back)
+                k->wino_pack(w->wino_back + 4 * l->pack, w->pack_back + l->pack, v->c, c_in, k->tile_oc);
+        }
     }
-    for (int c = 0; l->op == GGN_OP_BN && c < g->value[l->out].c; c++) {
+    for (int c = 0; l->op == GGN_OP_BN && c < v->c; c++) {
         size_t s = l->stats + (size_t)c;
         double scale = (double)w->params[l->weight + (size_t)c] / sqrt((double)w->var[s] + GGN_BN_EPS);
         w->scale[s] = (real)scale;
