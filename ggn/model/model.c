@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/json.h"
+
 /* most: of the parameters, which must fit into a file before memory is asked for them. */
 static struct ggn_model *create(const struct ggn_hyper *hyper, size_t most, struct base_err *err)
 {
@@ -163,4 +165,31 @@ int ggn_model_save(const struct ggn_model *m, const char *path, enum ggn_type ty
         rc = ggn_container_write(&c, path, err);
     ggn_container_release(&c);
     return rc;
+}
+
+int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct base_err *err)
+{
+    cJSON *object = cJSON_CreateObject();
+    int rc = ggn_policy_check(policy, err), failed = !object;
+
+    ggn_policy_put(object, policy, 1, &failed);
+    if (!rc && failed)
+        rc = base_fail_nomem(err, "model policy");
+    if (rc) {
+        cJSON_Delete(object);
+        return rc;
+    }
+    cJSON_DeleteItemFromObjectCaseSensitive(model->provenance, "policy");
+    base_json_item(model->provenance, "policy", object, &failed);
+    if (failed)
+        return base_fail_nomem(err, "model policy");
+    model->policy = *policy;
+    model->policy.ratio = policy->ratio > 1 ? policy->ratio : 1;
+    model->policy.n_levels = 0;
+    return 0;
+}
+
+int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct base_err *err)
+{
+    return ggn_policy_get(cJSON_GetObjectItemCaseSensitive(model->provenance, "policy"), model->policy, 1, policy, err);
 }

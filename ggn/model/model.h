@@ -47,4 +47,9 @@ int ggn_model_parse(const struct ggn_container *c, const char *name, struct ggn_
 /* Atomic. `type` is that of the convolution and linear weights; biases, batch norm and statistics are always f32. */
 int ggn_model_save(const struct ggn_model *model, const char *path, enum ggn_type type, struct base_err *err);
 
+/* What the model says, defaults elsewhere. BASE_EINVAL when a field is out of range. */
+int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct base_err *err);
+/* Puts the policy into the model; its levels as "levels" where it has any. */
+int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct base_err *err);
+
 #endif

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "base/json.h"
-#include "model/model.h"
 #include "nn/loss.h"
 
 /* Every field with its range but passes, which is an integer. `own`: a model's calibration has no place for it. */
@@ -148,7 +147,7 @@ double ggn_policy_predict(const struct ggn_policy *policy, double p, double thre
     return above > 0 ? spp * exp2(fmin(above / policy->slope, 20)) : spp;
 }
 
-static void put_fields(cJSON *to, const struct ggn_policy *policy, int only_own, int *failed)
+void ggn_policy_put(cJSON *to, const struct ggn_policy *policy, int only_own, int *failed)
 {
     for (int i = 0; i < N_FIELDS; i++)
         if (fields[i].own || !only_own)
@@ -172,22 +171,26 @@ static int get_levels(const cJSON *list, struct ggn_policy *policy, struct base_
     return 0;
 }
 
-static int get_fields(const cJSON *from, struct ggn_policy *policy, int only_own, struct base_err *err)
+int ggn_policy_get(const cJSON *from, struct ggn_policy p, int only_own, struct ggn_policy *policy, struct base_err *err)
 {
     for (int i = 0; i < N_FIELDS; i++) {
         const cJSON *item = fields[i].own || !only_own ? cJSON_GetObjectItemCaseSensitive(from, fields[i].name) : NULL;
         if (item && !cJSON_IsNumber(item))
             return base_fail(err, BASE_EINVAL, "policy: %s is not a number", fields[i].name);
         if (item)
-            memcpy((char *)policy + fields[i].offset, &item->valuedouble, sizeof item->valuedouble);
+            memcpy((char *)&p + fields[i].offset, &item->valuedouble, sizeof item->valuedouble);
     }
-    int rc = get_levels(cJSON_GetObjectItemCaseSensitive(from, "levels"), policy, err);
-    return rc ? rc : ggn_policy_check(policy, err);
+    int rc = get_levels(cJSON_GetObjectItemCaseSensitive(from, "levels"), &p, err);
+    if (!rc)
+        rc = ggn_policy_check(&p, err);
+    if (!rc)
+        *policy = p;
+    return rc;
 }
 
 void ggn_policy_print(cJSON *to, const struct ggn_policy *policy, int *failed)
 {
-    put_fields(to, policy, 0, failed);
+    ggn_policy_put(to, policy, 0, failed);
     base_json_number(to, "passes", policy->passes, failed);
 }
 
@@ -197,40 +200,5 @@ int ggn_policy_parse(const cJSON *from, struct ggn_policy *policy, struct base_e
     const cJSON *passes = cJSON_GetObjectItemCaseSensitive(from, "passes");
 
     p.passes = cJSON_IsNumber(passes) ? passes->valueint : 0;
-    int rc = get_fields(from, &p, 0, err);
-    if (!rc)
-        *policy = p;
-    return rc;
-}
-
-int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct base_err *err)
-{
-    cJSON *object = cJSON_CreateObject();
-    int rc = ggn_policy_check(policy, err), failed = !object;
-
-    put_fields(object, policy, 1, &failed);
-    if (!rc && failed)
-        rc = base_fail_nomem(err, "model policy");
-    if (rc) {
-        cJSON_Delete(object);
-        return rc;
-    }
-    cJSON_DeleteItemFromObjectCaseSensitive(model->provenance, "policy");
-    base_json_item(model->provenance, "policy", object, &failed);
-    if (failed)
-        return base_fail_nomem(err, "model policy");
-    model->policy = *policy;
-    model->policy.ratio = policy->ratio > 1 ? policy->ratio : 1;
-    model->policy.n_levels = 0;
-    return 0;
-}
-
-int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct base_err *err)
-{
-    struct ggn_policy p = model->policy;
-    const cJSON *object = cJSON_GetObjectItemCaseSensitive(model->provenance, "policy");
-    int rc = get_fields(object, &p, 1, err);
-    if (!rc)
-        *policy = p;
-    return rc;
+    return ggn_policy_get(from, p, 0, policy, err);
 }

@@ -12,7 +12,6 @@
 #include "model/preprocess.h"
 
 struct cJSON;
-struct ggn_model;
 
 enum { GGN_POLICY_LEVELS = 256 };
 
@@ -54,11 +53,6 @@ int ggn_policy_levels_differ(const struct ggn_policy *policy, const double *spp,
 /* Samples at which p is expected to fall below `threshold`, from p at spp; at least spp. NaN if the slope is not known. */
 double ggn_policy_predict(const struct ggn_policy *policy, double p, double threshold, double spp);
 
-/* What the model says, defaults elsewhere. BASE_EINVAL when a field is out of range. */
-int ggn_policy_of(const struct ggn_model *model, struct ggn_policy *policy, struct base_err *err);
-/* Puts the policy into the model; its levels as "levels" where it has any. */
-int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, struct base_err *err);
-
 /* What surrounds a picture that a model judges. A model knows what it has learned with. Exposure is not among it: that is
  * part of what is seen, as the lamps' strength is, and models learn with both. */
 struct ggn_setting {
@@ -69,9 +63,14 @@ struct ggn_setting {
  * a gamma instead of sRGB", and returns the length: 0 where nothing is. */
 size_t ggn_setting_difference(const struct ggn_setting *learned, const struct ggn_setting *here, char *text, size_t room);
 
-/* A whole policy as members of a JSON object, for models that are no networks. */
+/* All fields but passes as members of a JSON object, or those alone that a model's calibration has no place for. */
+void ggn_policy_put(struct cJSON *to, const struct ggn_policy *policy, int only_own, int *failed);
+/* BASE_EINVAL when a field is no number or out of range; fields that are missing stay those of `p`. */
+int ggn_policy_get(const struct cJSON *from, struct ggn_policy p, int only_own, struct ggn_policy *policy,
+                   struct base_err *err);
+/* A whole policy, for models that are no networks. */
 void ggn_policy_print(struct cJSON *to, const struct ggn_policy *policy, int *failed);
-/* BASE_EINVAL when a field is no number or out of range; fields that are missing keep their default. */
+/* Fields that are missing keep their default, but for passes. */
 int ggn_policy_parse(const struct cJSON *from, struct ggn_policy *policy, struct base_err *err);
 
 #endif

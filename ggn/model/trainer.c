@@ -130,8 +130,6 @@ static int create_execs(struct ggn_trainer *t, struct base_err *err)
 struct ggn_trainer *ggn_trainer_create(const struct ggn_hyper *hyper, const struct ggn_train_options *options,
                                        struct base_threads *threads, struct base_err *err)
 {
-    if (ggn_hyper_check(hyper, err))
-        return NULL;
     if (options->batch < 1 || options->batch > GGN_BATCH_MAX) {
         base_fail(err, BASE_EINVAL, "batch size %d is not in 1..%d", options->batch, GGN_BATCH_MAX);
         return NULL;
@@ -229,7 +227,7 @@ static int update(struct ggn_trainer *t, int net, size_t n, struct base_err *err
     return 0;
 }
 
-/* Gap-free planes into the input of image step · i + first of the executor, i < count; those of image i at planes[i·stride]. */
+/* Gap-free planes, from planes[i·stride] on, into the input of image step·i + first of the executor, i < count. */
 static void set_inputs(const struct ggn_exec *e, int step, int first, const real *const *planes, int stride, int count)
 {
     const struct ggn_value *v = &e->graph->value[0];
@@ -312,23 +310,18 @@ void ggn_trainer_denoiser_losses(struct ggn_trainer *t, const real *const *x, co
         loss[i] = 1 - denoised_ssim(t, i, reference + 3 * i, 0, 0);
 }
 
-/* Where a sample's map comes from: image step · sample + first of an executor. */
-struct maps {
-    const struct ggn_exec *m;
-    int step, first;
-};
-
 /* D's input (NFM of denoised, NFM of noisy) from generator outputs; or `back` with the gradients, which with `add` are added
  * to those of the maps: between two backward passes of D, M is the same, so that both can go back through it at once:
  * Jᵀg + Jᵀg' = Jᵀ(g + g'). */
-static void exchange_maps(struct ggn_trainer *t, const struct maps of[2], int count, int back, int add)
+static void exchange_maps(struct ggn_trainer *t, int count, int back, int add)
 {
     const int out = t->graph[GGN_NET_M].n_values - 1;
     const struct ggn_value *v = &t->graph[GGN_NET_M].value[out];
 
     for (int i = 0; i < 2 * count; i++) {
-        const int channel = i % 2, image = i / 2, n = of[channel].step * image + of[channel].first;
-        const struct ggn_exec *m = of[channel].m;
+        const int channel = i % 2, image = i / 2,
+                  n = t->m2 ? image : i; /* in one batch a sample's windows lie side by side */
+        const struct ggn_exec *m = channel && t->m2 ? t->m2 : t->m;
         if (!back) {
             ggn_exec_load(t->d, image, channel, ggn_exec_output(m, n, 0), v->row);
             continue;
@@ -418,19 +411,18 @@ int ggn_trainer_classifier_step(struct ggn_trainer *t, const struct ggn_batch *b
         return rc;
     if (t->hyper.preset == GGN_PRESET_PAPER)
         return base_fail(err, BASE_EINVAL, "the published preset trains in its own order");
-    const struct maps maps[2] = {{t->m, 2, 0}, {t->m, 2, 1}}; /* a sample's two windows lie side by side */
     set_inputs(t->m, 2, 0, b->denoised, planes, b->count);
     set_inputs(t->m, 2, 1, b->noisy, planes, b->count);
     zero_grad(t, GGN_NET_M);
     zero_grad(t, GGN_NET_D);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], 2 * b->count, GGN_TRAIN);
-    exchange_maps(t, maps, b->count, 0, 0);
+    exchange_maps(t, b->count, 0, 0);
     set_measured(t, b);
     *bce = classify(t, b, logits);
     rc = check(t, GGN_NET_D, *bce, "loss", err);
     if (rc)
         return rc;
-    exchange_maps(t, maps, b->count, 1, 0);
+    exchange_maps(t, b->count, 1, 0);
     ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
     rc = update(t, GGN_NET_D, t->graph[GGN_NET_D].n_params, err);
     if (!rc)
@@ -481,19 +473,18 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
     if (rc)
         return rc;
 
-    const struct maps maps[2] = {{t->m, 1, 0}, {t->m2, 1, 0}};
     zero_grad(t, GGN_NET_M);
     zero_grad(t, GGN_NET_D);
     set_inputs(t->m2, 1, 0, b->noisy, 3 * t->hyper.window, b->count);
     ggn_exec_forward(t->m, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
     ggn_exec_forward(t->m2, t->weights[GGN_NET_M], b->count, GGN_TRAIN);
-    exchange_maps(t, maps, b->count, 0, 0);
+    exchange_maps(t, b->count, 0, 0);
 
     record->bce_before = classify(t, b, record_all ? record->logit_before : NULL);
     rc = check(t, GGN_NET_D, record->bce_before, "loss", err);
     if (rc)
         return rc;
-    exchange_maps(t, maps, b->count, 1, 0);
+    exchange_maps(t, b->count, 1, 0);
     record->d_grad_l2 = grad_l2(t, GGN_NET_D, d->n_params);
     rc = update(t, GGN_NET_D, d->n_params, err);
     if (rc)
@@ -501,7 +492,7 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
 
     zero_grad(t, GGN_NET_D);
     record->bce_after = classify(t, b, record_all ? record->logit_after : NULL);
-    exchange_maps(t, maps, b->count, 1, 1);
+    exchange_maps(t, b->count, 1, 1);
     ggn_exec_backward(t->m, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
     ggn_exec_backward(t->m2, t->weights[GGN_NET_M], t->grad[GGN_NET_M]);
     record->m_grad_l2_accumulated = grad_l2(t, GGN_NET_M, m_trained);
