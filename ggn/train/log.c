@@ -9,12 +9,10 @@ const char *const ggn_log_phases[] = {"denoiser", "judge"};
 
 int ggn_log_add(struct ggn_log *log, const struct ggn_log_row *row, struct base_err *err)
 {
-    if ((log->n & (log->n - 1)) == 0) {
-        struct ggn_log_row *more = realloc(log->rows, (log->n ? 2 * (size_t)log->n : 1) * sizeof *more);
-        if (!more)
-            return base_fail_nomem(err, "learning curves");
-        log->rows = more;
-    }
+    struct ggn_log_row *more = realloc(log->rows, ((size_t)log->n + 1) * sizeof *more);
+    if (!more)
+        return base_fail_nomem(err, "learning curves");
+    log->rows = more;
     log->rows[log->n++] = *row;
     return 0;
 }

@@ -26,22 +26,13 @@ static void say(const struct ggn_session *s, const struct ggn_log_row *row, cons
     fflush(f);
 }
 
-/* The learning curves and the checkpoint. */
-static int write_files(struct ggn_session *s, struct base_err *err)
-{
-    char path[4096];
-
-    snprintf(path, sizeof path, "%s.csv", s->plan->out);
-    int rc = ggn_log_write_csv(&s->log, path, err);
-    return rc ? rc : ggn_resume_save(s, err);
-}
-
-/* One epoch; on divergence the trainer is back at the epoch's start and so is the step. */
+/* One epoch with its curves and checkpoint; on divergence the trainer is back at the epoch's start and so is the step. */
 static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct base_err *err)
 {
     const uint64_t begin = s->progress.step, left = phase->steps - begin;
     const uint64_t n = left < phase->epoch_steps ? left : phase->epoch_steps;
     struct ggn_log_row row = {.phase = s->progress.phase};
+    char path[4096];
     double start = base_clock_wall_s(), processor = base_clock_process_s(), loss, right;
 
     while (s->progress.step < begin + n) {
@@ -71,7 +62,9 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
     if (rc)
         return rc;
     say(s, &row, phase, (double)n * phase->batch / fmax(seconds, 1e-9));
-    return write_files(s, err);
+    snprintf(path, sizeof path, "%s.csv", s->plan->out);
+    rc = ggn_log_write_csv(&s->log, path, err);
+    return rc ? rc : ggn_resume_save(s, err);
 }
 
 /* The denoiser's own phase is not cut short, and there is no model without a validation. */

@@ -17,7 +17,8 @@ struct ggn_phase {
     int (*validate)(struct ggn_session *session, struct ggn_log_row *row, struct base_err *err);
 };
 
-/* From progress.step and the weights as they are to the end. After a divergence the epoch is repeated with half the learning rates and other draws. */
+/* From progress.step and the weights as they are to the end. After a divergence the epoch is repeated with half the learning
+ * rates and other draws. */
 int ggn_phase_run(struct ggn_session *session, const struct ggn_phase *phase, struct base_err *err);
 
 /*
@@ -25,7 +26,7 @@ int ggn_phase_run(struct ggn_session *session, const struct ggn_phase *phase, st
  * changes as tensors "0", "1", …, progress, optimiser counts and learning curves as JSON of "kind": "training".
  */
 int ggn_resume_save(struct ggn_session *session, struct base_err *err);
-/* With plan->resume: reads it, if it is there, and sets the phase, so that the session can make the trainer of that phase. */
+/* With plan->resume: reads it, if it is there, and sets the phase, so that a trainer of that phase can be made. */
 int ggn_resume_open(struct ggn_session *session, struct base_err *err);
 /* Then takes over the numbers, if it was there. */
 int ggn_resume_load(struct ggn_session *session, struct base_err *err);
@@ -44,7 +45,7 @@ struct ggn_classified {
     double loss, accuracy;    /* of the calibrated probability; NaN without windows */
     struct ggn_policy policy; /* calibrated: as the law, with a residual, else fitted to the labels */
 };
-/* Judges evenly strided ones, at most `most`, with the weights as they are. The caller frees `logit`, also after a failure. */
+/* Judges evenly strided ones, at most `most`, with the weights as they are. The caller frees `logit`, also on failure. */
 int ggn_classify_validation(struct ggn_session *session, int most, struct ggn_classified *out, struct base_err *err);
 
 #endif

@@ -67,7 +67,7 @@ struct ggn_session {
     double scale;         /* with plan->reach: of the logistic, per octave of noise */
 };
 
-/* Loads the data and checks the plan against it. `session` starts with its plan, path and phase; release it also after a failure. */
+/* Loads the data and checks the plan against it. `session` has plan, path and phase; release it after a failure, too. */
 int ggn_session_init(struct ggn_session *session, struct base_err *err);
 void ggn_session_release(struct ggn_session *session);
 /* Loads plan->init: a model of the same networks. */
