@@ -80,6 +80,7 @@ static void conv_piece(const struct ggn_task *t, long i)
     }
     const int oc0 = (int)(i % t->oc_groups) * t->oc_group;
     const int oc1 = oc0 + t->oc_group < conv.n_out ? oc0 + t->oc_group : conv.n_out;
+    /* Winograd's algorithm has its own grid of tiles: a piece's share of them, since a block of pixels may cut one */
     const long tiles = ggn_wino_tiles(v->h, v->w), p0 = part * t->px_block;
     if (t->wino)
         t->e->kernels->wino(&conv, t->wino, (int)(tiles * part / t->px_blocks), (int)(tiles * (part + 1) / t->px_blocks),

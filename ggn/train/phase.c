@@ -53,6 +53,7 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
         return rc;
     s->progress.seconds[row.phase] += base_clock_wall_s() - start;
     s->progress.processor_s[row.phase] += base_clock_process_s() - processor;
+    /* from here on a divergence goes back to this state; written only once it has been validated and logged */
     ggn_trainer_keep(s->trainer);
     row.lr = s->trainer->options.lr[phase->net];
     row.step = (double)s->progress.step;

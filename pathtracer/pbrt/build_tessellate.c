@@ -125,6 +125,7 @@ int pt_build_bilinear(struct pt_builder *b, struct pt_params *p)
     for (size_t i = 0; i < count; i++)
         if (pt_build_check_index(p, indices[i], vertices) != 0)
             return b->diag.rc;
+    /* a mesh has normals everywhere or nowhere: one bent patch gives them to all */
     for (size_t i = 0; i < count && !N; i += 4) {
         const double *c[4];
         for (size_t k = 0; k < 4; k++)

@@ -195,6 +195,7 @@ static int scan(const char *text, size_t n, struct decimal *d)
             continue;
         }
         digits++;
+        /* so many fit into 64 bits; the others only move the point */
         if (significant < 19) {
             d->mantissa = d->mantissa * 10 + (uint64_t)(text[i] - '0');
             significant += d->mantissa > 0;

@@ -45,6 +45,7 @@ static int begin_frame(struct pt_render *r, uint32_t film_planes, struct base_er
 {
     const struct pt_render_config *c = &r->config;
     struct lull_error e = {.struct_size = sizeof e};
+    /* what hangs on the clock is decided otherwise the next time */
     int deterministic = c->time_budget_s <= 0.0 && c->max_check_overhead <= 0.0;
     int independent = c->integrator.sampler == PT_SAMPLER_INDEPENDENT;
     struct lull_host_config config = {

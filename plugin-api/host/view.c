@@ -88,6 +88,7 @@ int32_t lull_host_show(const struct lull_host_blocks *b, const struct lull_host_
         s.planes[i] = v->planes[i];
     if (!s.planes[LULL_PLANE_WEIGHT].data)
         s.planes[LULL_PLANE_WEIGHT] = s.planes[LULL_PLANE_SPP];
+    /* where samples were dropped, sums are divided by those that are in them: the host's planes do not count those */
     const int halves = dropped && v->dropped_half && half->data &&
                        (half->normaliser == LULL_NORM_WEIGHT || half->normaliser == LULL_NORM_HALF_SPP);
     counts = counts && !(s.planes[LULL_PLANE_SPP].data && s.planes[LULL_PLANE_WEIGHT].data);

@@ -462,6 +462,7 @@ int seq_builder_add(struct seq_builder *w, const struct seq_frame *f, struct bas
         w->size = start;
         goto out;
     }
+    /* the header last: it has the size and the checksum of what follows it */
     uint8_t *p = w->bytes + start;
     size_t payload = w->size - start - SEQ_RECORD_HEADER;
     base_put_u32(p, f->is_reference ? KIND_REFERENCE : KIND_LEVEL);
