@@ -206,13 +206,14 @@ static void bound_quadric(const struct pt_shape *shape, const struct pt_quadric 
 }
 
 /* Where the light of an emitter that is not at infinity comes from and where it goes; `power` as by power_of. 0: nowhere. */
-static int bound_emitter(const struct pt_scene *scene, const struct pt_emitter *e, double power, struct pt_light_bounds *out)
+static int bound_emitter(const struct pt_scene *scene, int32_t id, double power, struct pt_light_bounds *out)
 {
+    const struct pt_emitter *e = &scene->emitters[id];
     const struct pt_light *light = &scene->lights[e->light];
     const struct pt_shape *shape = light->kind == PT_LIGHT_AREA ? &scene->shapes[light->shape] : NULL;
     double pi = (double)PT_PI;
     *out = (struct pt_light_bounds){
-        light->position, light->position, {0.0f, 0.0f, 1.0f}, PT_PI, 0.5f * PT_PI, light->two_sided, 0.0};
+        id, light->two_sided, light->position, light->position, {0.0f, 0.0f, 1.0f}, PT_PI, 0.5f * PT_PI, 0.0};
     if (e->primitive >= 0) {
         pt_vec3 b = v3_add(e->p0, e->e1), c = v3_add(e->p0, e->e2);
         out->lower = v3_least(e->p0, v3_least(b, c));
@@ -239,17 +240,18 @@ static int bound_emitter(const struct pt_scene *scene, const struct pt_emitter *
 }
 
 /* A share of the intensity spread evenly over the lights, as UNIFORM_SHARE is: strong lamps that stand in another room. */
-static void spread(const struct pt_scene *scene, const int32_t *ids, int32_t count, struct pt_light_bounds *bounds)
+static void spread(const struct pt_scene *scene, int32_t count, struct pt_light_bounds *bounds)
 {
+    const struct pt_emitter *emitters = scene->emitters;
     double total = 0.0;
     int lights = 0;
     for (int32_t i = 0; i < count; i++) {
         total += bounds[i].intensity;
-        lights += i == 0 || scene->emitters[ids[i]].light != scene->emitters[ids[i - 1]].light;
+        lights += i == 0 || emitters[bounds[i].emitter].light != emitters[bounds[i - 1].emitter].light;
     }
     for (int32_t i = 0, end; i < count; i = end) {
         double sum = 0.0;
-        for (end = i; end < count && scene->emitters[ids[end]].light == scene->emitters[ids[i]].light; end++)
+        for (end = i; end < count && emitters[bounds[end].emitter].light == emitters[bounds[i].emitter].light; end++)
             sum += bounds[end].intensity;
         for (int32_t k = i; k < end; k++)
             bounds[k].intensity *= (1.0 - TREE_UNIFORM_SHARE) / total + TREE_UNIFORM_SHARE / (sum * lights);
@@ -305,8 +307,8 @@ static int make_tree(struct pt_scene *scene, const struct shares *s, const doubl
         return 1;
     struct pt_light_tree *tree = pt_arena_alloc(&scene->arena, 1, sizeof *tree);
     struct pt_light_bounds *bounds = pt_arena_alloc(scratch, n, sizeof *bounds);
-    int32_t *ids = pt_arena_alloc(scratch, n, sizeof *ids), count = 0;
-    if (!tree || !bounds || !ids)
+    int32_t count = 0;
+    if (!tree || !bounds)
         return 0;
     if (s->far_count > 0 && !(tree->far = pt_arena_alloc(&scene->arena, (size_t)s->far_count, sizeof *tree->far)))
         return 0;
@@ -314,14 +316,14 @@ static int make_tree(struct pt_scene *scene, const struct shares *s, const doubl
         const int far = at_infinity(&scene->lights[scene->emitters[i].light]);
         if (far && weights[i] > 0.0)
             tree->far[tree->far_count++] = i;
-        if (!far && bound_emitter(scene, &scene->emitters[i], weights[i], &bounds[count]))
-            ids[count++] = i;
+        if (!far && bound_emitter(scene, i, weights[i], &bounds[count]))
+            count++;
     }
     if (count < TREE_LIGHTS)
         return 1;
-    spread(scene, ids, count, bounds);
+    spread(scene, count, bounds);
     float smallest = fmaxf(SMALLEST_NODE * v3_len(v3_sub(scene->bounds_max, scene->bounds_min)), 1e-18f);
-    if (!pt_light_tree_build(tree, bounds, ids, count, scene->emitter_count, smallest, &scene->arena, scratch))
+    if (!pt_light_tree_build(tree, bounds, count, scene->emitter_count, smallest, &scene->arena, scratch))
         return 0;
     scene->light_tree = tree;
     return 1;

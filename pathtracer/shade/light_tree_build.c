@@ -9,17 +9,12 @@ enum { BUCKETS = 12 };
  * convex body is seen from anywhere (Cauchy), 1/2 of a sheet that emits on both sides. */
 static const float SEEN_OF_BODY = 0.25f, SEEN_OF_SHEET = 0.5f;
 
-/* A run of emitters in `order`, and what bounds them together. */
+/* A run of emitters, and what bounds them together. */
 struct cluster {
-    int32_t begin, end;
+    int32_t begin, end;       /* in the array that is being sorted */
     struct pt_light_bounds b; /* intensity: the sum */
     double net[3];            /* sum of intensity · axis over emitters with a normal */
     double any;               /* sum of intensity over those without */
-};
-
-struct build {
-    const struct pt_light_bounds *bounds;
-    int32_t *order; /* [count] into bounds */
 };
 
 static float angle_between(pt_vec3 a, pt_vec3 b) { return acosf(fminf(1.0f, fmaxf(-1.0f, v3_dot(a, b)))); }
@@ -64,25 +59,23 @@ static void unite(struct cluster *a, const struct cluster *b)
     a->any += b->any;
 }
 
-static struct cluster single(const struct build *build, int32_t i)
+/* Adds emitter i of `bounds` to *c. */
+static void add(struct cluster *c, const struct pt_light_bounds *bounds, int32_t i)
 {
-    const struct pt_light_bounds *b = &build->bounds[build->order[i]];
-    struct cluster c = {.begin = i, .end = i + 1, .b = *b};
-    if (b->normals_rad >= PT_PI)
-        c.any = b->intensity;
-    c.net[0] = (b->intensity - c.any) * (double)b->axis.x;
-    c.net[1] = (b->intensity - c.any) * (double)b->axis.y;
-    c.net[2] = (b->intensity - c.any) * (double)b->axis.z;
-    return c;
+    struct cluster one = {.begin = i, .end = i + 1, .b = bounds[i]};
+    if (one.b.normals_rad >= PT_PI)
+        one.any = one.b.intensity;
+    one.net[0] = (one.b.intensity - one.any) * (double)one.b.axis.x;
+    one.net[1] = (one.b.intensity - one.any) * (double)one.b.axis.y;
+    one.net[2] = (one.b.intensity - one.any) * (double)one.b.axis.z;
+    unite(c, &one);
 }
 
-static struct cluster gather(const struct build *build, int32_t begin, int32_t end)
+static struct cluster gather(const struct pt_light_bounds *bounds, int32_t begin, int32_t end)
 {
     struct cluster all = {0};
-    for (int32_t i = begin; i < end; i++) {
-        struct cluster one = single(build, i);
-        unite(&all, &one);
-    }
+    for (int32_t i = begin; i < end; i++)
+        add(&all, bounds, i);
     all.begin = begin;
     all.end = end;
     return all;
@@ -109,37 +102,33 @@ static float centroid(const struct pt_light_bounds *b, int axis)
     return 0.5f * component(b->lower, axis) + 0.5f * component(b->upper, axis);
 }
 
-static int bucket_of(const struct pt_light_bounds *b, int axis, float low, float high)
+/* A way to split a cluster: at the end of bucket `after` of those between the least and the greatest centroid on an axis. */
+struct cut {
+    int axis, after;
+    float low, high;
+    double cost; /* INFINITY: there is none */
+};
+
+static int bucket_of(const struct pt_light_bounds *b, const struct cut *cut)
 {
-    int k = (int)((float)BUCKETS * ((centroid(b, axis) - low) / (high - low)));
+    int k = (int)((float)BUCKETS * ((centroid(b, cut->axis) - cut->low) / (cut->high - cut->low)));
     return k < 0 ? 0 : k >= BUCKETS ? BUCKETS - 1 : k;
 }
 
-static void centroid_range(const struct build *build, const struct cluster *c, int axis, float *low, float *high)
-{
-    *low = INFINITY;
-    *high = -INFINITY;
-    for (int32_t i = c->begin; i < c->end; i++) {
-        float x = centroid(&build->bounds[build->order[i]], axis);
-        *low = fminf(*low, x);
-        *high = fmaxf(*high, x);
-    }
-}
-
-/* Least cost over the splits between the buckets of one axis; *after: the last bucket on the left. INFINITY: none. */
-static double best_on_axis(const struct build *build, const struct cluster *c, int axis, int *after)
+/* The way of least cost on one axis. */
+static struct cut best_on_axis(const struct pt_light_bounds *bounds, const struct cluster *c, int axis)
 {
     struct cluster buckets[BUCKETS] = {0}, left = {0}, right = {0};
-    double right_cost[BUCKETS] = {0}, best = INFINITY;
-    float low, high;
-    centroid_range(build, c, axis, &low, &high);
-    if (!(high > low))
-        return INFINITY;
+    double right_cost[BUCKETS] = {0};
+    struct cut best = {.axis = axis, .low = INFINITY, .high = -INFINITY, .cost = INFINITY};
     for (int32_t i = c->begin; i < c->end; i++) {
-        int k = bucket_of(&build->bounds[build->order[i]], axis, low, high);
-        struct cluster one = single(build, i);
-        unite(&buckets[k], &one);
+        best.low = fminf(best.low, centroid(&bounds[i], axis));
+        best.high = fmaxf(best.high, centroid(&bounds[i], axis));
     }
+    if (!(best.high > best.low))
+        return best;
+    for (int32_t i = c->begin; i < c->end; i++)
+        add(&buckets[bucket_of(&bounds[i], &best)], bounds, i);
     for (int k = BUCKETS - 1; k > 0; k--) {
         unite(&right, &buckets[k]);
         right_cost[k] = cost(&right);
@@ -147,46 +136,39 @@ static double best_on_axis(const struct build *build, const struct cluster *c, i
     for (int k = 0; k + 1 < BUCKETS; k++) {
         unite(&left, &buckets[k]);
         double total = cost(&left) + right_cost[k + 1];
-        if (total < best) {
-            best = total;
-            *after = k;
+        if (total < best.cost) {
+            best.cost = total;
+            best.after = k;
         }
     }
     pt_vec3 d = v3_sub(c->b.upper, c->b.lower);
     /* against thin slices: an axis costs in proportion to how short it is */
-    return best * (double)(fmaxf(d.x, fmaxf(d.y, d.z)) / fmaxf(component(d, axis), 1e-30f));
+    best.cost *= (double)(fmaxf(d.x, fmaxf(d.y, d.z)) / fmaxf(component(d, axis), 1e-30f));
+    return best;
 }
 
 /* Reorders the run of c, which has two emitters at least, and returns where its second half begins. */
-static int32_t split(const struct build *build, const struct cluster *c)
+static int32_t split(struct pt_light_bounds *bounds, const struct cluster *c)
 {
-    int axis = -1, after = 0;
-    double least = INFINITY;
-    for (int a = 0; a < 3; a++) {
-        int k = 0;
-        double found = best_on_axis(build, c, a, &k);
-        if (found < least) {
-            least = found;
-            axis = a;
-            after = k;
-        }
+    struct cut best = {.cost = INFINITY};
+    for (int axis = 0; axis < 3; axis++) {
+        const struct cut cut = best_on_axis(bounds, c, axis);
+        if (cut.cost < best.cost)
+            best = cut;
     }
-    if (axis < 0) /* all in one place */
-        return c->begin + (c->end - c->begin) / 2;
-    float low, high;
-    centroid_range(build, c, axis, &low, &high);
     int32_t middle = c->begin;
-    for (int32_t i = c->begin; i < c->end; i++)
-        if (bucket_of(&build->bounds[build->order[i]], axis, low, high) <= after) {
-            int32_t swap = build->order[i];
-            build->order[i] = build->order[middle];
-            build->order[middle++] = swap;
+    for (int32_t i = c->begin; i < c->end && best.cost < INFINITY; i++)
+        if (bucket_of(&bounds[i], &best) <= best.after) {
+            struct pt_light_bounds swap = bounds[i];
+            bounds[i] = bounds[middle];
+            bounds[middle++] = swap;
         }
+    /* all in one place, or on one side by rounding: by number */
     return middle > c->begin && middle < c->end ? middle : c->begin + (c->end - c->begin) / 2;
 }
 
 /* Splits the most expensive until there are PT_LIGHT_FAN of them or all are single. */
-static int fan_out(const struct build *build, struct cluster all, struct cluster children[PT_LIGHT_FAN])
+static int fan_out(struct pt_light_bounds *bounds, struct cluster all, struct cluster children[PT_LIGHT_FAN])
 {
     int n = 1;
     children[0] = all;
@@ -199,9 +181,9 @@ static int fan_out(const struct build *build, struct cluster all, struct cluster
         if (most_expensive < 0)
             break;
         struct cluster whole = children[most_expensive];
-        int32_t middle = split(build, &whole);
-        children[most_expensive] = gather(build, whole.begin, middle);
-        children[n++] = gather(build, middle, whole.end);
+        int32_t middle = split(bounds, &whole);
+        children[most_expensive] = gather(bounds, whole.begin, middle);
+        children[n++] = gather(bounds, middle, whole.end);
     }
     return n;
 }
@@ -231,27 +213,23 @@ static void fill_slot(struct pt_light_node *n, int k, const struct cluster *c, d
     n->intensity[k] = (float)(seen_intensity(c) / total);
 }
 
-int pt_light_tree_build(struct pt_light_tree *tree, const struct pt_light_bounds *bounds, const int32_t *ids, int32_t count,
-                        int32_t emitter_count, float smallest, struct pt_arena *arena, struct pt_arena *scratch)
+int pt_light_tree_build(struct pt_light_tree *tree, struct pt_light_bounds *bounds, int32_t count, int32_t emitter_count,
+                        float smallest, struct pt_arena *arena, struct pt_arena *scratch)
 {
     /* each node has two children at least, so there are fewer of them than emitters */
     struct pt_light_node *nodes = pt_arena_alloc(scratch, (size_t)count, sizeof *nodes);
     struct cluster *clusters = pt_arena_alloc(scratch, (size_t)count, sizeof *clusters);
-    int32_t *order = pt_arena_alloc(scratch, (size_t)count, sizeof *order);
     int32_t *places = pt_arena_alloc(arena, (size_t)emitter_count, sizeof *places);
-    if (!nodes || !clusters || !order || !places)
+    if (!nodes || !clusters || !places)
         return 0;
-    struct build build = {bounds, order};
-    for (int32_t i = 0; i < count; i++)
-        order[i] = i;
     for (int32_t i = 0; i < emitter_count; i++)
         places[i] = -1;
-    clusters[0] = gather(&build, 0, count);
+    clusters[0] = gather(bounds, 0, count);
     nodes[0].parent = -1;
     tree->node_count = 1;
     for (int32_t i = 0; i < tree->node_count; i++) { /* breadth first: what is near the root lies close together */
         struct cluster children[PT_LIGHT_FAN];
-        int n = fan_out(&build, clusters[i], children);
+        int n = fan_out(bounds, clusters[i], children);
         double total = 0.0;
         for (int k = 0; k < n; k++)
             total += seen_intensity(&children[k]);
@@ -260,7 +238,7 @@ int pt_light_tree_build(struct pt_light_tree *tree, const struct pt_light_bounds
         for (int k = 0; k < n; k++) {
             fill_slot(&nodes[i], k, &children[k], total, smallest);
             if (children[k].end - children[k].begin == 1) {
-                int32_t emitter = ids[order[children[k].begin]];
+                int32_t emitter = bounds[children[k].begin].emitter;
                 nodes[i].child[k] = ~emitter;
                 places[emitter] = PT_LIGHT_FAN * i + k;
                 continue;
