@@ -7,11 +7,9 @@
 #include "geom/quadric.h"
 #include "sample/rng.h"
 #include "scene/settings.h"
-#include "shade/alias.h"
 #include "shade/light_area.h"
 #include "shade/light_env.h"
 #include "shade/light_tree.h"
-#include "shade/light_tree_build.h"
 
 /* Share of the selection probability that is spread evenly over the finite lights, so that a weak lamp near the camera is
  * not starved by strong ones elsewhere. */
@@ -167,13 +165,45 @@ static void balance(const struct pt_scene *scene, const struct shares *s, double
     }
 }
 
+void pt_alias_build(const double *weights, int32_t n, struct pt_emitter *emitters, int32_t *work)
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < n; i++)
+        sum += weights[i];
+    /* `work` holds the small entries from the front and the large ones from the back */
+    int32_t small = 0, large = n;
+    for (int32_t i = 0; i < n; i++) {
+        emitters[i].alias_q = (float)(weights[i] / sum * n);
+        emitters[i].alias = i;
+        if (emitters[i].alias_q < 1.0f)
+            work[small++] = i;
+        else
+            work[--large] = i;
+    }
+    while (small > 0 && large < n) {
+        int32_t s = work[--small], l = work[large];
+        emitters[s].alias = l;
+        emitters[l].alias_q -= 1.0f - emitters[s].alias_q;
+        if (emitters[l].alias_q < 1.0f) {
+            large++;
+            work[small++] = l;
+        }
+    }
+    while (large < n)
+        emitters[work[large++]].alias_q = 1.0f;
+    /* left over by rounding: but an entry of weight 0 must never be kept */
+    while (small > 0) {
+        int32_t s = work[--small];
+        if (weights[s] > 0.0)
+            emitters[s].alias_q = 1.0f;
+    }
+}
+
 static int make_table(struct pt_scene *scene, double *weights, struct pt_arena *scratch)
 {
     int32_t n = scene->emitter_count;
-    float *q = pt_arena_alloc(scratch, (size_t)n, sizeof *q);
-    int32_t *alias = pt_arena_alloc(scratch, (size_t)n, sizeof *alias),
-            *work = pt_arena_alloc(scratch, (size_t)n, sizeof *work);
-    if (!q || !alias || !work)
+    int32_t *work = pt_arena_alloc(scratch, (size_t)n, sizeof *work);
+    if (!work)
         return 0;
     double sum = 0.0;
     for (int32_t i = 0; i < n; i++)
@@ -181,11 +211,9 @@ static int make_table(struct pt_scene *scene, double *weights, struct pt_arena *
     for (int32_t i = 0; i < n && !(sum > 0.0); i++)
         weights[i] = 1.0; /* only black lights */
     sum = sum > 0.0 ? sum : (double)n;
-    pt_alias_build(weights, n, q, alias, work);
+    pt_alias_build(weights, n, scene->emitters, work);
     for (int32_t i = 0; i < n; i++) {
         struct pt_emitter *e = &scene->emitters[i];
-        e->alias = alias[i];
-        e->alias_q = q[i];
         e->pmf = (float)(weights[i] / sum);
         e->area_over_pmf = e->pmf > 0.0f ? e->area_over_pmf / e->pmf : 0.0f;
         if (e->primitive < 0)

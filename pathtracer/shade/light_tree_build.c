@@ -1,4 +1,4 @@
-#include "shade/light_tree_build.h"
+#include "shade/light_build.h"
 
 #include <math.h>
 #include <string.h>
@@ -81,8 +81,8 @@ static struct cluster gather(const struct pt_light_bounds *bounds, int32_t begin
     return all;
 }
 
-/* Intensity times the measures of place and orientation (eq. 1 there): what a cluster is expected to cost in variance. The
- * square of the diagonal keeps lights in a row from having no surface. INFINITY for an empty one. */
+/* Intensity times the measures of place and orientation (Conty Estevez & Kulla 2018, eq. 1): what a cluster is expected to
+ * cost in variance. The square of the diagonal keeps lights in a row from having no surface. INFINITY for an empty one. */
 static double cost(const struct cluster *c)
 {
     if (c->end == 0)

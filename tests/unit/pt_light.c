@@ -11,7 +11,7 @@
 #include "geom/accel.h"
 #include "geom/quadric.h"
 #include "integ/surface.h"
-#include "shade/alias.h"
+#include "shade/light_build.h"
 #include "shade/light_select.h"
 #include "support/pt_scenes.h"
 #include "support/pt_mat34.h"
@@ -24,13 +24,13 @@ static void alias_table_keeps_probabilities(void **state)
 {
     (void)state;
     const double weights[6] = {1.0, 0.0, 3.0, 0.5, 0.0, 2.5};
-    float q[6];
-    int32_t alias[6], work[6];
+    struct pt_emitter e[6];
+    int32_t work[6];
     double p[6] = {0};
-    pt_alias_build(weights, 6, q, alias, work);
+    pt_alias_build(weights, 6, e, work);
     for (int i = 0; i < 6; i++) {
-        p[i] += (double)q[i] / 6.0;
-        p[alias[i]] += (1.0 - (double)q[i]) / 6.0;
+        p[i] += (double)e[i].alias_q / 6.0;
+        p[e[i].alias] += (1.0 - (double)e[i].alias_q) / 6.0;
     }
     for (int i = 0; i < 6; i++)
         assert_true(fabs(p[i] - weights[i] / 7.0) < 1e-6);
@@ -44,19 +44,21 @@ static void alias_tables_of_any_weights(void **state)
     struct pt_rng rng = pt_rng_make(9);
     for (int round = 0; round < 300; round++) {
         double weights[N], sum = 0.0, p[N] = {0};
-        float q[N];
-        int32_t alias[N], work[N], n = 1 + round % N;
+        struct pt_emitter e[N];
+        int32_t work[N], n = 1 + round % N;
         for (int i = 0; i < n; i++) {
             float u = pt_rng_float(&rng);
             weights[i] = round % 3 == 0 ? 1.0 : i > 0 && u < 0.2f ? 0.0 : pow(10.0, 6.0 * (double)u - 3.0);
             sum += weights[i];
         }
-        pt_alias_build(weights, n, q, alias, work);
+        pt_alias_build(weights, n, e, work);
         for (int i = 0; i < n; i++) {
-            assert_true(q[i] >= 0.0f && q[i] <= 1.0f && alias[i] >= 0 && alias[i] < n);
-            assert_true(weights[alias[i]] > 0.0 && (weights[i] > 0.0 || q[i] == 0.0f));
-            p[i] += (double)q[i] / n;
-            p[alias[i]] += (1.0 - (double)q[i]) / n;
+            const float q = e[i].alias_q;
+            const int32_t alias = e[i].alias;
+            assert_true(q >= 0.0f && q <= 1.0f && alias >= 0 && alias < n);
+            assert_true(weights[alias] > 0.0 && (weights[i] > 0.0 || q == 0.0f));
+            p[i] += (double)q / n;
+            p[alias] += (1.0 - (double)q) / n;
         }
         for (int i = 0; i < n; i++)
             if (!(fabs(p[i] - weights[i] / sum) < 1e-5))
