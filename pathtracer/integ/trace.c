@@ -2,7 +2,7 @@
 
 #include <stdarg.h>
 
-#include "shade/bsdf_models.h"
+#include "shade/bsdf.h"
 
 #define XYZ(v) (double)(v).x, (double)(v).y, (double)(v).z
 

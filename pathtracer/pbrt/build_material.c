@@ -5,7 +5,7 @@
 
 #include "base/options.h"
 #include "pbrt/build.h"
-#include "shade/bsdf_models.h"
+#include "shade/bsdf.h"
 
 /* A material while its parameters are read. */
 struct making {

@@ -6,7 +6,7 @@
 
 #include "base/json.h"
 #include "render/output.h"
-#include "shade/bsdf_models.h"
+#include "shade/bsdf.h"
 
 enum { MOST_EXPENSIVE = 5, REPLAYED = 256 };
 

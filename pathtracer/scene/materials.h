@@ -13,7 +13,7 @@
 /*
  * X(ID, name, scene file's name, words for --debug-path, effects that every use of it needs): the scattering models. A line
  * here and shade/bsdf_NAME.h are all of a model (README.md says what is in it): kinds, dispatch (shade/bsdf_dispatch.h),
- * reading (shade/bsdf_models.h) come from the list.
+ * reading (shade/bsdf.h) come from the list.
  */
 #define PT_BSDFS(X) \
     X(DIFFUSE, diffuse, "diffuse", "diffuse", 0) \

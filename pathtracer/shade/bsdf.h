@@ -80,4 +80,13 @@ struct pt_bsdf_read {
         PT_READ_##kind, name, fallback, offsetof(struct pt_material, field) \
     }
 
+/* A scattering model, for the scene reader and the explanations. */
+struct pt_bsdf_model {
+    const char *file_name;            /* in scene files */
+    const char *words;                /* for people */
+    pt_effects needs;                 /* effects that every use of it needs; its parameters may need more */
+    const struct pt_bsdf_read *reads; /* ends with PT_READ_END */
+};
+extern const struct pt_bsdf_model pt_bsdf_models[PT_BSDF_COUNT]; /* by enum pt_bsdf_kind */
+
 #endif

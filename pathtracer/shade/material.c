@@ -1,7 +1,10 @@
 #include "shade/material.h"
 
-#include "shade/bsdf_models.h"
+#include "shade/bsdf_dispatch.h"
 #include "shade/coat_table.h"
+
+#define PT_BSDF_ROW(id, name, file_name, words, needs) {file_name, words, needs, pt_##name##_reads},
+const struct pt_bsdf_model pt_bsdf_models[PT_BSDF_COUNT] = {PT_BSDFS(PT_BSDF_ROW)};
 
 /* Unit, on the side of the geometric normal; `fallback` when there is no direction left. */
 static pt_vec3 keep_side(pt_vec3 n, pt_vec3 n_geometric, pt_vec3 fallback)
