@@ -17,7 +17,7 @@ PARTS = (("sampler", "sample/"), ("hit to place", "integ/surface geom/offset geo
           "shade/fresnel shade/material shade/inputs"), ("media", "shade/medium shade/phase"), ("path", "integ/"),
          ("camera and film", "shade/camera render/ plugin-api/"))
 EMBREE, LIBM, REST = "Embree", "C library", "other"
-TRANSPARENT = ("scene/vec.h", "scene/vec4.h", "base/colour.h")
+TRANSPARENT = ("scene/vec.h", "base/colour.h")
 
 
 def options(parser):
