@@ -490,13 +490,6 @@ void pt_accel_intersect_lanes(const struct pt_scene *scene, const struct pt_ray_
     ask_all(scene, &(struct batch){.lanes = rays}, count, coherent, hits, NULL);
 }
 
-int pt_accel_occluded(const struct pt_scene *scene, const struct pt_ray *ray)
-{
-    uint8_t occluded;
-    ask_all(scene, &(struct batch){.list = &ray}, 1, 0, NULL, &occluded);
-    return occluded;
-}
-
 void pt_accel_occluded_many(const struct pt_scene *scene, const struct pt_ray *const *rays, int count, uint8_t *occluded)
 {
     ask_all(scene, &(struct batch){.list = rays}, count, 0, NULL, occluded);

@@ -52,14 +52,12 @@ int pt_accel_intersect(const struct pt_scene *scene, const struct pt_ray *ray, s
 /* The same without what was passed. The scene has shapes with alpha or of the material `interface`. */
 int pt_accel_intersect_behind(const struct pt_scene *scene, const struct pt_ray *ray, const struct pt_passed *passed,
                               struct pt_hit *hit);
-/* 1 when anything lies in (t_min, t_max). Alpha is not looked at. */
-int pt_accel_occluded(const struct pt_scene *scene, const struct pt_ray *ray);
 
 /* The same for `count` rays, faster than one after the other and with the same hits; but of two surfaces at the very same
  * distance the other rays may decide which is found. `coherent`: the rays keep together. */
 void pt_accel_intersect_many(const struct pt_scene *scene, const struct pt_ray *const *rays, int count, int coherent,
                              struct pt_hit *const *hits);
-/* occluded[i]: pt_accel_occluded of rays[i]. */
+/* occluded[i]: 1 when anything lies in (t_min, t_max) of rays[i], else 0. Alpha is not looked at. */
 void pt_accel_occluded_many(const struct pt_scene *scene, const struct pt_ray *const *rays, int count, uint8_t *occluded);
 
 /* Rays side by side, from t_min to t_max at time 0; arrays of equal length, a multiple of 16. */

@@ -101,12 +101,20 @@ static void record_rays(const struct pt_scene *scene, const struct pt_integrator
         ray_count--;
 }
 
+/* One ray at a time. */
+static int occluded_one(const struct pt_scene *scene, const struct pt_ray *ray)
+{
+    uint8_t occluded;
+    pt_accel_occluded_many(scene, &ray, 1, &occluded);
+    return occluded;
+}
+
 static unsigned long long replay_single(const struct pt_scene *scene)
 {
     unsigned long long hits = 0;
     for (size_t i = 0; i < ray_count; i++) {
         struct pt_hit hit;
-        hits += (unsigned)(recorded[i].occlusion ? pt_accel_occluded(scene, &recorded[i].ray)
+        hits += (unsigned)(recorded[i].occlusion ? occluded_one(scene, &recorded[i].ray)
                                                  : pt_accel_intersect(scene, &recorded[i].ray, &hit));
     }
     return hits;

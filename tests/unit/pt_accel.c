@@ -32,6 +32,14 @@ static void assert_vec_near(pt_vec3 a, pt_vec3 b, float tolerance)
     assert_near(a.z, b.z, tolerance);
 }
 
+/* One ray at a time. */
+static int occluded_one(const struct pt_scene *scene, const struct pt_ray *ray)
+{
+    uint8_t occluded;
+    pt_accel_occluded_many(scene, &ray, 1, &occluded);
+    return occluded;
+}
+
 static void triangles_have_right_hand_normals(void **state)
 {
     (void)state;
@@ -51,9 +59,9 @@ static void triangles_have_right_hand_normals(void **state)
     pt_place_at_hit(PT_FX_ALL, &scene, &ray, &hit, &at);
     assert_vec_near(at.p, v3(0.25f, -0.5f, 2.0f), 1e-6f);
     assert_vec_near(at.s.n_geometric, v3(0, 0, 1), 1e-6f);
-    assert_int_equal(pt_accel_occluded(&scene, &ray), 1);
+    assert_int_equal(occluded_one(&scene, &ray), 1);
     ray.t_max = 1.9f;
-    assert_int_equal(pt_accel_occluded(&scene, &ray), 0);
+    assert_int_equal(occluded_one(&scene, &ray), 0);
     test_scene_end(&scene);
 }
 
@@ -112,7 +120,7 @@ static void start_is_not_met(void **state)
         list[i] = &rays[i];
         found[i] = &hits[i];
         assert_int_equal(pt_accel_intersect(&scene, &rays[i], &hits[i]), 0);
-        assert_int_equal(pt_accel_occluded(&scene, &rays[i]), 0);
+        assert_int_equal(occluded_one(&scene, &rays[i]), 0);
     }
     struct pt_ray_lanes lanes = {{zero, zero, zero}, {x, zero, z}, PT_RAY_OFF_START, INFINITY};
     for (int coherent = 0; coherent < 2; coherent++)
@@ -142,7 +150,7 @@ static void empty_scene_has_no_hits(void **state)
     test_scene_finish(&scene);
     struct pt_ray ray = ray_to(v3(0, 0, 0), v3(0, 0, 1));
     assert_int_equal(pt_accel_intersect(&scene, &ray, &hit), 0);
-    assert_int_equal(pt_accel_occluded(&scene, &ray), 0);
+    assert_int_equal(occluded_one(&scene, &ray), 0);
     test_scene_end(&scene);
 }
 
@@ -346,7 +354,7 @@ static void compare_many(const struct pt_scene *scene, int count, int coherent, 
     for (int i = 0; i < count; i++) {
         struct pt_hit one;
         assert_int_equal(pt_accel_intersect(scene, &rays[i], &one), hits[i].shape >= 0);
-        assert_int_equal(pt_accel_occluded(scene, &rays[i]), occluded[i]);
+        assert_int_equal(occluded_one(scene, &rays[i]), occluded[i]);
         assert_int_equal(one.shape, hits[i].shape);
         if (one.shape < 0)
             continue;
@@ -381,7 +389,7 @@ static void compare_lanes(const struct pt_scene *scene, int count, int coherent,
         struct pt_hit one;
         pt_accel_intersect(scene, &ray, &one);
         assert_int_equal(one.shape, hits[i].shape);
-        assert_int_equal(pt_accel_occluded(scene, &ray), occluded[i]);
+        assert_int_equal(occluded_one(scene, &ray), occluded[i]);
         if (one.shape >= 0)
             assert_memory_equal(&one.t, &hits[i].t, sizeof one.t);
     }
