@@ -25,8 +25,6 @@
 #include "scene/materials.h"
 #include "scene/vec.h"
 
-/* --- camera ----------------------------------------------------------------------------------------------------------- */
-
 enum pt_camera_kind { PT_CAMERA_PERSPECTIVE, PT_CAMERA_ORTHOGRAPHIC };
 
 struct pt_camera {
@@ -44,8 +42,6 @@ struct pt_camera {
     /* derived by pt_camera_init */
     float x0, dx, y0, dy; /* z = 1 (perspective) or z = 0 (orthographic) plane: x = x0 + dx·raster_x, likewise y */
 };
-
-/* --- textures --------------------------------------------------------------------------------------------------------- */
 
 enum pt_wrap { PT_WRAP_REPEAT, PT_WRAP_BLACK, PT_WRAP_CLAMP, PT_WRAP_OCTAHEDRAL };
 enum pt_pixel_type { PT_PIXEL_U8_SRGB, PT_PIXEL_U8_LINEAR, PT_PIXEL_FLOAT };
@@ -80,8 +76,6 @@ struct pt_texture {
     float su, sv, du, dv;  /* s = su·u + du, t = sv·v + dv */
     struct pt_input in[4]; /* numbers below this texture's own: the array is in dependency order */
 };
-
-/* --- shapes ----------------------------------------------------------------------------------------------------------- */
 
 /* All that a hit reads of a corner lies in one cache line. */
 struct pt_vertex {
@@ -136,8 +130,6 @@ struct pt_instance {
     struct pt_mat34 to_render[2]; /* object, moved by `origin` → render, at first and at last */
     pt_vec3 origin;               /* 0 unless animated; the motion turns about the point that to_render takes 0 to */
 };
-
-/* --- lights ----------------------------------------------------------------------------------------------------------- */
 
 enum pt_light_kind {
     PT_LIGHT_AREA, /* every shape that names it */
@@ -226,8 +218,6 @@ struct pt_env_distribution {
     const uint16_t *column_guide; /* [height][width] */
 };
 
-/* --- media ------------------------------------------------------------------------------------------------------------ */
-
 enum pt_medium_kind { PT_MEDIUM_HOMOGENEOUS, PT_MEDIUM_GRID };
 
 struct pt_medium {
@@ -242,8 +232,6 @@ struct pt_medium {
     int32_t mx, my, mz;          /* majorant cells; made by shade/medium */
     const float *majorant;       /* [mz][my][mx] largest density in each */
 };
-
-/* --- the scene -------------------------------------------------------------------------------------------------------- */
 
 /* Why an effect is in the scene's set, for --explain. */
 struct pt_effect_reason {
