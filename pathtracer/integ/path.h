@@ -209,6 +209,8 @@ PT_KERNEL_INLINE pt_vec3 pt_path_transmittance(pt_effects fx, struct pt_path *pa
         enum pt_passage passage = found ? pt_passage_at(fx, scene, ray, &hit, &rng) : PT_PASSAGE_BORDER;
         if (passage == PT_PASSAGE_NONE)
             return v3_splat(0.0f);
+        /* A medium ends at a border or at the light. Borders at one place are crossed together, once the ray meets something
+         * behind them: until then the medium that goes on from `start` is not known. */
         if ((fx & PT_FX_MEDIA) && passage == PT_PASSAGE_BORDER) {
             if (found)
                 pt_place_at_hit(fx, scene, ray, &hit, &at);
@@ -463,6 +465,7 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
     if (path->trace)
         pt_trace_surface(path->trace, at, &bsdf, path->throughput);
 
+    /* the light before the next direction, which replaces the ray, the medium and the throughput that it needs */
     path->prev = pt_path_receiver(fx, at->p, &frame, &bsdf, wo);
     if (pt_bsdf_has_smooth(fx, &bsdf) && pt_path_sample_light(fx, path, u_light)) {
         const struct pt_light_sample *light = &path->plan.light;

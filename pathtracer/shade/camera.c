@@ -87,6 +87,7 @@ void pt_camera_transform_at(const struct pt_camera *camera, float time, struct p
                   2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y)};
     pt_vec3 t = v3_madd(v3_scale(a.translation, 1.0f - time), time, b.translation);
     const float translation[3] = {t.x, t.y, t.z};
+    /* rotation times stretch, of which the lower triangle is 0 */
     for (int i = 0; i < 3; i++) {
         out->m[4 * i] = r[3 * i] * s[0];
         out->m[4 * i + 1] = r[3 * i] * s[1] + r[3 * i + 1] * s[3];

@@ -273,7 +273,7 @@ static inline int pt_layer_walk_sample(const struct pt_bsdf *b, pt_vec3 wo, floa
             return 0;
         if (pt_layer_travel(&k, rng, &pdf))
             continue;
-        if (k.w.z < 0.0f) {
+        if (k.w.z < 0.0f) { /* at the base, else at the interface from below */
             struct pt_bsdf_sample s;
             if (!pt_layer_bounce(&k.base, v3_neg(k.w), rng, &s))
                 return 0;

@@ -405,6 +405,7 @@ int pt_lights_build(struct pt_scene *scene, struct base_err *err)
         if (ok) {
             scene->emitter_count = (int32_t)count;
             fill(scene, weights);
+            /* in this order: the hierarchy takes powers, the table probabilities, and it judges a small hierarchy */
             const struct shares s = share_out(scene, weights);
             ok = make_tree(scene, &s, weights, &scratch);
             balance(scene, &s, weights);

@@ -94,6 +94,7 @@ static int walk_start(struct walk *w, const struct pt_medium *m, pt_vec3 origin,
     w->direction = pt_mat34_vector(&m->from_render, direction);
     w->sigma = v3_max(v3_add(m->sigma_a, m->sigma_s));
     const float o[3] = {w->origin.x, w->origin.y, w->origin.z}, d[3] = {w->direction.x, w->direction.y, w->direction.z};
+    /* the part of the ray between all pairs of faces; a ray along a pair is between the two all the way or nowhere */
     float t0 = 0.0f, t1 = t_max;
     for (int a = 0; a < 3; a++) {
         if (d[a] == 0.0f) {
@@ -107,6 +108,7 @@ static int walk_start(struct walk *w, const struct pt_medium *m, pt_vec3 origin,
     }
     if (!(t0 < t1 && isfinite(t1)))
         return 0;
+    /* the cell that it enters in, clamped: rounding may put that point outside */
     w->t = t0;
     w->t_end = t1;
     w->count[0] = m->mx;
@@ -175,6 +177,7 @@ void pt_medium_grid_sample(const struct pt_medium *m, pt_vec3 origin, pt_vec3 di
             pt_vec3 scatter = v3_scale(m->sigma_s, share), null = v3_sub(v3_splat(1.0f), v3_scale(sigma_t, share));
             null = v3_most(null, v3_splat(0.0f));
             pt_vec3 carried = v3_mul(throughput, weight);
+            /* scattering or a null collision by what the path would carry on; both black: all of it is absorbed */
             float ps = v3_dot(carried, scatter), pn = v3_dot(carried, null);
             if (!(ps + pn > 0.0f)) {
                 weight = v3_splat(0.0f);
