@@ -41,4 +41,11 @@ struct pt_light_sample {
     const struct pt_emitter *emitter; /* only with PT_FX_ALPHA: whose light it is */
 };
 
+/* The emitter that the hierarchy (light_tree.c) selects by u in [0, 1), and its probability; -1 when none of the node that
+ * it reached can send light to `at`. */
+int32_t pt_light_tree_pick(const struct pt_scene *scene, const struct pt_receiver *at, float u, float *pmf);
+
+/* The probability with which pt_light_tree_pick selects `emitter`; 0 for one that is in no node. */
+float pt_light_tree_pmf(const struct pt_scene *scene, const struct pt_receiver *at, int32_t emitter);
+
 #endif

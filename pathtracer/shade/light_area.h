@@ -4,7 +4,7 @@
 #define PT_SHADE_LIGHT_AREA_H
 
 #include "geom/offset.h"
-#include "shade/light_tree.h"
+#include "shade/light.h"
 
 /* Area in render space, within 1e-4 of it. */
 double pt_light_quadric_area(const struct pt_quadric *q);

@@ -9,7 +9,6 @@
 #include "scene/settings.h"
 #include "shade/light_area.h"
 #include "shade/light_env.h"
-#include "shade/light_tree.h"
 
 /* Share of the selection probability that is spread evenly over the finite lights, so that a weak lamp near the camera is
  * not starved by strong ones elsewhere. */

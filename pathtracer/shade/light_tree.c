@@ -1,4 +1,9 @@
-#include "shade/light_tree.h"
+/*
+ * Selection of an emitter by what it probably sends to a point: a walk down the hierarchy of pt_light_tree, at each node to
+ * a child in proportion to its importance (Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with Adaptive
+ * Tree Splitting"). Lights at infinity stand beside the hierarchy.
+ */
+#include "shade/light.h"
 
 #include <math.h>
 #include <string.h>
