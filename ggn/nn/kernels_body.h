@@ -27,8 +27,6 @@ enum { TILE_V = 3 /* vectors of pixels in a register tile: 8·3 or 4·3 accumula
 
 INLINE real vsum(vf a) { return VSUM(a); }
 
-/* --- convolution ------------------------------------------------------------------------------------------------------ */
-
 /* Register tile: `ot` channels × `nv` vectors of pixels; input channels [i0, i1). A weight is broadcast, a vector of pixels
  * is loaded at each tap's offset. */
 INLINE void conv_tile(const struct ggn_conv *a, const real *w, int oc, int i0, int i1, long p, const int ot, const int nv,
@@ -168,8 +166,6 @@ static void lane_sums(real *out, const real *acc, int n)
     for (int k = 0; k < n; k++)
         out[k] = vsum(LOAD(acc + (long)k * VW));
 }
-
-/* --- per plane -------------------------------------------------------------------------------------------------------- */
 
 static double sum(const real *x, int h, int w, int row)
 {
@@ -440,8 +436,6 @@ static void up_grad(real *restrict dx, const real *restrict dy, int add, int h, 
             dx[w - 1] = (add ? dx[w - 1] : 0) + last;
     }
 }
-
-/* --- vectors ---------------------------------------------------------------------------------------------------------- */
 
 static real dot(const real *a, const real *b, long n)
 {

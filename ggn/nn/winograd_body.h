@@ -258,8 +258,6 @@ static void wino_conv(const struct ggn_conv *a, const float *u, int t0, int t1, 
     }
 }
 
-/* --- gradient of the weights ------------------------------------------------------------------------------------------ */
-
 /* dU = Σ over the tiles of (A dY Aᵀ) ⊙ (Bᵀ d B), dW = Gᵀ dU G, the adjoint of the above. Here the lanes of a vector are
  * channels, so that the sum over tiles is one of products of a broadcast value and a vector, in order. */
 enum { GRAD_TILES = GGN_WINO_GRAD_TILES, STRIDE = GGN_WINO_GRAD_STRIDE, CHANNELS = GGN_WINO_GRAD };

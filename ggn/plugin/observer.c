@@ -220,7 +220,7 @@ static double error_around(const struct question *q)
     return q->of.view->all ? error_of_area(q, area) / AROUND : 0;
 }
 
-/* What a block shows together with the pixels at its edges, where light of those may reach over them unmet; 0 elsewhere. */
+/* What a block shows together with the pixels at its edges, where light of those may reach over them unseen; 0 elsewhere. */
 static double error_at_edges(const struct question *q)
 {
     const struct lull_rect own = gp_rect_of(q->of.block), area = border_of(&q->in->frame.area, own);
@@ -245,12 +245,12 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
      * all that is wanted. */
     if (!in->frame.means.count && (error <= in->viewer.stop_error || (b->flags & LULL_BLOCK_FINAL && !isnan(error)))) {
         const double seen = fmax(error, fmax(error_around(&q), error_at_edges(&q)));
-        const double unmet = gp_undersampled_error(&in->kit, view, b);
-        if (seen <= in->viewer.stop_error && unmet > in->viewer.stop_error)
+        const double undersampled = gp_undersampled_error(&in->kit, view, b);
+        if (seen <= in->viewer.stop_error && undersampled > in->viewer.stop_error)
             gp_say_once(&in->kit, LULL_LOG_INFO, &in->frame.held,
                         "blocks below 100x100 pixels go on though no noise is seen: a few samples like their "
                         "brightest would be");
-        error = fmax(seen, unmet);
+        error = fmax(seen, undersampled);
     }
     lull_kit_verdict(&in->kit, b, &tally, error, in->viewer.stop_error, 0, in->kit.value[P_GROWTH], d);
     if (d->action == LULL_CONTINUE && !isnan(d->predicted_spp)) /* the last steps are short: checks cost little here */

@@ -10,7 +10,7 @@
  * that mean by B / (P n). The error is sqrt(2.4 B / (P D n)): at the default limit a block waits until three such samples
  * move the mean by less than D. docs/results.md has what that saves and costs. Pure, any thread. */
 double gp_undersampled_error(const struct lull_kit *kit, const struct lull_view *view, const struct lull_block *block);
-/* Whether light beyond the edges of a block may reach over them unmet: a pixel inside has no noise, and that of a pixel
+/* Whether light beyond the edges of a block may reach over them unseen: a pixel inside has no noise, and that of a pixel
  * which touches it from outside would be seen in it. area: about the block `own`, with the pixels at its edges; rgb: its
  * two pictures by second moments (gp_pair_of_moments). Pure, any thread. */
 int gp_undersampled_edge(struct lull_rect own, struct lull_rect area, float *const rgb[2]);
