@@ -4,7 +4,7 @@
 
 #include "base/options.h"
 #include "cli/commands.h"
-#include "observer/flip.h"
+#include "sight/flip.h"
 #include "picture/png.h"
 
 struct options {

@@ -11,10 +11,10 @@
 #include "cli/commands.h"
 #include "data/dataset.h"
 #include "data/thresholds.h"
-#include "figures/stats.h"
+#include "sight/stats.h"
 #include "job/farm.h"
-#include "observer/calibrate.h"
-#include "observer/views.h"
+#include "train/calibrate.h"
+#include "train/views.h"
 
 enum { MAX_INPUTS = 256 };
 

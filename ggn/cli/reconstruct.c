@@ -10,7 +10,7 @@
 #include "data/labels.h"
 #include "sequence/manifest.h"
 #include "data/thresholds.h"
-#include "observer/flip.h"
+#include "sight/flip.h"
 #include "picture/png.h"
 
 struct options {

@@ -108,7 +108,7 @@ def judge(root, models):
             continue
         rows = found[name] = {}
         for model in models:
-            result = json.loads(ggn("evaluate", "-d", os.path.join(root, name), "-O", os.path.join(tool.ROOT, "ggn/observer/observer.json"),
+            result = json.loads(ggn("evaluate", "-d", os.path.join(root, name), "-O", os.path.join(tool.ROOT, "ggn/sight/observer.json"),
                                   *(["--recorded"] if name == "test" else []), "--no-quality", "--json", "-t", 1, "-m", model))
             split = next(s for s in result["splits"].values())
             for method in ("observer", os.path.basename(model)):

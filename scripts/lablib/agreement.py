@@ -31,7 +31,7 @@ def options(parser):
             ("--human", os.path.join(tool.SHARED, "human"), "human-thresholds.csv and views/ that people judged (../shared/human)"),
             ("--rendered", os.path.join(tool.ROOT, "../data-people/people"),
              "blocks of those that were rendered past their thresholds, as scripts/people.plan says (../data-people/people); may be absent"),
-            ("--observer", os.path.join(tool.ROOT, "ggn/observer/observer.json"), "its parameters, with those of each view left out"),
+            ("--observer", os.path.join(tool.ROOT, "ggn/sight/observer.json"), "its parameters, with those of each view left out"),
             ("--out", os.path.join(tool.BUILD, "agreement"), "labelled copies and agreement.json (build/agreement)")):
         parser.add_argument(name, type=tool.path, default=default, metavar="PATH", help=text)
     parser.add_argument("--threads", type=int, default=tool.THREADS)
@@ -119,7 +119,7 @@ def page_table(results, name):
     kept = results[name]
     m = kept["measured"]
     source = "%s, %s" % (m["date"], m["commit"])
-    if m["level"] != tool.observer_law():
+    if m["level"] != tool.observer()["level"]:
         source += ", an earlier observer (`--visible %g`)" % m["visible"]
     return table(kept["rows"], ("measured", lambda *_: source))
 

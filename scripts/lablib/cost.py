@@ -229,7 +229,7 @@ def people(o, out):
         return
     people_views(o.people, views, os.path.join(WORK, "people/people"))
     published = [x for k in ("SVD-Entropy", "26-attributes") for x in ("--thresholds", os.path.join(o.people, k + "-thresholds.csv"))]
-    options = ("--split", "people", "--no-quality", "-O", "ggn/observer/observer.json")
+    options = ("--split", "people", "--no-quality", "-O", "ggn/sight/observer.json")
     measured_anew(out, "people", "people", *options, "--threads", o.threads, *shipped(o), *baselines(o), *published)
     judged(o, out, "people", *options, "--no-pictures", *shipped(o), folder="people")
 
@@ -478,7 +478,7 @@ def main(o):
         if step in steps:
             function(o, out)
             print("cost: %s done" % step, flush=True)
-            out.setdefault("measured", {})[step] = tool.measured(level=tool.observer_law(), visible=out["defaults"]["observer"][1])
+            out.setdefault("measured", {})[step] = tool.measured(level=tool.observer()["level"], visible=out["defaults"]["observer"][1])
             tool.save(rounded(out), o.out, "results", "cost.json", separators=(",", ":"))
     if "draw" in steps:
         plots.charts()  # which says what is missing

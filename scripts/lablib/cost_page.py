@@ -47,7 +47,7 @@ def measured(out):
     """When, at which commit; of steps that were measured apart each by itself; says so if the observer has changed since."""
     sources = {}
     for step, m in out["measured"].items():
-        law = "" if math.isclose(m["level"], tool.observer_law(), rel_tol=1e-3) else ", an earlier observer whose default was `--visible %g`" % m["visible"]
+        law = "" if math.isclose(m["level"], tool.observer()["level"], rel_tol=1e-3) else ", an earlier observer whose default was `--visible %g`" % m["visible"]
         sources.setdefault("%s at commit %s on %s%s" % (m["date"], m["commit"], m["processor"], law), []).append(step)
     return ";\n".join(text if len(sources) == 1 else "%s: %s" % (", ".join(steps), text) for text, steps in sources.items())
 

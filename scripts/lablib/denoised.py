@@ -81,7 +81,7 @@ def measure(o, scene):
 
 def low_enough():
     """The error at which the default of --visible stops."""
-    observer = tool.load(tool.ROOT, "ggn", "observer", "observer.json")
+    observer = tool.observer()
     return 2 ** (observer["spread"] * statistics.NormalDist().inv_cdf(tool.default("denoised", "visible")) / 2)
 
 

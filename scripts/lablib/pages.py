@@ -12,7 +12,7 @@ from lablib import (agreement, ablation, artists, bench, cost_page, denoised, fu
                     references, scale, shots, tool, truth)
 
 TEMPLATES = os.path.join(tool.ROOT, "scripts", "lablib", "templates")
-OTHERS = ("ggn/README.md", "ggn/models/README.md", "ggn/observer/README.md")  # pages outside docs/ that show figures
+OTHERS = ("ggn/README.md", "ggn/models/README.md", "ggn/sight/README.md")  # pages outside docs/ that show figures
 RESULTS = ("results.md", "results/decisions.md")
 PLACE = re.compile(r"(<!-- lab: (?!end -->)(.*?) -->\n).*?(<!-- lab: end -->)", re.S)
 

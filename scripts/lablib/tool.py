@@ -90,8 +90,9 @@ def default(criterion, parameter):
     return float(found[1])
 
 
-def observer_law():
-    return load(ROOT, "ggn", "observer", "observer.json")["level"]
+def observer():
+    """The parameters of the model observer that ships: its level and spread."""
+    return load(ROOT, "ggn", "sight", "observer.json")
 
 
 def measured(**more):

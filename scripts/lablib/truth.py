@@ -96,7 +96,7 @@ class Reference:
     def error(self, lightness, rect):
         """True error of a block, in units of what is just seen."""
         cut = tuple(p[rect.y0:rect.y1, rect.x0:rect.x1] for p in (lightness, *self.pictures))
-        return self.law.true(*cut, self.law.texture(*cut[1:])) / tool.observer_law()
+        return self.law.true(*cut, self.law.texture(*cut[1:])) / tool.observer()["level"]
 
 
 def replay(lull, name, looks, size, block, errors):

@@ -36,13 +36,13 @@ t "without jinja2: one line says what to install" refuses "apt-get install pytho
 unset PYTHONPATH
 t "every page is what the templates make of the figures" scripts/lab pages --check
 
-mkdir -p "$tmp/tree/docs" "$tmp/tree/ggn/observer"
-cp -r docs/*.md docs/results "$tmp/tree/docs" && cp README.md "$tmp/tree" && cp ggn/README.md "$tmp/tree/ggn" && cp ggn/observer/README.md "$tmp/tree/ggn/observer"
+mkdir -p "$tmp/tree/docs" "$tmp/tree/ggn/sight"
+cp -r docs/*.md docs/results "$tmp/tree/docs" && cp README.md "$tmp/tree" && cp ggn/README.md "$tmp/tree/ggn" && cp ggn/sight/README.md "$tmp/tree/ggn/sight"
 figure=$(grep -o '[0-9]\.[0-9][0-9][0-9]' "$tmp/tree/docs/results/decisions.md" | head -n 1)
 echo "AUC $figure against people" >>"$tmp/tree/README.md"
 t "a figure of the tables in README is told" says "README.md tells $figure, a figure of docs/results.md or docs/results/decisions.md"
 cp README.md "$tmp/tree"
-for page in docs/results.md docs/results/decisions.md docs/results/speed.md ggn/observer/README.md; do
+for page in docs/results.md docs/results/decisions.md docs/results/speed.md ggn/sight/README.md; do
     sed -i "/^# \(Results\|How well the criteria\)/,\$s/ 0\.[0-9]/ 7.1/; /<!-- lab: [a-z]*\./,/<!-- lab: end/s/ 0\.[0-9]/ 7.1/" "$tmp/tree/$page"
     t "a figure that was changed in $page is told" says "$page is not what its template makes of the figures"
     t "  …and mended" sh -c "scripts/lab pages --docs '$tmp/tree/docs' && cmp '$tmp/tree/$page' $page"

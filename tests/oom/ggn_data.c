@@ -14,10 +14,10 @@
 #include "data/import.h"
 #include "picture/read.h"
 #include "data/thresholds.h"
-#include "figures/stats.h"
-#include "observer/curve.h"
-#include "observer/flip.h"
-#include "observer/views.h"
+#include "sight/stats.h"
+#include "sight/curve.h"
+#include "sight/flip.h"
+#include "train/views.h"
 #include "support/fail_alloc.h"
 
 enum { W = 12, H = 10, P = W * H };

@@ -11,7 +11,7 @@
 #include "support/ggn_near.h"
 
 #include "data/thresholds.h"
-#include "figures/stats.h"
+#include "sight/stats.h"
 
 static void quantiles(void **state)
 {

@@ -13,8 +13,8 @@
 #include "support/ggn_observer_block.h"
 
 #include "base/files.h"
-#include "observer/views.h"
-#include "model/visibility.h"
+#include "train/views.h"
+#include "sight/visibility.h"
 
 /* --- thresholds --- */
 

@@ -9,7 +9,7 @@ from typing import Optional, Sequence
 
 GROWTH = 1.5  # largest ratio of samples between two checks of the criterion `observer`
 FIRST_SPP = 16.0  # of its checks
-STUDY_CAP, SIMULATED_CAP, STUDY_REFERENCE = 10000.0, 20000.0, 20000.0  # spp; ggn/observer/observer.h
+STUDY_CAP, SIMULATED_CAP, STUDY_REFERENCE = 10000.0, 20000.0, 20000.0  # spp; ggn/sight/observer.h
 
 
 def from_study(spp: float) -> float:

@@ -1,9 +1,9 @@
-#include "model/measure.h"
+#include "sight/measure.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-#include "model/visibility.h"
+#include "sight/visibility.h"
 
 static const double GAUSSIAN_PEAK = 0.651; /* log2(15)/6 */
 static const double LEAST_OCTAVES = -20;

@@ -3,7 +3,7 @@
  *
  * - From two halves: M and D of the block's full level, recorded at n0 spp, give two halves at n spp as M + sqrt(n0/n) D and
  *   the same with the other sign, for n > n0 up to SEQ_SIMULATED_CAP. Recorded levels below n0 are measured by their own
- *   halves. It errs where rare bright paths make the noise far from Gaussian (ggn/observer/README.md).
+ *   halves. It errs where rare bright paths make the noise far from Gaussian (ggn/sight/README.md).
  * - From recorded levels: the picture I at n spp against a reference R of n_r independent samples. I - R has the variance
  *   s^2 (1/n + 1/n_r), so it is scaled by sqrt(n_r / (n_r + n)); texture is what the last level and R share. Where the block
  *   has halves too they go on beyond the last level.

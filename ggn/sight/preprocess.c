@@ -1,4 +1,4 @@
-#include "model/preprocess.h"
+#include "sight/preprocess.h"
 
 #include <float.h>
 #include <math.h>

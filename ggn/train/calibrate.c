@@ -1,4 +1,4 @@
-#include "observer/calibrate.h"
+#include "train/calibrate.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -7,8 +7,8 @@
 #include "base/files.h"
 #include "base/json.h"
 #include "base/text.h"
-#include "figures/stats.h"
-#include "observer/views.h"
+#include "sight/stats.h"
+#include "train/views.h"
 
 /* What is known of all blocks before any fit. */
 struct evidence {

@@ -1,4 +1,4 @@
-#include "figures/stats.h"
+#include "sight/stats.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,10 +1,10 @@
-#include "observer/remaining.h"
+#include "sight/remaining.h"
 
 #include <math.h>
 #include <stdlib.h>
 
 #include "base/colour.h"
-#include "model/visibility.h"
+#include "sight/visibility.h"
 
 struct workspace { /* for one block */
     double *texture, *scratch;

@@ -31,7 +31,7 @@ struct ggn_viewing {
 };
 
 /* fps >= 0, 0: a still. pixels_per_degree > 0: of the display, as far away as it is looked at; 67 is 0.7 m from a screen
- * 0.7 m wide with 3840 pixels, as in observer/flip.h. */
+ * 0.7 m wide with 3840 pixels, as in sight/flip.h. */
 void ggn_viewing_init(struct ggn_viewing *viewing, double fps, double pixels_per_degree);
 /* Gain of noise [height][width] as seen, that is blurred: of its bands, each weighted by its mean square. Overwrites it.
  * *still: that of an error with the same bands which stands still; NULL if nobody asks. */

@@ -1,6 +1,6 @@
 /*
  * How visible the error is of a picture that is kept of two denoised halves: what the criterion `denoised` decides by. Both
- * estimates are of what the eye is left with after the observer's blur, over what texture hides (model/visibility.h):
+ * estimates are of what the eye is left with after the observer's blur, over what texture hides (sight/visibility.h):
  *
  * - halves: how far the kept halves are apart. Bias, which they share, is not in it.
  * - crossed: how far each is from the other, noisy half (denoise/blend.h's formula, what is kept in the place of F). Bias
@@ -19,7 +19,7 @@
 
 #include <stddef.h>
 
-#include "observer/viewing.h"
+#include "sight/viewing.h"
 
 struct ggn_kept { /* of a block, as a display shows it; [height][width] each */
     int width, height;

@@ -1,10 +1,10 @@
-#include "observer/curve.h"
+#include "sight/curve.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/measure.h"
+#include "sight/measure.h"
 #include "sequence/simulate.h"
 
 const char *const ggn_curve_sources[] = {"halves", "levels", NULL};

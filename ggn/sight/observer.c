@@ -1,4 +1,4 @@
-#include "observer/observer.h"
+#include "sight/observer.h"
 
 #include <math.h>
 

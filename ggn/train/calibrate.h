@@ -11,8 +11,8 @@
 #include "base/threads.h"
 #include "data/dataset.h"
 #include "data/thresholds.h"
-#include "observer/curve.h"
-#include "observer/observer.h"
+#include "sight/curve.h"
+#include "sight/observer.h"
 
 struct ggn_calibration_input {
     const struct ggn_dataset_view *view; /* borrows */

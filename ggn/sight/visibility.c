@@ -1,4 +1,4 @@
-#include "model/visibility.h"
+#include "sight/visibility.h"
 
 #include <math.h>
 #include <stdint.h>

@@ -1,8 +1,8 @@
 /*
  * The model observer: stands in for people where there are no human thresholds, and is never called human.
  *
- * Visible noise r (model/visibility.h) is seen while it exceeds `level`, the one number that is fitted to people
- * (observer/calibrate.h). People differ and the observer errs: log2 of the samples at which a viewer stops seeing the noise
+ * Visible noise r (sight/visibility.h) is seen while it exceeds `level`, the one number that is fitted to people
+ * (train/calibrate.h). People differ and the observer errs: log2 of the samples at which a viewer stops seeing the noise
  * is taken as normal around its answer, with the deviation `spread`. Pure functions, thread-safe.
  *
  * The observer answers at how many samples no noise is seen at all. The study (SIN3D) asked another question: from how many
@@ -18,7 +18,7 @@
 #include "base/err.h"
 #include "sequence/simulate.h"
 
-/* The criterion's default share of viewers who may still see noise (ggn/observer/README.md says how it was chosen). */
+/* The criterion's default share of viewers who may still see noise (ggn/sight/README.md says how it was chosen). */
 #define GGN_OBSERVER_VISIBLE 0.35
 
 struct ggn_observer {
@@ -26,7 +26,7 @@ struct ggn_observer {
     double spread; /* octaves of samples, > 0 */
 };
 
-/* What is used when no other is named; ggn/observer/observer.json says the same and how it came about. */
+/* What is used when no other is named; ggn/sight/observer.json says the same and how it came about. */
 extern const struct ggn_observer ggn_observer_default;
 
 /* A threshold of the study in samples of the observer; one that is censored there, at SEQ_STUDY_CAP, is SEQ_SIMULATED_CAP.

@@ -12,7 +12,7 @@
  *   in the mean. Half that error is taken off, so that next to nothing is added.
  * - Visible noise r of the block: the root mean square over its patches of (mean over the patch of G^6)^(1/6) / sqrt(s + 2).
  *   A norm of 6 lets a few bright pixels count, because people see them; squares let one noisy patch count beside smooth
- *   ones. observer/observer.h turns r into an answer.
+ *   ones. sight/observer.h turns r into an answer.
  *
  * Second witness. The difference of two halves is one draw of the noise, symmetric though the noise of few bright paths is
  * not. Second moments say how large each pixel's noise is expected to be: with v the variance of the mean luminance Y,

@@ -1,9 +1,9 @@
-#include "observer/kept.h"
+#include "sight/kept.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "model/visibility.h"
+#include "sight/visibility.h"
 
 enum { TILE = 25, STRATA = 7 };
 
@@ -13,7 +13,7 @@ static const double GAUSSIAN = 15.0; /* sixth moment of a normal distribution ov
 struct judging {
     const struct ggn_kept *kept;
     double *texture;   /* [patches] */
-    double *rows;      /* scratch of model/visibility.h */
+    double *rows;      /* scratch of sight/visibility.h */
     float *edges;      /* [P]: L* of the denoised picture */
     float *apart;      /* [P]: the halves' difference as it is seen */
     float *crossed;    /* [P]: mean square of the error as it is seen; may be below zero */

@@ -7,8 +7,8 @@
 
 #include "base/threads.h"
 #include "data/dataset.h"
-#include "observer/curve.h"
-#include "observer/observer.h"
+#include "sight/curve.h"
+#include "sight/observer.h"
 
 /* curves: [n_blocks of the view], in the manifest's order; the caller releases each. On failure there is none to release. */
 int ggn_view_curves(const struct ggn_dataset_view *view, enum ggn_curve_source source, struct base_threads *threads,

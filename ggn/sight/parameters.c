@@ -7,7 +7,7 @@
 
 #include "base/files.h"
 #include "base/json.h"
-#include "observer/observer.h"
+#include "sight/observer.h"
 
 void ggn_observer_describe(const struct ggn_observer *o, char *text, size_t room)
 {

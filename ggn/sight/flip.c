@@ -1,4 +1,4 @@
-#include "observer/flip.h"
+#include "sight/flip.h"
 
 #include <math.h>
 #include <stdlib.h>

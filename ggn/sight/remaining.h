@@ -2,7 +2,7 @@
  * How visible the noise is that remains in an image, block by block, against a reference of the same view.
  *
  * The noise of a block is the difference of its lightness to the reference's (CIE L* of the 8-bit display images), its
- * texture the reference's own; the rest is the observer's (model/visibility.h). What noise the reference has itself
+ * texture the reference's own; the rest is the observer's (sight/visibility.h). What noise the reference has itself
  * counts as the image's: with k times the samples it adds a factor of sqrt(1 + 1/k).
  *
  * A second reference, as good and independent of the first, takes that noise out. For the blurred differences g and h of a
@@ -15,7 +15,7 @@
 
 #include "base/err.h"
 #include "picture/image.h"
-#include "observer/observer.h"
+#include "sight/observer.h"
 
 struct ggn_remaining {
     int x, y, width, height; /* pixels; from the top left corner */

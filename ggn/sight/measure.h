@@ -1,5 +1,5 @@
 /*
- * What is measured of a block's image beside its pixels: the law of visible noise (model/visibility.h), and what tells when
+ * What is measured of a block's image beside its pixels: the law of visible noise (sight/visibility.h), and what tells when
  * that law may err. Residual networks are anchored to the first and given the rest.
  *
  * A meter owns the scratch memory for blocks that its room was made for; one call at a time per meter.
@@ -29,7 +29,7 @@ struct ggn_meter {
     float *lightness[2]; /* [P] */
     float *blurred;      /* [P] */
     double *texture;     /* [patches] */
-    double *scratch;     /* of model/visibility.h */
+    double *scratch;     /* of sight/visibility.h */
     void *memory;        /* owns all of it */
 };
 

@@ -1,4 +1,4 @@
-#include "observer/viewing.h"
+#include "sight/viewing.h"
 
 #include <math.h>
 #include <stddef.h>

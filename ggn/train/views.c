@@ -1,4 +1,4 @@
-#include "observer/views.h"
+#include "train/views.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "data/each.h"
-#include "figures/stats.h"
+#include "sight/stats.h"
 
 struct work {
     const struct ggn_dataset_view *view;
