@@ -309,7 +309,8 @@ setup: ## install the Debian packages that are missing
 	@scripts/setup
 
 tests: $(TESTS) test-tools
-test-tools: $(ABI_PLUGINS) $(OIDN_STUB) $(OUT)/tests/approve $(OUT)/tests/processors/embree_isa.so # what test scripts need
+test-tools: $(ABI_PLUGINS) $(OIDN_STUB) $(OUT)/tests/approve $(OUT)/tests/processors/embree_isa.so \
+    $(OUT)/bench/ggn_golden $(OUT)/bench/ggn_networks # what test scripts need
 replay: $(REPLAY)
 
 # Sub-makes, so that packages installed by setup are seen by pkg-config; by all processors, if no -j says by how many.

@@ -352,7 +352,7 @@ def grow(o, out):
 
 
 def golden(isa, *options):
-    return json.loads(ggn("golden", "--threads", "1", *options, env={"LULL_ISA": isa}))["p"]
+    return json.loads(tool.bench("ggn_golden", "--threads", "1", *options, env={"LULL_ISA": isa}))["p"]
 
 
 def pictures_of(program, *options):

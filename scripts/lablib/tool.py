@@ -58,6 +58,11 @@ def ggn(*words, **how):
     return run(GGN, *words, **how)
 
 
+def bench(name, *words, **how):
+    """What a measuring program of tests/bench/ prints; `make build/bench/NAME` builds it."""
+    return run(os.path.join(BUILD, "bench", name), *words, **how)
+
+
 def load(*names):
     try:
         with open(os.path.join(*names), encoding="utf-8") as file:

@@ -1,4 +1,4 @@
-/* `ggn bench`: how fast the networks run on this machine, per layer and as medians. */
+/* How fast the networks run on this machine, per layer and as medians: build/bench/ggn_networks --help */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -6,7 +6,6 @@
 #include "base/clock.h"
 #include "base/options.h"
 #include "baselines/blas.h"
-#include "cli/commands.h"
 #include "sight/stats.h"
 #include "model/inference.h"
 #include "sight/measure.h"
@@ -301,7 +300,7 @@ static void print_figures(const struct bench *b, const double figure[N_FIGURES])
     printf("}\n");
 }
 
-int ggn_cmd_bench(int argc, char **argv, struct base_err *err)
+static int run(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {.list = list, .doc = "Measures inference and training of the networks."};
     struct bench b = {.o = {.threads = base_threads_available(), .rounds = 9, .batch = 4}};
@@ -321,4 +320,13 @@ int ggn_cmd_bench(int argc, char **argv, struct base_err *err)
         print_figures(&b, figure);
     release(&b);
     return rc;
+}
+
+int main(int argc, char **argv)
+{
+    struct base_err err = {0};
+    int rc = run(argc, argv, &err);
+    if (rc)
+        fprintf(stderr, "%s: %s\n", argv[0], err.text);
+    return rc ? 2 : 0;
 }

@@ -1,4 +1,4 @@
-#include "model/golden.h"
+#include "support/ggn_golden.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -8,6 +8,10 @@
 #include "nn/loss.h"
 #include "nn/ssim.h"
 #include "nn/real.h"
+
+#ifdef GGN_DOUBLE
+#define ggn_golden_run GGN_TYPED(ggn_golden_run)
+#endif
 
 enum { SIDE = 200, AREA = SIDE * SIDE, IMAGES = 6, PLANES = 3 * IMAGES, W_COUNT = GGN_GOLDEN_WINDOWS };
 
@@ -39,6 +43,7 @@ static struct moments moments_of(const struct ggn_exec *e, int value, int first,
     return (struct moments){mean, sqrt(square - mean * mean), sqrt(square)};
 }
 
+#ifndef GGN_DOUBLE /* one for both precisions */
 double ggn_golden_pixel(int w, int i, int c, int y, int x)
 {
     double v = 0.5 + 0.4 * sin((0.02 + 0.01 * w) * x + (0.03 + 0.02 * w) * y + c + w);
@@ -49,6 +54,7 @@ double ggn_golden_pixel(int w, int i, int c, int y, int x)
     }
     return fmin(fmax(v, 0), 1);
 }
+#endif
 
 static void fill_windows(struct state *s)
 {

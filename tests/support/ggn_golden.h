@@ -1,10 +1,10 @@
 /*
  * The golden values: what the published networks give for weights and windows that a hash defines, in either precision.
  *
- * Formulas of weights and windows: README of this folder's parent, section "Golden values".
+ * Formulas of weights and windows: ggn/README.md.
  */
-#ifndef GGN_MODEL_GOLDEN_H
-#define GGN_MODEL_GOLDEN_H
+#ifndef SUPPORT_GGN_GOLDEN_H
+#define SUPPORT_GGN_GOLDEN_H
 
 #include "base/threads.h"
 #include "model/trainer.h"

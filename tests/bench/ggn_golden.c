@@ -1,12 +1,10 @@
-/* `ggn golden`: what the published networks give for weights that a hash defines; the same figures from any implementation.
- */
+/* What the published networks give for weights that a hash defines, as JSON; the same figures from any implementation. */
 #include <cjson/cJSON.h>
 #include <stdio.h>
 
 #include "base/json.h"
 #include "base/options.h"
-#include "cli/commands.h"
-#include "model/golden.h"
+#include "support/ggn_golden.h"
 
 struct options {
     struct ggn_golden_seeds seeds;
@@ -91,7 +89,7 @@ static cJSON *to_json(const struct ggn_golden *g, int train_step, int *failed)
     return j;
 }
 
-int ggn_cmd_golden(int argc, char **argv, struct base_err *err)
+static int run(int argc, char **argv, struct base_err *err)
 {
     static const struct base_options options = {
         .list = list, .doc = "Prints the golden values of the published networks as one JSON object."};
@@ -111,4 +109,13 @@ int ggn_cmd_golden(int argc, char **argv, struct base_err *err)
     rc = base_json_write(NULL, json, failed, err);
     cJSON_Delete(json);
     return rc;
+}
+
+int main(int argc, char **argv)
+{
+    struct base_err err = {0};
+    int rc = run(argc, argv, &err);
+    if (rc)
+        fprintf(stderr, "%s: %s\n", argv[0], err.text);
+    return rc ? 2 : 0;
 }
