@@ -13,8 +13,10 @@ import resource
 import subprocess
 
 from lablib import tables, tool
+from lablib.sources import TRAINING
 from lablib.tool import GGN, Refused, ggn
 
+SOURCES = TRAINING
 HEAD = ("variant", "options", "AUC", "median \\|log2\\|", "early", "samples", "best step", "ms per decision", "ms per training window",
         "minutes trained", "KB as f16")
 
@@ -89,10 +91,6 @@ def table(rows, auc="%.4f", early="%.1f %%", times="%.1f"):
             ("decision_ms", times), ("step_ms", times), ("minutes", "%.1f"), ("kb", "%d"))
     shown = lambda r, key: 100 * r[key] if key == "early_stop_rate" else r.get(key)
     return tables.table(HEAD, [[r["name"], r["options"], *[tables.figure(shown(r, key), form) for key, form in keys]] for r in rows])
-
-
-def page(results):
-    return "%s; all with\n`%s`.\n\n%s" % (tables.provenance(results["measured"]), results["common"], table(results["rows"], "%.3f", "%.0f %%", "%.0f"))
 
 
 SETS = {"people": "people's four views, made from halves, each left out of the observer's fit", "test": "test scenes of the plan",

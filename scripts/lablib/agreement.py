@@ -12,8 +12,10 @@ import shutil
 
 from lablib import tables, tool
 from lablib.recordings import link_views, manifest_of, people_views
+from lablib.sources import JUDGE, NETWORK, OBSERVER, PICTURES
 from lablib.tool import ggn
 
+SOURCES = PICTURES + OBSERVER + NETWORK + JUDGE
 BASELINES = ["attributes", "noise-mask"]  # those that are shipped
 SHARES = (0.25, 0.3, 0.35, 0.4, 0.45, 0.5)
 HEAD = ("AUC", "early (below 0.8)", "samples", "median \\|log2\\|", "bias", "within an octave", "ρ")

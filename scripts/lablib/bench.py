@@ -17,8 +17,10 @@ import tempfile
 import time
 
 from lablib import reading, tables, tool
+from lablib.sources import PICTURES
 from lablib.tool import BUILD, GGN, RENDER, ROOT, THREADS
 
+SOURCES = PICTURES + ("ggn/nn/*.[ch]", "pathtracer/render/*.[ch]")
 RAYS = os.path.join(BUILD, "bench", "pt_rays")
 NOISE = os.path.join(BUILD, "bench", "pt_noise")
 NETWORKS = os.path.join(BUILD, "bench", "ggn_networks")

@@ -11,7 +11,7 @@ import re
 import resource
 import statistics
 
-from lablib import plots, tool
+from lablib import cost_page, plots, sources, tool
 from lablib.cost_figures import bare
 from lablib.recordings import link_views, manifest_of, people_views
 from lablib.tool import BUILD, GGN, RENDER, ROOT, Refused, ggn, run
@@ -480,6 +480,7 @@ def main(o):
             print("cost: %s done" % step, flush=True)
             out.setdefault("measured", {})[step] = tool.measured(level=tool.observer()["level"], visible=out["defaults"]["observer"][1])
             tool.save(rounded(out), o.out, "results", "cost.json", separators=(",", ":"))
+            sources.keep(o.out, "cost", out, cost_page.SOURCES)
     if "draw" in steps:
         plots.charts()  # which says what is missing
         from lablib import cost_pictures

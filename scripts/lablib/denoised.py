@@ -13,7 +13,9 @@ import sys
 import textwrap
 
 from lablib import cvvdp, denoised_judges, tables, tool
+from lablib.sources import DENOISED, PICTURES
 
+SOURCES = PICTURES + DENOISED
 SCENES = ["scenes/%s.pbrt" % name for name in "demo rock-garden kitchen cornell-box garage defocus harbour bathroom office".split()] + [
     os.path.join("..", "shared", "scenes", name) for name in ("coffee-v3/scene.pbrt", "veach-mis-v4/veach-mis.pbrt",
                                                               "cornell-bunny-v4/cornell_bunny_conductor.pbrt")]

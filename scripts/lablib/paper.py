@@ -13,8 +13,10 @@ import statistics
 
 from lablib import tables, tool
 from lablib.recordings import people_views
+from lablib.sources import JUDGE, NETWORK, OBSERVER, PICTURES
 from lablib.tool import ggn
 
+SOURCES = PICTURES + OBSERVER + NETWORK + JUDGE
 CUTS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.98)
 PUBLISHED = ("SVD-Entropy", "26-attributes")
 NAMES = {"lull-3": "lull-3, as shipped", "law": "the observer's law",

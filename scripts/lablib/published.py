@@ -12,8 +12,10 @@ import shutil
 import subprocess
 
 from lablib import ablation, plots, recordings, tables, tool
+from lablib.sources import TRAINING
 from lablib.tool import GGN, Refused, ggn
 
+SOURCES = TRAINING
 SHIPPED = os.path.join(tool.ROOT, "ggn", "models", "lull-3.ggn")
 PASSES, WINDOWS = 30, 17524  # as published; of the 648 blocks of scripts/dataset.plan
 TRIVIAL = {"observer": "the observer's law", "-spp": "number of samples alone"}

@@ -12,7 +12,9 @@ import subprocess
 import sys
 
 from lablib import plots, tables, tool
+from lablib.sources import OBSERVER, PICTURES
 
+SOURCES = PICTURES + OBSERVER + ("plugin-api/host/quote.c", "plugin-api/host/forecast.c", "pathtracer/render/quote.[ch]")
 SIZE, BLOCK, MOST = 64, 32, 2000
 HEAD = ("scene", "seen in tuning", "real: spp, thread s", "quoted: spp, thread s (interval)", "time quoted / real", "blocks inside",
         "light not met", "ETA at 10, 25, 50 %")

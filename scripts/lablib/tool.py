@@ -115,7 +115,8 @@ def results(docs, job):
 
 def store(docs, job, data, **layout):
     """Keeps the figures of a job and fills the pages that show them."""
-    from lablib import pages
+    from lablib import pages, sources
     os.makedirs(os.path.join(docs, "results"), exist_ok=True)
     save(data, docs, "results", job + ".json", **layout)
+    sources.keep(docs, job, data, pages.FIGURES[job].SOURCES)
     pages.fill(docs)

@@ -13,7 +13,9 @@ import struct
 import sys
 
 from lablib import tool
+from lablib.sources import EXAMPLES, NETWORK, OBSERVER, PICTURES
 
+SOURCES = PICTURES + OBSERVER + NETWORK + EXAMPLES
 SCENES = ("chess glossy soft-shadow cornell-box office museum judge/rare-lamps brick-yard gallery candles kitchen judge/rare-beads "
           "garage bathroom gems night-street judge/rare-foil panes corridor glass-shelf").split()
 RARE = ("rare-", "candles", "gems", "night-street", "glass-shelf")  # scenes whose noise is made by few bright paths

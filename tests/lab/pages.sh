@@ -25,7 +25,7 @@ says() { # says LINE: the last check of the copy ended with status 1 and said th
     [ $? -eq 1 ] && [ "$(wc -l <"$tmp/err")" -eq 1 ] && grep -qE -e "$1" "$tmp/err"
 }
 helps() { for job in $(scripts/lab --help | sed -n 's/^  \([a-z-]*\)  .*/\1/p'); do scripts/lab "$job" --help | grep -q "^usage: scripts/lab $job" || exit 1; done; }
-t "--help names twenty-two jobs" test "$(scripts/lab --help | grep -c '^  [a-z-]*  ')" -eq 22
+t "--help names twenty-one jobs" test "$(scripts/lab --help | grep -c '^  [a-z-]*  ')" -eq 21
 t "  …each with its own" helps
 t "no such job: one line" refuses "expected data-set, cost, " nonsense
 t "no such option: one line" refuses "lab pages: unrecognized arguments: --what" pages --what
@@ -37,7 +37,7 @@ unset PYTHONPATH
 t "every page is what the templates make of the figures" scripts/lab pages --check
 
 mkdir -p "$tmp/tree/docs" "$tmp/tree/ggn/sight"
-cp -r docs/*.md docs/results "$tmp/tree/docs" && cp README.md "$tmp/tree" && cp ggn/README.md "$tmp/tree/ggn" && cp ggn/sight/README.md "$tmp/tree/ggn/sight"
+cp -r docs/*.md docs/results docs/notebook "$tmp/tree/docs" && cp README.md "$tmp/tree" && cp ggn/README.md "$tmp/tree/ggn" && cp ggn/sight/README.md "$tmp/tree/ggn/sight"
 figure=$(grep -o '[0-9]\.[0-9][0-9][0-9]' "$tmp/tree/docs/results/decisions.md" | head -n 1)
 echo "AUC $figure against people" >>"$tmp/tree/README.md"
 t "a figure of the tables in README is told" says "README.md tells $figure, a figure of docs/results.md or docs/results/decisions.md"
