@@ -53,7 +53,7 @@ t "other figures make other pages" test "$(cut -d' ' -f3 "$tmp/err" | xargs -n 1
 sed -i 's/"people"/"somebody"/' "$tmp/tree/docs/results/agreement.json"
 t "figures that lack are one line" refuses "results/decisions.md: its figures are not whole" pages --docs "$tmp/tree/docs"
 
-mkdir -p "$tmp/out/results" && cp docs/results/cost.json "$tmp/out/results"
+mkdir -p "$tmp/out/results" && cp docs/results/cost.json docs/results/sources.json "$tmp/out/results"
 t "lab cost draws from the figures" scripts/lab cost --only draw --out "$tmp/out"
 t "  …the same page" diff "$tmp/out/results/cost.md" docs/results/cost.md
 t "  …and every picture of it" sh -c 'for p in $(grep -o "](cost-[a-z-]*\.png)" "$1/results/cost.md" | tr -d "]()"); do [ -s "docs/results/$p" ] || { echo "$p"; exit 1; }; done' - "$tmp/out"
