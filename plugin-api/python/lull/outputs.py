@@ -19,9 +19,10 @@ from .files import file_call, srgb, srgb_encoded, write_png
 from .frame import Frame
 from .host import HostFrame, reasons
 from .library import bytes_of, library
+from .version import SOFTWARE
 
 
-def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull for Python 1.0",
+def write_exr(path: str, driver: Driver, scene: str = "", software: str = SOFTWARE,
               more: Optional[Mapping[str, Optional[np.ndarray]]] = None, denoised: Optional[Denoised] = None) -> None:
     """R, G, B and the layer lull, which image programs show as spp, p_noisy, error and reason, then those of the frame;
     cut to the crop. more: further channels over the frame's view, or instead of its layers; None leaves one out.

@@ -17,6 +17,7 @@ from ..driver import Driver, Result
 from ..files import Output, check_outputs, write_each
 from ..frame import Frame
 from ..library import LullError
+from ..version import SOFTWARE
 from . import shown
 from .cycles import WAVE, Cycles, HostError
 from .view import display_of, is_plain, read_grey, view_text
@@ -232,7 +233,7 @@ class Session:
         interrupted = result.outcome in ("interrupt", "failed")
         kept = self.denoised
         written, unwritten = write_each((
-            (s.output, lambda p: outputs.write_exr(p, self.driver, scene, f"lull for Python 1.0; {kernel}",
+            (s.output, lambda p: outputs.write_exr(p, self.driver, scene, f"{SOFTWARE}; {kernel}",
                                                     self.host.passes.finished(self.frame, self._rgb()), kept)),
             (s.preview, lambda p: outputs.write_preview(p, self.driver, kept)),
             (s.stop_map, lambda p: outputs.write_stop_map(p, self.frame, scene)),

@@ -10,7 +10,8 @@ import sys
 import textwrap
 from typing import Any, Callable, NamedTuple, Sequence
 
-from .files import VERSION, Refused
+from ..version import PRODUCT
+from .files import Refused
 
 
 class Option(NamedTuple):
@@ -68,7 +69,7 @@ OWN = (Option("help", "", "Print this and exit", letter="?"), Option("usage", ""
 
 def _answer(command: Command, rows: Sequence[Option], what: str) -> str:
     if what == "version":
-        return f"{command.name.split()[0]} (Lull) {VERSION}"
+        return f"{command.name.split()[0]} (Lull) {PRODUCT}"
     said_margin = re.search(r"rmargin=(\d+)", os.environ.get("ARGP_HELP_FMT", ""))  # docs/man/write wants no line broken
     margin = int(said_margin[1]) if said_margin else 79
     forms = [f"--{o.name}" + (f"={o.value}" if o.value else "") for o in rows]
