@@ -362,7 +362,7 @@ host-model: $(BIN)/lull-render $(CRITERIA) ## 1,000 runs that are interrupted, k
 	@tests/model/host.py $(MODEL_FLAGS)
 
 # Every header compiles alone; the ABI header also as C99 and C++11.
-HEADERS := $(shell find pathtracer ggn plugin-api tests -name '*.h' 2>/dev/null)
+HEADERS := $(shell find pathtracer ggn plugin-api tests -name '*.h' -type f 2>/dev/null)
 LOOK := -fsyntax-only
 C_LOOK = $(CC) -std=c17 -D_POSIX_C_SOURCE=200809L $(WARNC) -Wno-unused-const-variable
 PUBLIC := $(addprefix plugin-api/include/lull/,criterion.h criterion_kit.h host.h host_draft.h)

@@ -1,5 +1,5 @@
 /* The version of the whole project: programs, packages, Python. The criteria's ABI and the host library count for themselves
- * (lull/criterion.h, lull/host.h). Whatever says a version takes it from one of these headers; tests/cli/versions.sh compares. */
+ * (lull/criterion.h, lull/host.h). What says a version takes it from these headers; tests/cli/versions.sh compares. */
 #ifndef BASE_VERSION_H
 #define BASE_VERSION_H
 
