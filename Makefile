@@ -406,7 +406,8 @@ INSTALLED = $(call put,$(PREFIX)/bin,755,$(PROGRAMS) scripts/packages/lull-denoi
     $(call put,$(libdir)/lull,755,$(CRITERIA)) $(call put,$(libdir)/lull/modules,755,$(MODULES)) \
     $(call put,$(share)/man/man1,644,$(wildcard docs/man/*.1)) $(call put,$(share)/man/man7,644,$(wildcard docs/man/*.7)) \
     $(call put,$(share)/bash-completion/completions,644,$(wildcard scripts/packages/completions/*)) \
-    $(call put,$(share)/lull,644,$(wildcard ggn/models/*.ggn) plugin-api/base/version.h plugin-api/python/lull/version.py) \
+    $(call put,$(share)/lull,644,$(wildcard ggn/models/*.ggn) plugin-api/base/version.h \
+        $(addprefix plugin-api/python/lull/,program.py version.py)) \
     $(foreach p,judge plot,$(call put,$(share)/lull/$(p),644,$(wildcard plugin-api/python/lull/$(p)/*.py))) \
     $(call put,$(share)/lull/study,644,$(wildcard $(STUDY)/*.py)) \
     $(call put,$(share)/lull/study/page,644,$(wildcard $(STUDY)/page/*.*)) \

@@ -22,6 +22,7 @@ from .display import Display
 from .frame import Frame, Sample
 from .host import Block
 from .library import LullError
+from .program import say
 
 Render = Callable[[Sequence[Rect], int, int, bool], Iterable[Sample]]
 
@@ -58,7 +59,7 @@ class Driver:
 
     def __init__(self, frame: Frame, render: Optional[Render], *, threads: int = 1,
                  identity: Optional[Mapping[str, str]] = None, after_call: Optional[Callable[[Driver], None]] = None,
-                 suspend: Optional[Callable[[Driver], None]] = None, warn: Callable[[str], None] = print,
+                 suspend: Optional[Callable[[Driver], None]] = None, warn: Callable[[str], None] = say,
                  display_server: str = ""):
         self.frame, self.render, self.threads = frame, render, limits.checked("threads", threads)
         self.after_call, self.suspend, self.warn = after_call, suspend, warn

@@ -16,7 +16,7 @@ from ..criterion import Criterion, load
 from ..driver import Driver, Result
 from ..files import Output, check_outputs, write_each
 from ..frame import Frame
-from ..library import LullError
+from ..library import LullError, encoded
 from ..version import SOFTWARE
 from . import shown
 from .cycles import WAVE, Cycles, HostError
@@ -103,7 +103,7 @@ def scene_inputs() -> list[str]:
     for image in filter(None, map(bpy.data.images.get, (shown.PICTURE, shown.STOP_MAP))):
         if (path := bpy.path.abspath(image.filepath)) in paths:
             paths.remove(path)  # once: another image may read the same file
-    return sorted({os.path.realpath(p) for p in paths if p and os.path.isfile(p)})
+    return sorted({os.path.realpath(p) for p in paths if p and os.path.isfile(encoded(p))})
 
 
 def check_files(frames: Sequence[Settings], criterion: Criterion) -> None:
@@ -120,7 +120,7 @@ def _identity(scene: bpy.types.Scene, host: Cycles) -> dict[str, str]:
     """What the samples depend on beside the frame's own settings, for the checkpoint."""
     crc = 0
     for path in scene_inputs():
-        with open(path, "rb") as file:
+        with open(encoded(path), "rb") as file:
             while data := file.read(1 << 20):
                 crc = zlib.crc32(data, crc)
     camera, view = scene.camera, zlib.crc32(np.array(scene.camera.matrix_world, "<f4").tobytes())
@@ -187,7 +187,7 @@ class Session:
     def begin(self, resume: bool = False, every_s: float = 60.0) -> None:
         """Goes on from the checkpoint, if it is there; keeps it from now on. every_s 0: after every step."""
         state = self.settings.checkpoint
-        if state and resume and os.path.exists(state):
+        if state and resume and os.path.exists(encoded(state)):
             checkpoint.load(state, self.driver)
             self.host.passes.remember(self.frame)
             self._before = (self.driver.totals.render_s, self.driver.totals.criterion_s)
