@@ -22,8 +22,8 @@ from ..criterion import Criterion, load
 from ..driver import Result
 from ..library import encoded
 from ..outputs import Progress
-from ..program import run
-from ..stopping import EXIT_STATUS, Stopping
+from ..program import INTERRUPTED, run
+from ..stopping import Stopping
 
 if TYPE_CHECKING:  # launch() does without bpy
     import bpy
@@ -219,8 +219,8 @@ def _render(options: argparse.Namespace, stopping: Stopping) -> int:
             if frame is not None:
                 scene.frame_set(frame)
             status = max(status, _render_frame(options, scene, settings, criterion, stopping, costs))
-            if status in (1, EXIT_STATUS) or stopping.asked:
-                return EXIT_STATUS if stopping.asked and status in (0, EXIT_STATUS) else status
+            if status in (1, INTERRUPTED) or stopping.asked:
+                return INTERRUPTED if stopping.asked and status in (0, INTERRUPTED) else status
     if options.quote and len(frames) > 1:
         unknown = f"{len(frames)} frames: the criterion cannot tell what they cost"
         print(quote.shot(list(enumerate(costs)), len(frames)) or unknown, flush=True)
@@ -284,4 +284,4 @@ def _end(session: Session, result: Optional[Result], failed: Sequence[str]) -> i
         return 1
     if failed or session.unsaved:
         return 2
-    return EXIT_STATUS if result is not None and result.outcome == "interrupt" else 0
+    return INTERRUPTED if result is not None and result.outcome == "interrupt" else 0
