@@ -281,7 +281,7 @@ int main(int argc, char **argv)
 {
     const int host = argc > 1 && strcmp(argv[1], "--print-host") == 0;
     if (host || (argc > 1 && strcmp(argv[1], "--print") == 0)) {
-        printf("# lull/%s 1.0 where pointers have 8 bytes: each struct and its size, each field's offset and size.\n"
+        printf("# lull/%s where pointers have 8 bytes: each struct and its size, each field's offset and size.\n"
                "# Frozen: lines may be added (a minor version appends fields), never changed. Made by tests/abi/api_layout "
                "%s.\n",
                host ? "host.h" : "criterion.h", argv[1]);

@@ -25,7 +25,6 @@ cp -r $recorded "$tmp/d"
 d=$tmp/d one=$tmp/d/train/one-view0
 
 # --- options: help, and both bounds of every number ----------------------------------------------------------------------------
-says help --help
 for command in inspect convert flip visible thresholds compare import label train baseline replay evaluate cost reconstruct; do
     says help "$command" --help
 done

@@ -115,6 +115,25 @@ def test_programs():
     assert os.stat("one.png").st_mode & 0o777 == 0o644
 
 
+def test_environment():
+    """the same bytes whatever MPLBACKEND and a matplotlibrc say, of the folder or named, good or broken; and nobody else's are changed"""
+    subprocess.run([PROGRAM, "stops.csv", "-o", "plain.png"], check=True)
+    with open("plain.png", "rb") as file:
+        plain = file.read()
+    os.makedirs("settings", exist_ok=True)
+    for text in ("lines.linewidth: 9\nfont.size: 20\nfigure.facecolor: red\nsavefig.dpi: 30\n", "backend: x\n", "\xff\xfe", "no such thing"):
+        with open("settings/matplotlibrc", "w", encoding="latin-1") as file:
+            file.write(text)
+        for env in ({}, {"MPLBACKEND": "x"}, {"MPLBACKEND": "TkAgg"}, {"MATPLOTLIBRC": "/nowhere"}, {"MATPLOTLIBRC": os.path.abspath("settings")}):
+            done = subprocess.run([PROGRAM, "../stops.csv", "-o", "../other.png"], cwd="settings", env={**os.environ, **env}, capture_output=True)
+            with open("other.png", "rb") as file:
+                assert done.returncode == 0 and not done.stderr and file.read() == plain, (text, env, done)
+    code = "import os; before = dict(os.environ), os.getcwd(); import lull.plot.canvas; assert before == (dict(os.environ), os.getcwd())"
+    subprocess.run([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": PACKAGE, "MPLBACKEND": "x", "MATPLOTLIBRC": "y"}, check=True)
+    found = subprocess.run(["grep", "-rlE", "^ *(from|import) matplotlib", "--include=*.py", os.path.join(PACKAGE, "lull")], capture_output=True, text=True)
+    assert [os.path.basename(name) for name in found.stdout.split()] == ["canvas.py"], found.stdout
+
+
 def test_without():
     """without matplotlib: one line says what to install; --help and the rest of the package do without"""
     os.makedirs("without", exist_ok=True)

@@ -419,6 +419,10 @@ def test_bad_pictures():
         assert f.blocks[0].spp == 0 and not f.sums["color"].any()
     result, f, _ = run(host=lambda rects, *_: [good.astype(np.float32)] * (len(rects) - 1))
     assert "3 pictures for 4 rectangles" in str(result.exception) and [b.spp for b in f.blocks] == [16, 16, 16, 0]
+    five = lambda rects, *_: [good.astype(np.float32)] * (len(rects) + 1)  # noqa: E731
+    for host, text, spp in ((five, "5 pictures for 4 rectangles", 0), (lambda *a: iter(five(*a)), "more than 4 pictures for 4 rectangles", 16)):
+        result, f, _ = run(host=host)
+        assert result.outcome == "failed" and text in str(result.exception) and [b.spp for b in f.blocks] == [spp] * 4, result
 
 
 def test_strides():

@@ -180,7 +180,7 @@ LULL_EXPORT int32_t lull_host_denoise(const struct lull_host_frame *frame, const
 /* Whether there is a library; the error says how to get one. */
 LULL_EXPORT int32_t lull_host_denoiser(const char *library, struct lull_error *err);
 
-/* --- the live view (1.1) ---------------------------------------------------------------------------------------------- */
+/* --- the live view, since 1.1 ----------------------------------------------------------------------------------------- */
 
 /* Shows the picture in an image viewer while it is made: noisy R, G, B and lull.spp, lull.p_noisy, lull.error, and a frame
  * around each block, bright while it is active, thin with its samples when it has stopped. A thread of its own speaks the

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The structs and numbers of lull/criterion.h, loader.h and host.h 1.0 for ctypes: nothing else. The headers' comments are
+"""The structs and numbers of lull/criterion.h, loader.h and host.h for ctypes: nothing else. The headers' comments are
 the contract; tests/hosts compares every offset with plugin-api/layout-1.txt and host-layout-1.txt, every number with the
 headers."""
 import ctypes as C

@@ -7,8 +7,8 @@ import os
 from typing import Iterator, Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 
+from ..plot.canvas import Figure
 from ..plot.charts import new_figure, save
 from .definition import TWO_INTERVAL, VALIDATION
 from .people import People

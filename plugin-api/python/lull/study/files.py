@@ -8,11 +8,7 @@ import math
 import os
 from typing import Any, Iterator, TextIO
 
-VERSION = "1.0"
-
-
-class Refused(Exception):
-    """One line for people: bad usage, bad input, or an output that cannot be written. Exit status 2."""
+from ..program import Refused
 
 
 # --- JSON ---
