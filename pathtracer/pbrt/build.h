@@ -158,8 +158,8 @@ struct pt_input pt_build_colour_input(struct pt_builder *b, struct pt_params *p,
                                       pt_vec3 fallback);
 struct pt_input pt_input_grey(double value);
 /* Image map by file name; encoding: NULL = by file kind, "sRGB", "linear", "gamma X". -1 on failure. Colours of an EXR are
- * made Rec. 709's, by its chromaticities; numbers stay as they are. */
-enum pt_image_use { PT_IMAGE_COLOUR, PT_IMAGE_DATA };
+ * made Rec. 709's, by its chromaticities; numbers stay as they are. Of light, what is infinite, NaN or negative is said. */
+enum pt_image_use { PT_IMAGE_COLOUR, PT_IMAGE_DATA, PT_IMAGE_LIGHT };
 int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding,
                            enum pt_image_use use);
 /* An image of numbers as texture (normal maps): its number, or 0 after a failure. */
