@@ -98,7 +98,10 @@ struct pt_builder {
     struct pt_xform camera_ctm[2];
     int32_t camera_medium;
     double transform_times[2], shutter[2];
-    double origin[3]; /* of render space, in the world */
+    double origin[3];        /* of render space, in the world */
+    double camera_start;     /* depth in front of the camera where its rays begin, and the origin is */
+    double window_middle[2]; /* of what the camera sees, in its space; where rays begin at a depth, the screen is about it */
+    struct pt_xform world_to_camera[2];
 
     struct pt_list images, textures, materials, material_infos, meshes, quadrics, world_shapes, object_shapes, objects,
         instances, lights, media, medium_infos;
@@ -138,6 +141,10 @@ struct pt_xform pt_builder_to_render(const struct pt_builder *b, struct pt_xform
 
 /* build_image.c: film, filter, sampler, integrator, camera; at WorldBegin. */
 int pt_build_header(struct pt_builder *b);
+
+/* far_view.c: where the rays of a camera that looks from afar should begin, from the scene with its acceleration structure;
+ * camera_start when it is well where it is. Warns of a view that floats do not hold. */
+double pt_build_far_view(struct pt_builder *b);
 
 /* build_colour.c */
 enum pt_colour_use { PT_USE_REFLECTANCE, PT_USE_UNBOUNDED, PT_USE_LIGHT };
