@@ -220,6 +220,8 @@ static int finish(struct pt_builder *b, double *start)
     scene->shapes = move(b, &b->world_shapes, &scene->shape_count);
     int rc = b->diag.rc;
     if (!rc)
+        rc = pt_build_cut_instances(b);
+    if (!rc)
         rc = pt_materials_build(scene, err);
     if (!rc)
         rc = pt_media_build(scene, err);

@@ -219,6 +219,19 @@ struct pt_soup {
     const double *indices_d;
     const uint32_t *indices;
 };
+/* refine.c: a soup whose triangles that are huge against their distance from the origin of render space are cut up. */
+struct pt_cut {
+    struct pt_soup soup; /* the given one, or of these: */
+    double *p, *n, *uv;  /* owns */
+    uint32_t *indices;   /* owns; [corners] */
+    size_t corners;
+    int is_lost; /* so huge that it is not known where it is seen */
+};
+/* to_render: of the soup's positions. 0: out of memory. To be released in any case. */
+int pt_build_cut(const struct pt_soup *soup, const struct pt_xform *to_render, struct pt_cut *out);
+void pt_cut_release(struct pt_cut *cut_up);
+/* At the end: the same of the meshes of objects, about the places that their instances give the origin. */
+int pt_build_cut_instances(struct pt_builder *b);
 int pt_build_mesh(struct pt_builder *b, struct pt_params *p, const struct pt_soup *soup);
 /* Fails unless v, of the parameter "indices", is one of so many vertices. */
 int pt_build_check_index(const struct pt_params *p, double v, size_t vertex_count);
