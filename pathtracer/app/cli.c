@@ -307,7 +307,7 @@ const struct base_option pt_cli_options[] = {
              "image"},
     {"look-at", 0, "\"EX EY EZ AX AY AZ UX UY UZ\"", .set = set_look_at, .role = BASE_DECIDES, .identify = identify_look_at,
      .help = "Look from E at A with U up, in the scene's world, instead of through the scene's camera"},
-    {"fov", 0, "DEGREES", TO(load.view.fov_deg), 1e-3, 179.9, .role = BASE_DECIDES,
+    {"fov", 0, "DEGREES", TO(load.view.fov_deg), 1e-12, 179.9, .role = BASE_DECIDES,
      .help = "Field of view over the image's short side, instead of the scene's"},
     {"light-selection", 0, NULL, TO(load.light_selection), .words = pt_light_selection_words, .role = BASE_DECIDES,
      .identify = identify_light_selection,

@@ -57,8 +57,8 @@ static int parse_view(char *line, int *frame, struct pt_view *view, struct base_
         return base_fail(err, BASE_EINVAL, "expected a frame from 0 to %d", PT_SHOT_LAST_FRAME);
     *frame = (int)n;
     field[4] += strspn(field[4], " ");
-    if (*field[4] != '\0' && !base_parse_real(field[4], 1e-3, 179.9, &view->fov_deg))
-        return base_fail(err, BASE_EINVAL, "expected a field of view from 0.001 to 179.9 degrees, or nothing");
+    if (*field[4] != '\0' && !base_parse_real(field[4], 1e-12, 179.9, &view->fov_deg))
+        return base_fail(err, BASE_EINVAL, "expected a field of view from 1e-12 to 179.9 degrees, or nothing");
     return pt_cli_look_at(field[1], view, err);
 }
 

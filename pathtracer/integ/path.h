@@ -394,7 +394,7 @@ PT_KERNEL_INLINE void pt_path_aux(pt_effects fx, const struct pt_path *path, con
 {
     struct pt_path_result *out = path->out;
     if (path->depth == 0) /* on the camera's ray, not where a medium sent it */
-        out->depth = path->hit.t;
+        out->depth = path->hit.t + path->scene->camera.before;
     if (!pt_bsdf_has_smooth(fx, bsdf) || !v3_is_black(out->albedo))
         return;
     out->albedo = pt_clamp_unit(pt_bsdf_albedo(fx, bsdf, wo));

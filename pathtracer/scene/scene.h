@@ -2,8 +2,9 @@
  * The renderable: what a loaded scene is while it is being rendered. Plain data; read-only once built, so any thread may
  * read.
  *
- * Spaces. *Render space* is world space translated so that the camera (at shutter open) sits at the origin; the translation
- * is applied in double before anything becomes float, so that a scene far from the world's origin keeps its precision.
+ * Spaces. *Render space* is world space translated so that the camera (at shutter open), or what it sees from afar, is at
+ * the origin; the translation is applied in double before anything becomes float, so that a scene far from the world's
+ * origin keeps its precision.
  * Everything here is in render space and scene units, but for the shapes of an object (see pt_object), which are in the
  * space of their object. Colours are linear Rec.709 RGB. Ids are indices into the arrays of pt_scene, -1 = none; textures
  * have numbers, id + 1, 0 = none.
@@ -38,7 +39,10 @@ struct pt_camera {
     struct pt_mat34
         to_render[2]; /* camera (x right, y up, z forward; may be left-handed) → render, at shutter open, close */
     int32_t animated; /* to_render[1] counts */
-    int32_t medium;   /* the camera lies in it, -1 = vacuum */
+    /* start > 0: rays begin at that depth, `before` from the lens; to_render is of the middle of the window there. `screen`
+     * is about that middle, which is in the camera's own space, of a perspective one at depth 1. pbrt/far_view.c */
+    float start, before, middle_x, middle_y, focus_beyond; /* the last: focal_distance - start */
+    int32_t medium;                                        /* the camera lies in it, -1 = vacuum */
     /* derived by pt_camera_init */
     float x0, dx, y0, dy; /* z = 1 (perspective) or z = 0 (orthographic) plane: x = x0 + dx·raster_x, likewise y */
 };
