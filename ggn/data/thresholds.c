@@ -11,7 +11,7 @@
 #include "base/list.h"
 #include "picture/read.h"
 
-enum { MAX_TEXT = 1 << 26, MAX_VIEWS = 1 << 20 };
+enum { MAX_TEXT = 1 << 26, MAX_VIEWS = 1 << 20, SHOWN = 40 }; /* SHOWN: bytes of a value in a message */
 
 void ggn_thresholds_release(struct ggn_thresholds *t)
 {
@@ -58,18 +58,18 @@ static struct ggn_view *add_view(struct ggn_thresholds *t, const char *name, int
     return v;
 }
 
-static int parse_line(const char *path, int number, char *line, struct ggn_thresholds *t, struct base_err *err)
+static int parse_line(const char *path, size_t number, char *line, struct ggn_thresholds *t, struct base_err *err)
 {
     char *sep = strchr(line, ';');
     if (!sep || sep == line || sep - line >= GGN_VIEW_NAME)
-        return base_fail(err, BASE_EINVAL, "%s:%d: expected NAME;T0;T1;…", path, number);
+        return base_fail(err, BASE_EINVAL, "%s:%zu: expected NAME;T0;T1;…", path, number);
     *sep = '\0';
     int n = 0;
     for (const char *p = sep + 1; *p != '\0'; p++)
         n += *p == ';';
     n += sep[1] != '\0' && sep[strlen(sep + 1)] != ';'; /* a last value without its ';' */
     if (n < 1 || n > GGN_VIEW_BLOCKS)
-        return base_fail(err, BASE_EINVAL, "%s:%d: %d thresholds", path, number, n);
+        return base_fail(err, BASE_EINVAL, "%s:%zu: %d thresholds", path, number, n);
     struct ggn_view *v = add_view(t, line, n);
     if (!v)
         return base_fail_nomem(err, path);
@@ -78,27 +78,31 @@ static int parse_line(const char *path, int number, char *line, struct ggn_thres
         char *end;
         double value = strtod(at, &end);
         if (end == at || !(value > 0.0 && value < 1e12) || (*end != ';' && *end != '\0'))
-            return base_fail(err, BASE_EINVAL, "%s:%d: threshold %d is not a positive number", path, number, i);
+            return base_fail(err, BASE_EINVAL, "%s:%zu: '%.*s' is not a positive number (threshold %d)", path, number,
+                             (int)(strcspn(at, ";") < SHOWN ? strcspn(at, ";") : SHOWN), at, i);
         v->spp[i] = value;
         at = end + 1;
     }
     return 0;
 }
 
-int ggn_thresholds_parse_csv(const char *path, char *text, struct ggn_thresholds *out, struct base_err *err)
+int ggn_thresholds_parse_csv(const char *path, char *text, size_t size, struct ggn_thresholds *out, struct base_err *err)
 {
     struct ggn_thresholds t = {0};
-    int rc = 0, number = 0;
-    for (char *line = text + base_utf8_mark(text, strlen(text)), *next; line && !rc; line = next) {
-        next = strchr(line, '\n');
-        if (next)
-            *next++ = '\0';
-        number++;
-        line[strcspn(line, "\r")] = '\0';
-        if (line[0] == '\0' || line[0] == '#')
+    struct base_lines lines;
+    const char *line;
+    size_t length;
+    base_lines_init(&lines, path, text, size);
+    int rc;
+    while (!(rc = base_lines_next(&lines, &line, &length, err)) && line) {
+        char *own = text + (line - text);
+        own[length] = '\0';
+        if (length == 0 || own[0] == '#')
             continue;
-        rc = t.n < MAX_VIEWS ? parse_line(path, number, line, &t, err)
+        rc = t.n < MAX_VIEWS ? parse_line(path, lines.number, own, &t, err)
                              : base_fail(err, BASE_EINVAL, "%s: too many lines", path);
+        if (rc)
+            break;
     }
     if (!rc && t.n == 0)
         rc = base_fail(err, BASE_EINVAL, "%s: no thresholds in it", path);
@@ -206,7 +210,7 @@ int ggn_thresholds_read(const char *path, int block, struct ggn_thresholds *out,
             rc = list_json(path, root, &t, err);
             cJSON_Delete(root);
         } else if (!rc) {
-            rc = ggn_thresholds_parse_csv(path, text, &t, err);
+            rc = ggn_thresholds_parse_csv(path, text, size, &t, err);
         }
         free(text);
     }

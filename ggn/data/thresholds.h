@@ -31,7 +31,7 @@ struct ggn_thresholds {
 /* The kind of file is taken from its name: .csv, .json, .exr. block: side of a block in pixels, for EXR only. */
 int ggn_thresholds_read(const char *path, int block, struct ggn_thresholds *out, struct base_err *err);
 /* text is NUL-terminated at text[size]; it is modified. `path` is for messages. */
-int ggn_thresholds_parse_csv(const char *path, char *text, struct ggn_thresholds *out, struct base_err *err);
+int ggn_thresholds_parse_csv(const char *path, char *text, size_t size, struct ggn_thresholds *out, struct base_err *err);
 void ggn_thresholds_release(struct ggn_thresholds *t);
 const struct ggn_view *ggn_thresholds_find(const struct ggn_thresholds *t, const char *name);
 /* The same for a recorded view: its folder's name, or that with the ending _part6 of SIN3D's own files. */

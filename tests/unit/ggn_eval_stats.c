@@ -41,7 +41,7 @@ static int parse(const char *text, struct ggn_thresholds *t, struct base_err *er
 {
     char *copy = malloc(strlen(text) + 1);
     strcpy(copy, text);
-    int rc = ggn_thresholds_parse_csv("x.csv", copy, t, err);
+    int rc = ggn_thresholds_parse_csv("x.csv", copy, strlen(copy), t, err);
     free(copy);
     return rc;
 }

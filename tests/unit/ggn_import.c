@@ -82,7 +82,7 @@ static void layout(void **state)
     snprintf(out, sizeof out, "%s/out", root);
     mkdir(out, 0777);
     snprintf(out, sizeof out, "%s/out/toy", root);
-    assert_int_equal(ggn_thresholds_parse_csv("t.csv", text, &t, NULL), 0);
+    assert_int_equal(ggn_thresholds_parse_csv("t.csv", text, strlen(text), &t, NULL), 0);
     struct ggn_import_options o = plain;
     o.thresholds = &t;
     if (ggn_import_view(dir, out, &o, &labelled, &err) != 0)
@@ -426,7 +426,7 @@ static void views_are_told_word_by_word(void **state)
         cases[i].spoil(dir);
         if (cases[i].thresholds) {
             snprintf(csv, sizeof csv, "%s", cases[i].thresholds);
-            assert_int_equal(ggn_thresholds_parse_csv("t.csv", csv, &thresholds, NULL), 0);
+            assert_int_equal(ggn_thresholds_parse_csv("t.csv", csv, strlen(csv), &thresholds, NULL), 0);
             o.thresholds = &thresholds;
         }
         snprintf(out, sizeof out, "%s/%s-out", root, cases[i].name);
