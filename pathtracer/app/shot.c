@@ -100,7 +100,9 @@ int pt_shot_parse_path(const char *name, const char *text, size_t size, struct p
     while (!(rc = base_lines_next(&lines, &line, &length, err)) && line)
         if ((rc = parse_line(&lines, line, length, s, err)) != 0)
             break;
-    return rc ? rc : s->count > 0 ? 0 : base_fail(err, BASE_EINVAL, "%s: expected %s and a line for each frame", name, PATH_HEAD);
+    return rc             ? rc
+           : s->count > 0 ? 0
+                          : base_fail(err, BASE_EINVAL, "%s: expected %s and a line for each frame", name, PATH_HEAD);
 }
 
 /* Of the path, the frames that --frames lists. */

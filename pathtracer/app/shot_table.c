@@ -52,7 +52,8 @@ static int parse_frame(const struct base_lines *lines, const char *at, size_t le
     t->frames[f] = (int)value;
     for (size_t i = 0; i < t->block_count; i++) {
         if (!take(&at, end, 1, INT32_MAX, &behind, &value) || behind != (i + 1 < t->block_count ? ';' : '\0'))
-            return bad(lines->name, lines->number, "as many samples per pixel as in the first frame, each from 1 to 2147483647", err);
+            return bad(lines->name, lines->number,
+                       "as many samples per pixel as in the first frame, each from 1 to 2147483647", err);
         t->spp[f * t->block_count + i] = (uint32_t)value;
     }
     t->frame_count++;
