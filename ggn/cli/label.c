@@ -76,11 +76,17 @@ static void convert_from_study(struct ggn_labels *l)
     snprintf(l->detail + used, sizeof l->detail - used, ", as samples at which no noise is seen at all");
 }
 
+/* The last level, as of imported pictures. */
+static int has_own_reference(const struct ggn_dataset_view *v)
+{
+    return !v->manifest.reference_independent && v->manifest.reference_spp > 0;
+}
+
 /* Of imported pictures the thresholds that the import would attach; of a recording they are those of the study. */
 static int human_labels(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v,
                         struct ggn_labels *out, struct base_err *err)
 {
-    const int own_pictures = !v->manifest.reference_independent && v->manifest.reference_spp > 0;
+    const int own_pictures = has_own_reference(v);
     const struct ggn_view *row;
     struct base_err why = {0};
     int rc = find_row(o->human, o->view ? o->view : v->name, t, &row, err);
@@ -163,8 +169,9 @@ static int label_view(const struct labelling *l, const struct ggn_dataset_view *
     if (!rc && o->human)
         printf("%s: %u blocks labelled with human thresholds\n", v->dir, labels.n);
     else if (!rc)
-        printf("%s: %u blocks labelled by the model observer, %u censored at %.0f spp\n", v->dir, labels.n, censored,
-               labels.cap);
+        printf("%s: %u blocks labelled by the model observer, %u censored at %.0f spp%s\n", v->dir, labels.n, censored,
+               labels.cap,
+               o->source == GGN_FROM_LEVELS && has_own_reference(v) ? "; the reference is the last level itself" : "");
     ggn_labels_release(&labels);
     return rc;
 }

@@ -71,7 +71,7 @@ fails "import: a view onto itself" "this is the view itself" $ggn import "$view"
 cmp -s "$d/labels.json" "$tmp/people.json" && [ ! -e "$tmp/none.png" ] && [ ! -e "$tmp/data/figures" ]
 check "  …and nothing has changed" $?
 
-$ggn label --source levels --replace-human "$tmp/data" >"$tmp/out" 2>"$tmp/err" && grep -q 'model observer' "$tmp/out" && grep -q '"source":.*"observer"' "$d/labels.json" &&
+$ggn label --source levels --replace-human "$tmp/data" >"$tmp/out" 2>"$tmp/err" && grep -q 'by the model observer, 2 censored at 267 spp; the reference is the last level itself$' "$tmp/out" && grep -q '"source":.*"observer"' "$d/labels.json" &&
     ! grep -q human "$d/labels.json"
 check "observer labels are not called human" $?
 $ggn label "$tmp/data" --human "$tmp/human.csv" >"$tmp/out" 2>"$tmp/err" && grep -q '"threshold":.*90' "$d/labels.json"
