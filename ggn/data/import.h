@@ -2,10 +2,10 @@
  * Pictures of rising sample counts, one folder per view, into block sequences: PNG, JPEG, EXR, and the .rawls of SIN3D.
  *
  * A view folder holds NAME_00020.exr …: the number is that of the samples. What is hidden (._NAME_00020.exr) or called
- * otherwise is none of it; a second sequence, a second picture of a level and a second format are refused. EXR and .rawls are linear light, the others sRGB
- * codes. Halves, the mean of the first half of the samples, are either second files NAME_half_00020.exr … or the layer
- * half.R, half.G, half.B of an EXR; then the sequence needs no reference. Without halves the last level serves as the
- * reference, and the manifest says that it is not independent.
+ * otherwise is none of it; a second sequence, a second picture of a level and a second format are refused. EXR and .rawls
+ * are linear light, the others sRGB codes. Halves, the mean of the first half of the samples, are either second files
+ * NAME_half_00020.exr … or the layer half of an EXR (half.R, half.G, half.B, or half.Y); then the sequence needs no
+ * reference. Without halves the last level serves as the reference, and the manifest says that it is not independent.
  */
 #ifndef GGN_DATA_IMPORT_H
 #define GGN_DATA_IMPORT_H

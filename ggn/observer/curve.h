@@ -8,8 +8,8 @@
  *   s^2 (1/n + 1/n_r), so it is scaled by sqrt(n_r / (n_r + n)); texture is what the last level and R share. Where the block
  *   has halves too they go on beyond the last level.
  * - From recorded levels of which R is the last one, so that it has their samples among its own: I - R has the variance
- *   s^2 (1/n - 1/n_r) and stands for 1 / (1/n - 1/n_r) samples, as in people's studies (observer.h). Of the levels those count
- *   that stand for at most 2 n_r samples: the curve ends there, and what is seen at its end is censored.
+ *   s^2 (1/n - 1/n_r) and stands for 1 / (1/n - 1/n_r) samples, as in people's studies (observer.h). Of the levels those
+ *   count that stand for at most 2 n_r samples: the curve ends there, and what is seen at its end is censored.
  */
 #ifndef GGN_OBSERVER_CURVE_H
 #define GGN_OBSERVER_CURVE_H

@@ -24,7 +24,7 @@ struct base_lines {
     int is_ended;                /* that line has an end */
 };
 void base_lines_init(struct base_lines *lines, const char *name, const char *text, size_t size);
-/* The next line without its end; *line is NULL behind the last one. BASE_EINVAL: it has a byte 0, so that this is no text. */
+/* The next line without its end; *line is NULL behind the last one. BASE_EINVAL: it has a byte 0, which no text has. */
 int base_lines_next(struct base_lines *lines, const char **line, size_t *length, struct base_err *err);
 /* So many follow. */
 size_t base_lines_left(const struct base_lines *lines);
