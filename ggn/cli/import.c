@@ -96,7 +96,7 @@ int ggn_cmd_import(int argc, char **argv, struct base_err *err)
         return rc;
     base_interrupt_catch();
     if (o.thresholds) {
-        rc = ggn_thresholds_read(o.thresholds, o.how.block, &thresholds, err);
+        rc = ggn_thresholds_read(o.thresholds, (int[2]){o.how.block, o.how.block}, &thresholds, err);
         o.how.thresholds = &thresholds;
     }
     int made = 0;

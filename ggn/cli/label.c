@@ -55,12 +55,16 @@ static const struct base_option list[] = {
     {"threads", 't', "N", TO(threads), 1, 1024, .help = "worker threads (all processors)"},
     {0}};
 
+static const int study_block[2] = {200, 200};
+
 /* The row of human thresholds of a view. */
 static int find_row(const char *csv, const char *name, const struct ggn_thresholds *t, const struct ggn_view **row,
                     struct base_err *err)
 {
     *row = ggn_thresholds_of(t, name);
-    return *row ? 0 : base_fail(err, BASE_EINVAL, "%s: no thresholds for '%s'", csv, name);
+    if (!*row)
+        return base_fail(err, BASE_EINVAL, "%s: no thresholds for '%s'", csv, name);
+    return (*row)->of_study ? 0 : base_fail(err, BASE_EINVAL, "%s: these are no thresholds of people's study", csv);
 }
 
 /* From thresholds of the study to samples at which no noise is seen at all. */
@@ -229,7 +233,7 @@ static int label(const struct options *o, struct base_threads *threads, struct b
     if (o->spread > 0)
         observer.spread = o->spread;
     if (!rc && o->human)
-        rc = ggn_thresholds_read(o->human, 200, &human, err);
+        rc = ggn_thresholds_read(o->human, study_block, &human, err);
     if (!rc && !o->check)
         rc = job_handshake(ggn_cmd_job, "version=" BASE_VERSION "\n", base_threads_count(threads), err);
     for (int i = 0; i < 2 * o->n_inputs && !rc && !base_interrupted; i++) { /* a look at all, then the work */
@@ -276,7 +280,7 @@ static int calibrate(const struct options *o, struct base_threads *threads, stru
     struct ggn_thresholds t = {0};
     struct ggn_calibration c = {0};
     size_t room = 1;
-    int n = 0, rc = ggn_thresholds_read(o->calibrate, 200, &t, err);
+    int n = 0, rc = ggn_thresholds_read(o->calibrate, study_block, &t, err);
     for (int s = 0; s < o->n_inputs && !rc; s++) {
         rc = ggn_dataset_open(o->inputs[s], &sets[s], err);
         room += rc ? 0 : (size_t)sets[s].n;

@@ -559,12 +559,9 @@ static int take_over(const char *out, struct seq_manifest *m, struct base_err *e
 static int attach_thresholds(const struct view *v, const char *out, const struct seq_manifest *m,
                              const struct ggn_thresholds *t, int *labelled, struct base_err *err)
 {
-    char with_part[GGN_VIEW_NAME + 8];
-    snprintf(with_part, sizeof with_part, "%s_part6", v->prefix);
-    const char *const names[] = {with_part, v->prefix, base_file_name(v->dir)};
-    const struct ggn_view *row = NULL;
-    for (int i = 0; i < 3 && t && !row; i++)
-        row = ggn_thresholds_find(t, names[i]);
+    const struct ggn_view *row = t ? ggn_thresholds_of(t, v->prefix) : NULL;
+    if (t && !row)
+        row = ggn_thresholds_of(t, base_file_name(v->dir));
     *labelled = row != NULL;
     if (!row)
         return 0;

@@ -7,9 +7,12 @@
 #include <cjson/cJSON.h>
 
 #include "base/files.h"
-#include "base/text.h"
+#include "base/json.h"
 #include "base/list.h"
+#include "base/options.h"
+#include "base/text.h"
 #include "picture/read.h"
+#include "sequence/simulate.h"
 
 enum { MAX_TEXT = 1 << 26, MAX_VIEWS = 1 << 20, SHOWN = 40 }; /* SHOWN: bytes of a value in a message */
 
@@ -21,20 +24,29 @@ void ggn_thresholds_release(struct ggn_thresholds *t)
     *t = (struct ggn_thresholds){0};
 }
 
-const struct ggn_view *ggn_thresholds_find(const struct ggn_thresholds *t, const char *name)
+static int length_without_part(const char *name)
 {
-    for (int i = 0; i < t->n; i++)
-        if (strcmp(t->views[i].name, name) == 0)
-            return &t->views[i];
-    return NULL;
+    static const char part[] = "_part6";
+    const size_t length = strlen(name), n = sizeof part - 1;
+    return (int)(length > n && strcmp(name + length - n, part) == 0 ? length - n : length);
+}
+
+int ggn_view_is(const char *name, const char *other)
+{
+    const int n = length_without_part(name);
+    return n == length_without_part(other) && strncmp(name, other, (size_t)n) == 0;
 }
 
 const struct ggn_view *ggn_thresholds_of(const struct ggn_thresholds *t, const char *view)
 {
-    char with_part[GGN_VIEW_NAME + 8];
-    const struct ggn_view *found = ggn_thresholds_find(t, view);
-    snprintf(with_part, sizeof with_part, "%.*s_part6", GGN_VIEW_NAME - 1, view);
-    return found ? found : ggn_thresholds_find(t, with_part);
+    const struct ggn_view *same = NULL;
+    for (int i = t->n - 1; i >= 0; i--) {
+        if (strcmp(t->views[i].name, view) == 0)
+            return &t->views[i];
+        if (ggn_view_is(t->views[i].name, view))
+            same = &t->views[i];
+    }
+    return same;
 }
 
 /* Appends a view with room for n blocks, all unknown. NULL: out of memory. */
@@ -111,12 +123,24 @@ int ggn_thresholds_parse_csv(const char *path, char *text, size_t size, struct g
     if (repeated)
         rc = repeated > 0 ? base_fail(err, BASE_EINVAL, "%s: view '%s' appears twice", path, twice)
                           : base_fail_nomem(err, path);
-    if (rc) {
+    for (int i = 0; i < t.n; i++)
+        t.views[i].of_study = 1;
+    if (rc)
         ggn_thresholds_release(&t);
-        return rc;
-    }
-    *out = t;
-    return 0;
+    else
+        *out = t;
+    return rc;
+}
+
+/* Labels of people are thresholds of their study, unless they were converted (ggn label --human): then they end at the cap of
+ * what is simulated. */
+static int json_is_of_study(const cJSON *root)
+{
+    const cJSON *source = cJSON_GetObjectItemCaseSensitive(root, "source");
+    double cap;
+    return cJSON_IsString(source) && (strcmp(source->valuestring, "people") == 0 ||
+                                      (strcmp(source->valuestring, "human") == 0 &&
+                                       !(base_json_get(root, "cap", 0, 1e12, &cap) && cap == (double)SEQ_SIMULATED_CAP)));
 }
 
 /* Reports name their blocks by id; ids may be any subset of the grid. */
@@ -148,30 +172,38 @@ static int list_json(const char *path, const cJSON *root, struct ggn_thresholds 
         return base_fail_nomem(err, path);
     v->columns = columns;
     v->unnamed = !cJSON_IsString(scene);
+    v->of_study = json_is_of_study(root);
     cJSON_ArrayForEach (block, blocks) {
         const cJSON *id = cJSON_GetObjectItemCaseSensitive(block, "id");
         const cJSON *spp = cJSON_GetObjectItemCaseSensitive(block, "threshold");
         if (!spp)
             spp = cJSON_GetObjectItemCaseSensitive(block, "spp");
         if (!cJSON_IsNumber(spp) || !(spp->valuedouble > 0.0 && spp->valuedouble < 1e12))
-            return base_fail(err, BASE_EINVAL, "%s: block %d has no positive spp", path, id->valueint);
+            return base_fail(err, BASE_EINVAL, "%s: block %d: spp %g (expected a number above 0, below 1e12)", path,
+                             id->valueint, cJSON_IsNumber(spp) ? spp->valuedouble : (double)NAN);
         v->spp[id->valueint] = spp->valuedouble;
     }
     return 0;
 }
 
-/* One value per block: the largest in the block (a block is one value; the largest forgives borders that are filtered). */
-static int list_stop_map(const char *path, const struct pic_image *image, int block, struct ggn_thresholds *t,
+/* One value per block: the largest in the block (a block is one value; the largest forgives borders that are filtered).
+ * Blocks are those of the whole picture, of which the file may hold a crop, and of the size that the file says. */
+static int list_stop_map(const char *path, const struct pic_image *image, const int asked[2], struct ggn_thresholds *t,
                          struct base_err *err)
 {
-    /* Blocks are those of the whole picture, of which the file may hold a crop. */
     struct pic_window w;
+    struct pic_attribute size = {.name = "lull:block"};
+    int block[2] = {asked[0], asked[1]};
     const int found =
-        pic_read_header(path, &w, NULL, 0, NULL) == 0 && w.x1 - w.x0 == image->width && w.y1 - w.y0 == image->height;
-    const int left = found ? w.x0 % block : 0, top = found ? w.y0 % block : 0; /* of the first pixel in its block */
-    long columns = (left + image->width + block - 1L) / block, rows = (top + image->height + block - 1L) / block;
+        pic_read_header(path, &w, &size, 1, NULL) == 0 && w.x1 - w.x0 == image->width && w.y1 - w.y0 == image->height;
+    if (found && size.text[0] && !base_parse_block(size.text, PIC_MAX_SIDE, block))
+        return base_fail(err, BASE_EINVAL, "%s: lull:block is '%.40s' (expected the size of its blocks, as 200x200)", path,
+                         size.text);
+    const int left = found ? w.x0 % block[0] : 0, top = found ? w.y0 % block[1] : 0; /* of the first pixel in its block */
+    const long columns = (left + image->width + block[0] - 1L) / block[0],
+               rows = (top + image->height + block[1] - 1L) / block[1];
     if (columns * rows > GGN_VIEW_BLOCKS)
-        return base_fail(err, BASE_EINVAL, "%s: %ld blocks of %d pixels", path, columns * rows, block);
+        return base_fail(err, BASE_EINVAL, "%s: %ld blocks of %dx%d pixels", path, columns * rows, block[0], block[1]);
     struct ggn_view *v = add_view(t, base_file_name(path), (int)(columns * rows));
     if (!v)
         return base_fail_nomem(err, path);
@@ -179,41 +211,47 @@ static int list_stop_map(const char *path, const struct pic_image *image, int bl
     v->unnamed = 1;
     for (int y = 0; y < image->height; y++)
         for (int x = 0; x < image->width; x++) {
-            double *s = &v->spp[(top + y) / block * columns + (left + x) / block];
+            double *s = &v->spp[(top + y) / block[1] * columns + (left + x) / block[0]];
             double value = (double)image->f32[(size_t)y * (size_t)image->width + (size_t)x];
             if (!(*s >= value))
                 *s = value;
         }
     for (int i = 0; i < v->n; i++)
         if (!(v->spp[i] > 0.0 && v->spp[i] < 1e12))
-            return base_fail(err, BASE_EINVAL, "%s: block %d has no positive spp", path, i);
+            return base_fail(err, BASE_EINVAL, "%s: block %d: spp %g (expected a number above 0, below 1e12)", path, i,
+                             v->spp[i]);
     return 0;
 }
 
-int ggn_thresholds_read(const char *path, int block, struct ggn_thresholds *out, struct base_err *err)
+static int read_text(const char *path, int is_json, struct ggn_thresholds *t, struct base_err *err)
 {
-    const char *dot = strrchr(path, '.');
+    char *text;
+    size_t size;
+    int rc = base_file_read(path, MAX_TEXT, &text, &size, err);
+    if (rc)
+        return rc;
+    if (is_json) {
+        cJSON *root = cJSON_ParseWithLength(text, size);
+        rc = list_json(path, root, t, err);
+        cJSON_Delete(root);
+    } else
+        rc = ggn_thresholds_parse_csv(path, text, size, t, err);
+    free(text);
+    return rc;
+}
+
+int ggn_thresholds_read(const char *path, const int block[2], struct ggn_thresholds *out, struct base_err *err)
+{
     struct ggn_thresholds t = {0};
     struct pic_image image = {0};
-    char *text = NULL;
-    size_t size;
     int rc;
-    if (dot && strcmp(dot, ".exr") == 0) {
+    if (base_file_has_ending(path, "exr")) {
         rc = pic_read_channel(path, "lull.spp.V", &image, err);
         if (!rc)
             rc = list_stop_map(path, &image, block, &t, err);
         pic_release(&image);
-    } else {
-        rc = base_file_read(path, MAX_TEXT, &text, &size, err);
-        if (!rc && dot && strcmp(dot, ".json") == 0) {
-            cJSON *root = cJSON_ParseWithLength(text, size);
-            rc = list_json(path, root, &t, err);
-            cJSON_Delete(root);
-        } else if (!rc) {
-            rc = ggn_thresholds_parse_csv(path, text, size, &t, err);
-        }
-        free(text);
-    }
+    } else
+        rc = read_text(path, base_file_has_ending(path, "json"), &t, err);
     if (rc)
         ggn_thresholds_release(&t);
     else
