@@ -132,8 +132,8 @@ int ggn_thresholds_parse_csv(const char *path, char *text, size_t size, struct g
     return rc;
 }
 
-/* Labels of people are thresholds of their study, unless they were converted (ggn label --human): then they end at the cap of
- * what is simulated. */
+/* Labels of people are thresholds of their study, unless they were converted (ggn label --human): then they end at the cap
+ * of what is simulated. */
 static int json_is_of_study(const cJSON *root)
 {
     const cJSON *source = cJSON_GetObjectItemCaseSensitive(root, "source");

@@ -30,8 +30,8 @@ struct ggn_thresholds {
     struct ggn_view *views; /* owns */
 };
 
-/* The kind of file is taken from its name: .csv, .json, .exr. block: width and height of a block in pixels, where an EXR does
- * not say it (lull:block). */
+/* The kind of file is taken from its name: .csv, .json, .exr. block: width and height of a block in pixels, where an EXR
+ * does not say it (lull:block). */
 int ggn_thresholds_read(const char *path, const int block[2], struct ggn_thresholds *out, struct base_err *err);
 /* text is NUL-terminated at text[size]; it is modified. `path` is for messages. */
 int ggn_thresholds_parse_csv(const char *path, char *text, size_t size, struct ggn_thresholds *out, struct base_err *err);

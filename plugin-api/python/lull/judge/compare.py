@@ -122,6 +122,6 @@ def run(program: str, paths: Sequence[str], o: dict[str, Any]) -> None:
     names = found[0].truth["name"], found[0].model["name"]
     print("'%s' against '%s'" % names if len(found) == 1 and names[0] != names[1] else
           f"{len(found)} view{'' if len(found) == 1 else 's'} in common")
-    print("in samples at which no noise is seen" if not any(of_study) else "in samples of the study, as both have them" if all(of_study) else
-          f"in samples of the study; n at which no noise is seen are {CONVERSION} of them")
+    print("in samples at which no noise is seen" if not any(of_study) else
+          "in samples of the study, as both have them" if all(of_study) else f"in samples of the study; n at which no noise is seen are {CONVERSION} of them")
     print("\n".join(_table(figures)))
