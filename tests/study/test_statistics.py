@@ -226,6 +226,10 @@ def test_kinds():
     assert (d.octaves, d.people, d.blocks) == (1.75, 2, 2)
     near(d.hi - d.octaves, 12.7062 * 1.0, 1e-4)
     assert against_noisy(people, "blend", 3).octaves == 2.25 and against_noisy(people, "denoised").people == 0
+    for own, ends in (([5, 6, 7, 10], (False, True)), ([10, 6, 7, 9], (True, False)), ([5, 6, 4, 9], (True, False)), ([10, 6, 11, 9], (True, True))):
+        people.results[0].estimates = {c: Estimate(2, t, 1.0, 2.0, 0.1, 0.5) for c, t in enumerate(own)}
+        d = against_noisy(people, "blend")  # what is above the levels may differ by more, or by less where the noisy one is
+        assert (math.isinf(d.lo), math.isinf(d.hi)) == ends, (own, d)
 
 
 # --- people with plans and answers ---
