@@ -29,6 +29,7 @@ struct view {
     char dir[4096], prefix[GGN_VIEW_NAME];
     const char *ending;   /* of all files, static */
     int n, has_halves;    /* has_halves: in files of their own, or as a layer of each level's */
+    int pictures;         /* halves included */
     struct level *levels; /* owns; rising */
 };
 
@@ -83,12 +84,12 @@ struct series {
     int pictures;
 };
 
-/* The series of each name of a level, the largest first, among equals that which came first. Returns how many there are, or
+/* The series of each name of a level; *largest among equals is that which came first. Returns how many there are, or
  * BASE_ENOMEM. */
-static int list_series(struct dirent **entries, int n, struct series **out)
+static int list_series(struct dirent **entries, int n, struct series **out, int *largest)
 {
     struct series *list = malloc((size_t)(n + 1) * sizeof *list);
-    int count = 0, largest = 0, is_half;
+    int count = 0, is_half;
     const char *ending;
     uint32_t spp;
     if (!list)
@@ -107,13 +108,9 @@ static int list_series(struct dirent **entries, int n, struct series **out)
         }
         list[k].pictures++;
     }
+    *largest = 0;
     for (int k = 1; k < count; k++)
-        largest = list[k].pictures > list[largest].pictures ? k : largest;
-    if (count > 0) {
-        const struct series first = list[largest];
-        memmove(list + 1, list, (size_t)largest * sizeof *list);
-        list[0] = first;
-    }
+        *largest = list[k].pictures > list[*largest].pictures ? k : *largest;
     *out = list;
     return count;
 }
@@ -149,17 +146,19 @@ static int scan(const char *dir, struct view *v, struct base_err *err)
 {
     struct dirent **entries;
     struct series *series = NULL;
-    int rc = 0, n = scandir(dir, &entries, is_visible, alphasort);
+    int rc = 0, largest, n = scandir(dir, &entries, is_visible, alphasort);
     snprintf(v->dir, sizeof v->dir, "%s", dir);
     if (n < 0)
         return base_fail(err, BASE_EIO, "%s: %s", dir, strerror(errno));
-    const int count = list_series(entries, n, &series);
+    const int count = list_series(entries, n, &series, &largest);
     if (count < 0)
         rc = base_fail_nomem(err, dir);
-    else if (count > 0)
-        snprintf(v->prefix, sizeof v->prefix, "%s", series[0].prefix);
-    for (int k = 1; k < count && !rc; k++)
-        if (series[k].pictures > 1 || series[0].pictures == 1)
+    else if (count > 0) {
+        v->pictures = series[largest].pictures;
+        snprintf(v->prefix, sizeof v->prefix, "%s", series[largest].prefix);
+    }
+    for (int k = 0; k < count && !rc; k++)
+        if (k != largest && (series[k].pictures > 1 || v->pictures == 1))
             rc = base_fail(err, BASE_EINVAL, "%s: pictures of '%s' and of '%s' (expected those of one view)", dir, v->prefix,
                            series[k].prefix);
     for (int i = 0; i < n; i++) {
@@ -176,17 +175,10 @@ static int scan(const char *dir, struct view *v, struct base_err *err)
 
 int ggn_import_pictures(const char *dir)
 {
-    struct dirent **entries;
-    struct series *series = NULL;
-    int n = scandir(dir, &entries, is_visible, NULL), pictures = 0;
-    if (n >= 0 && list_series(entries, n, &series) > 0)
-        pictures = series[0].pictures;
-    while (n > 0)
-        free(entries[--n]);
-    if (n == 0)
-        free(entries);
-    free(series);
-    return pictures;
+    struct view v = {0};
+    scan(dir, &v, NULL);
+    free(v.levels);
+    return v.pictures;
 }
 
 /* Samples of the first level that an evenly spaced sequence lacks: most steps are the smallest one, and the others are
