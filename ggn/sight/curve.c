@@ -12,6 +12,10 @@ const char *const ggn_curve_sources[] = {"halves", "levels", NULL};
 /* Simulated levels: SEQ_SIMULATED_CAP and quarter octaves below it, down to about 5 spp. */
 enum { SIMULATED = 49 };
 
+/* Of levels whose reference has their samples among its own: noise of more than so many times its samples is not looked for,
+ * as people's thresholds against 10,000 samples end at 20,000. */
+static const double NESTED_REACH = 2;
+
 static double simulated_spp(int i) { return SEQ_SIMULATED_CAP * exp2(0.25 * (i - (SIMULATED - 1))); }
 
 struct eye {
@@ -92,6 +96,35 @@ static int add_halves(struct ggn_curve *c, struct eye *e, double beyond, struct 
     return rc;
 }
 
+/* Texture and noise where the reference, of n_r samples, has those of the levels among its own: a second running mean tells
+ * how noisy it is itself, best that of its first half. */
+static int add_nested_levels(struct ggn_curve *c, struct eye *e, struct base_err *err)
+{
+    const struct seq_block *b = e->block;
+    const size_t values = 3 * (size_t)b->width * b->height;
+    const double n_r = b->reference->spp, most = NESTED_REACH * n_r;
+    const struct seq_record *half = b->levels, *end = b->levels + b->n_levels;
+    while (half + 1 < end && 2 * half[1].spp <= b->reference->spp)
+        half++;
+    if (half->spp >= b->reference->spp)
+        return base_fail(err, BASE_EINVAL, "block %u has no level below its reference", b->id);
+    int rc = seq_mean(b, half, e->difference, err);
+    for (size_t i = 0; i < values && !rc; i++)
+        e->difference[i] = (float)seq_means_scale(half->spp, n_r) * (e->mean[i] - e->difference[i]);
+    if (!rc)
+        see_halves(e, 1.0, 0);
+    memcpy(e->meter.rgb[1], e->mean, values * sizeof *e->mean);
+    for (const struct seq_record *r = b->levels; r < end && r->spp < b->reference->spp && !rc; r++) {
+        const double spp = 1.0 / (1.0 / r->spp - 1.0 / n_r);
+        if (c->n > 0 && spp > most)
+            break;
+        rc = seq_mean(b, r, e->meter.rgb[0], err);
+        append(c, spp, see(e, 1.0, 1));
+    }
+    c->recorded = c->n;
+    return rc;
+}
+
 /* The picture at each recorded level against the reference. */
 static int add_levels(struct ggn_curve *c, struct eye *e, int independent, struct base_err *err)
 {
@@ -100,8 +133,10 @@ static int add_levels(struct ggn_curve *c, struct eye *e, int independent, struc
     const size_t values = 3 * (size_t)b->width * b->height;
     double n_r = b->reference->spp;
     int rc = seq_mean(b, b->reference, e->mean, err);
+    if (!rc && !independent)
+        return add_nested_levels(c, e, err);
     if (!rc)
-        rc = seq_mean(b, independent ? last : b->reference, e->meter.rgb[0], err);
+        rc = seq_mean(b, last, e->meter.rgb[0], err);
     if (rc)
         return rc;
     memcpy(e->meter.rgb[1], e->mean, values * sizeof *e->mean);
@@ -112,7 +147,7 @@ static int add_levels(struct ggn_curve *c, struct eye *e, int independent, struc
             return rc;
         for (size_t i = 0; i < values; i++)
             e->difference[i] -= e->mean[i];
-        simulate(e, independent ? seq_reference_scale(n_r, r->spp) : 1.0, 0);
+        simulate(e, seq_reference_scale(n_r, r->spp), 0);
         append(c, r->spp, see(e, 1.0, 1));
     }
     c->recorded = c->n;

@@ -7,6 +7,9 @@
  * - From recorded levels: the picture I at n spp against a reference R of n_r independent samples. I - R has the variance
  *   s^2 (1/n + 1/n_r), so it is scaled by sqrt(n_r / (n_r + n)); texture is what the last level and R share. Where the block
  *   has halves too they go on beyond the last level.
+ * - From recorded levels of which R is the last one, so that it has their samples among its own: I - R has the variance
+ *   s^2 (1/n - 1/n_r) and stands for 1 / (1/n - 1/n_r) samples, as in people's studies (observer.h). Of the levels those
+ *   count that stand for at most 2 n_r samples: the curve ends there, and what is seen at its end is censored.
  */
 #ifndef GGN_OBSERVER_CURVE_H
 #define GGN_OBSERVER_CURVE_H
@@ -22,7 +25,7 @@ struct ggn_curve {
     double *spp, *visible; /* own; [n]; spp rising; ggn_visible_noise at each */
 };
 
-/* BASE_EINVAL: GGN_FROM_HALVES without a full level, GGN_FROM_LEVELS without a reference. */
+/* BASE_EINVAL: GGN_FROM_HALVES without a full level, GGN_FROM_LEVELS without a reference or a level below it. */
 int ggn_curve_make(const struct seq_block *block, enum ggn_curve_source source, int reference_independent,
                    struct ggn_curve *curve, struct base_err *err);
 void ggn_curve_release(struct ggn_curve *curve);

@@ -8,6 +8,7 @@
 #include "base/files.h"
 #include "base/json.h"
 #include "sight/observer.h"
+#include "sight/view_name.h"
 
 void ggn_observer_describe(const struct ggn_observer *o, char *text, size_t room)
 {
@@ -21,7 +22,7 @@ static const cJSON *fit_without(const cJSON *root, const char *left_out)
     const cJSON *row;
     cJSON_ArrayForEach (row, cJSON_GetObjectItemCaseSensitive(root, "each_view_left_out")) {
         const cJSON *name = cJSON_GetObjectItemCaseSensitive(row, "name");
-        if (left_out && cJSON_IsString(name) && strcmp(name->valuestring, left_out) == 0)
+        if (left_out && cJSON_IsString(name) && ggn_view_is(name->valuestring, left_out))
             return row;
     }
     return root;

@@ -211,34 +211,34 @@ struct trial {
 };
 
 /* Lines that are no trial (two that ran into one another, level 0) are left out and counted. */
-static int parse_trials(const char *path, char *text, struct trial **out, int *count, int *skipped, struct base_err *err)
+static int parse_trials(const char *path, char *text, size_t size, struct trial **out, int *count, int *skipped,
+                        struct base_err *err)
 {
-    size_t room = 1;
-    for (const char *p = text; *p != '\0'; p++)
-        room += *p == '\n';
-    struct trial *t = malloc(room * sizeof *t);
-    int n = 0;
+    struct base_lines lines;
+    const char *line;
+    size_t length;
+    int rc, n = 0;
+    base_lines_init(&lines, path, text, size);
+    struct trial *t = malloc((base_lines_left(&lines) + 1) * sizeof *t);
     *skipped = 0;
     if (!t)
         return base_fail_nomem(err, path);
-    for (char *line = text + base_utf8_mark(text, strlen(text)), *next; line; line = next) {
-        char *end = line;
-        next = strchr(line, '\n');
-        if (next)
-            *next++ = '\0';
-        if (*line == '\0')
+    while (!(rc = base_lines_next(&lines, &line, &length, err)) && line) {
+        char *end = text + (line - text);
+        if (length == 0)
             continue;
+        end[length] = '\0';
         double block = strtod(line, &end), level = *end == ';' ? strtod(end + 1, &end) : -1.0,
                seen = *end == ';' ? strtod(end + 1, &end) : -1.0;
         if (!(block >= 0 && block < TRIAL_BLOCKS) || !(level > 0 && level < 1e6) || (seen != 0.0 && seen != 1.0) ||
-            end[strspn(end, "\r \t")] != '\0')
+            end[strspn(end, " \t")] != '\0')
             ++*skipped;
         else
             t[n++] = (struct trial){(int)block, seen == 1.0, log2(20.0 * level)};
     }
     *out = t;
     *count = n;
-    return 0;
+    return rc;
 }
 
 /* Log-likelihood of one block's trials for threshold x (log2) and spread s. A lapse rate of 2 %: no slip rules. */
@@ -262,10 +262,12 @@ int ggn_trials_spread(const char *path, double *spread, int *blocks, int *trials
     int rc = base_file_read(path, 1 << 26, &text, &size, err);
     if (rc)
         return rc;
-    rc = parse_trials(path, text, &t, &n, skipped, err);
+    rc = parse_trials(path, text, size, &t, &n, skipped, err);
     free(text);
-    if (rc)
+    if (rc) {
+        free(t);
         return rc;
+    }
     *blocks = 0;
     for (int i = 0; i < n; i++)
         *blocks += present[t[i].block]++ == 0;

@@ -60,8 +60,12 @@ int ggn_view_label(const struct ggn_observer *observer, const struct ggn_dataset
     free(curves);
     ggn_observer_describe(observer, l.detail, sizeof l.detail);
     size_t used = strlen(l.detail);
-    snprintf(l.detail + used, sizeof l.detail - used,
-             source == GGN_FROM_HALVES ? "; from two halves" : "; from recorded levels, beyond them two halves");
+    if (source == GGN_FROM_HALVES)
+        snprintf(l.detail + used, sizeof l.detail - used, "; from two halves");
+    else if (view->manifest.reference_independent)
+        snprintf(l.detail + used, sizeof l.detail - used, "; from recorded levels, beyond them two halves");
+    else
+        snprintf(l.detail + used, sizeof l.detail - used, "; from recorded levels, of which the last is the reference");
     if (rc)
         ggn_labels_release(&l);
     else

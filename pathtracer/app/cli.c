@@ -33,9 +33,7 @@ static int set_block(void *into, const char *value, struct base_err *err)
 {
     struct pt_cli *cli = into;
     int v[2];
-    if (get_list(value, "x", 1, 1, 4096, v))
-        v[1] = v[0];
-    else if (!get_list(value, "x", 2, 1, 4096, v))
+    if (!base_parse_block(value, 4096, v))
         return expected(err, "N or WxH, each from 1 to 4096");
     cli->render.block_width = v[0];
     cli->render.block_height = v[1];

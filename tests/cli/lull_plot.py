@@ -105,6 +105,17 @@ def test_evaluated():
     assert plot("stops.csv", "-o", "of.png") == (0, "")
 
 
+def test_lines():
+    """tables whose lines end in CR, CR LF or LF are one table; one with a byte 0 is none"""
+    for end in ("\r", "\r\n", "\n"):
+        write("ends.csv", STOPS.replace("\n", end))
+        assert plot("ends.csv", "-o", f"ends{len(end)}.png") == (0, "")
+        with open(f"ends{len(end)}.png", "rb") as one, open("of.png", "rb") as other:
+            assert one.read() == other.read()
+    write("wide.csv", STOPS[:-4] + "\0" + STOPS[-4:])
+    refused(f"wide.csv:{STOPS.count(chr(10))}: has a byte 0", "wide.csv", "-o", "no.png")
+
+
 def test_programs():
     """lull-plot and python3 -m lull plot draw the same bytes, into a file of the mode that the umask says"""
     env = {**os.environ, "PYTHONPATH": PACKAGE}

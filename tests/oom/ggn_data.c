@@ -128,7 +128,7 @@ static int tables(struct base_err *err)
     const double x[] = {1, 2, 3};
     const unsigned char label[] = {0, 1, 1};
     double auc;
-    int rc = ggn_thresholds_parse_csv("t.csv", text, &t, err);
+    int rc = ggn_thresholds_parse_csv("t.csv", text, strlen(text), &t, err);
     if (rc)
         return rc;
     ggn_thresholds_release(&t);

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bisect
 import math
-from typing import Optional, Sequence
+from typing import Any, Optional, Sequence
 
 GROWTH = 1.5  # largest ratio of samples between two checks of the criterion `observer`
 FIRST_SPP = 16.0  # of its checks
@@ -19,6 +19,15 @@ def from_study(spp: float) -> float:
 
 def to_study(spp: float) -> float:
     return min(1 / (1 / spp + 1 / STUDY_REFERENCE), STUDY_CAP)
+
+
+# --- names ---
+
+def of_view(views: Sequence[dict[str, Any]], name: str) -> Optional[dict[str, Any]]:
+    """The view of this name, or else of one that is the same: SIN3D's own files have the ending _part6, which others leave
+    out (ggn/data/thresholds.h)."""
+    return next((v for v in views if v["name"] == name), None) or next(
+        (v for v in views if v["name"].removesuffix("_part6") == name.removesuffix("_part6")), None)
 
 
 # --- scores ---

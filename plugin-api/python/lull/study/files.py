@@ -6,6 +6,7 @@ import contextlib
 import json
 import math
 import os
+import re
 from typing import Any, Iterator, TextIO
 
 from ..program import Refused
@@ -62,6 +63,15 @@ def read_file(path: str, most: int) -> bytes:
     if len(data) > most:
         raise Refused(f"{path}: larger than {most} bytes")
     return data
+
+
+def lines_of(path: str, text: str) -> list[str]:
+    """As Lull's programs read tables (base/text.h): lines end in LF, CR LF or CR, each as it likes."""
+    lines = re.split("\r\n|\r|\n", text.removeprefix("\ufeff"))
+    bad = next((i for i, line in enumerate(lines, 1) if "\0" in line), 0)
+    if bad:
+        raise Refused(f"{path}:{bad}: has a byte 0 (expected a line of text, in UTF-8)")
+    return lines
 
 
 # --- writing ---

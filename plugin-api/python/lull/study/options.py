@@ -50,6 +50,14 @@ def real(least: float, most: float) -> Callable[[str], float]:
     return take
 
 
+def block_size(most: int) -> Callable[[str], str]:
+    def take(text: str) -> str:
+        if not all(re.fullmatch("[0-9]{1,9}", side, re.ASCII) and 1 <= int(side) <= most for side in text.split("x", 1)):
+            raise ValueError(f"expected N or WxH, each from 1 to {most}")
+        return text
+    return take
+
+
 def word(*words: str) -> Callable[[str], str]:
     def take(text: str) -> str:
         if text not in words:
