@@ -24,6 +24,7 @@ def options(parser):
     parser.add_argument("--scenes", metavar="FILE", help='the plan, one "ROLE PATH" a line (scripts/quote.plan)')
     parser.add_argument("--size", type=int, default=SIZE, help="pixels of a side (64); of another size only the cheap scenes of the plan")
     parser.add_argument("--block", type=int, default=BLOCK, help="(32)")
+    parser.add_argument("--denoise", action="store_true", help="of pictures that are denoised")
     parser.add_argument("--work", metavar="DIR", help="one file per scene, what is there is not made again (build/quote or build/quote-SIZE)")
     parser.add_argument("--program", default=tool.RENDER)
     parser.add_argument("--threads", type=int, default=1)
@@ -33,7 +34,7 @@ def options(parser):
 
 def base(o, scene):
     return [o.program, scene, "--size", "%dx%d" % (o.size, o.size), "--block", str(o.block), "--spp-max", str(MOST),
-            "--threads", str(o.threads)]
+            "--threads", str(o.threads), *(["--denoise"] if o.denoise else [])]
 
 
 def cpu_s(pid):
