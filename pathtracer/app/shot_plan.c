@@ -117,10 +117,9 @@ static void print_price(const struct plan *p)
            pt_quote_duration(thread_s, thread), pt_quote_duration(thread_s / p->threads, wall), p->threads,
            most * all / samples);
     if (p->untold_count > 0)
-        printf(
-            "%zu of %zu pilots have met too little: what their frames need is not known (a longer --quote-pilot says "
-            "more)\n",
-            p->untold_count, p->pilot_count);
+        printf("%zu of %zu pilots have met too little: what their frames need is not known (a longer --quote-pilot says "
+               "more)\n",
+               p->untold_count, p->pilot_count);
 }
 
 int pt_shot_plan(const struct pt_shot *s, struct pt_open *o, int *status, struct base_err *err)

@@ -63,7 +63,7 @@ int32_t lull_host_scale_quality(const struct lull_criterion *t, const struct lul
     }
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         const char *text = lull_host_parameter(t, names[i], pairs, pair_count, &p);
-        if (p && !text)
+        if (p && !text && p->max > p->min)
             return lull_error_set(err, LULL_E_VALUE,
                                   "criterion %s: a mask scales '%s', which has no value: give one, %s=VALUE", t->id,
                                   names[i], names[i]);

@@ -332,8 +332,8 @@ static struct lull_host_stop_at stop_of(const struct lull_host_blocks *blocks, c
     return lull_host_expect(&response, lull_host_goal(blocks, b), blocks->spp_max);
 }
 
-/* Light that most pixels have not met tells what it needs up to sixteen times the samples that were taken: of 24 scenes quoted at 20
- * and 32 samples, the factors off beyond 1.6 were all of rows with more than half of their samples in blocks beyond that
+/* Light that most pixels have not met tells what it needs up to sixteen times the samples that were taken: of 24 scenes
+ * quoted at 20 and 32 samples, those off by more than 1.6 had more than half of their samples in blocks beyond that
  * (docs/results/quote.md). What has not been judged yet tells nothing. */
 static const double FARTHEST = 16.0, MOST_FAR = 0.5;
 
@@ -343,7 +343,7 @@ static int is_far(const struct lull_host_quote *q, const struct lull_host_quote_
     const struct lull_host_criterion *judge = a->criterion ? a->criterion : q->frame->criterion;
     const struct lull_host_quote_block *said = &a->blocks[i];
     return said->stop.known ? said->unmet && said->stop.spp > FARTHEST * (double)a->responses[i].last.spp
-                            : judge && b->spp < judge->needs.first_spp;
+                            : judge && b->spp < judge->needs.first_spp && b->spp < q->frame->blocks.spp_max;
 }
 
 static void add_up(const struct lull_host_quote *q, const struct lull_host_quote_asked *a, struct lull_host_quote_row *row,

@@ -285,8 +285,8 @@ static void light_that_few_pixels_met_is_told(void **state)
     end(&run);
 }
 
-/* What few pixels have met is told up to sixteen times the pilot's samples; beyond that, and where nothing was judged yet, there is no
- * number as soon as more than half of the samples hang on it. */
+/* What few pixels have met is told up to sixteen times the pilot's samples; beyond that there is no number as soon as more
+ * than half of the samples hang on it. */
 static void a_pilot_that_met_too_little_is_told(void **state)
 {
     (void)state;

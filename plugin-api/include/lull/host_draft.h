@@ -102,12 +102,12 @@ LULL_EXPORT int32_t lull_host_quote_add_error(struct lull_host_quote *quote, dou
 LULL_EXPORT int32_t lull_host_quote_add_other(struct lull_host_quote *quote, struct lull_host_criterion *criterion,
                                               struct lull_error *err);
 
-/* Rows that people compare, coarse to fine, with parameter, value and name. Where the criterion has `error`: 8, 4 and 2 times
- * what is just seen; where that is set, 1, 0.5 and the value itself, too. Else, of `visible`, 0.5 (where there is no `error`),
- * the criterion's default (0.25 if it names none), 0.05 and the value itself; of `threshold` four times, twice and once the
- * value; values that the criterion's table excludes have no row. The render itself always has one, "as asked" if it is none of
- * these. noisy: NULL, or the criterion that judges the noisy picture: where the frame's criterion is `denoised`, rows are those
- * of coarser errors, the render, "denoised", and "noisy". */
+/* Rows that people compare, coarse to fine, with parameter, value and name. Where the criterion has `error`: 8, 4 and 2
+ * times what is just seen; where that is set, 1, 0.5 and the value itself, too. Else, of `visible`, 0.5 (where there is no
+ * `error`), the criterion's default (0.25 if it names none), 0.05 and the value itself; of `threshold` four times, twice and
+ * once the value; values that the criterion's table excludes have no row. The render itself always has one, "as asked" if it
+ * is none of these. noisy: NULL, or the criterion that judges the noisy picture: where the frame's criterion is `denoised`,
+ * rows are those of coarser errors, the render, "denoised", and "noisy". */
 LULL_EXPORT int32_t lull_host_quote_usual(struct lull_host_quote *quote, const struct lull_criterion *noisy,
                                           struct lull_error *err);
 

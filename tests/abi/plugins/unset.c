@@ -25,7 +25,7 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
 {
     const struct lull_kit_tally tally = {.valid = 1};
     (void)view, (void)worker;
-    lull_kit_verdict(lull_kit_of(in), block, &tally, 4 / sqrt((double)block->spp), 0.5, 0, 1.5, decision);
+    lull_kit_verdict(lull_kit_of(in), block, &tally, 2 / sqrt((double)block->spp), 0.5, 0, 1.5, decision);
 }
 
 static const struct lull_kit_rule rule = {.judge = judge};
