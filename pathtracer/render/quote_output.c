@@ -122,13 +122,12 @@ static void print_most_expensive(FILE *out, const struct pt_quote *q, const stru
         const struct lull_host_stop_at *stop = &row->blocks[expensive[k].index].stop;
         double paths = (double)b->spp * (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0);
         char spp[32], low[32], high[32];
-        fprintf(out,
-                "  block %u (%d,%d to %d,%d): %.0f %%, %s spp (%s to %s), %.2f us per path of %.1f vertices, %.0f %% "
-                "of them %s\n",
-                b->id, b->x0, b->y0, b->x1, b->y1, 100 * expensive[k].share, pt_quote_thousands(stop->spp, 0, spp),
-                pt_quote_thousands(stop->low, 0, low), pt_quote_thousands(stop->high, 0, high),
-                paths > 0 ? b->thread_s / paths * 1e6 : 0.0, expensive[k].bounces, 100 * expensive[k].mostly_share,
-                expensive[k].mostly);
+        fprintf(out, "  block %u (%d,%d to %d,%d): ", b->id, b->x0, b->y0, b->x1, b->y1);
+        if (row->told)
+            fprintf(out, "%.0f %%, %s spp (%s to %s), ", 100 * expensive[k].share, pt_quote_thousands(stop->spp, 0, spp),
+                    pt_quote_thousands(stop->low, 0, low), pt_quote_thousands(stop->high, 0, high));
+        fprintf(out, "%.2f us per path of %.1f vertices, %.0f %% of them %s\n", paths > 0 ? b->thread_s / paths * 1e6 : 0.0,
+                expensive[k].bounces, 100 * expensive[k].mostly_share, expensive[k].mostly);
     }
 }
 
