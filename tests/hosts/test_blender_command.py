@@ -201,6 +201,9 @@ def test_quote():
     assert "spp min / mean / max" in table[0] and settings == [
         ("error", "8"), ("error", "4"), ("error", "2"), ("visible", "0.35"), ("visible", "0.2"), ("visible", "0.05")], table
     assert "chosen" in table[5] and not os.path.exists("quote.exr")
+    for both in (("--error", "2"), ("-p", "error=2")):
+        status, text = command(*common, *both, "-q", "--quote")
+        assert (status, text.count("\n")) == (2, 1) and "error and visible each say when a block stops: leave out one" in text, text
     assert all(re.search(r" [0-9.]+ (s|min) \([0-9.]+ (s|min) to [0-9.]+ (s|min)\)", row) for row in table[1:]), table
     means = [float(r.split("/")[1].replace(",", "")) for r in table[1:]]
     assert means == sorted(means) and means[0] < means[-1], table
