@@ -332,17 +332,17 @@ static struct lull_host_stop_at stop_of(const struct lull_host_blocks *blocks, c
     return lull_host_expect(&response, lull_host_goal(blocks, b), blocks->spp_max);
 }
 
-/* Light that most pixels have not met tells what it needs up to sixteen times the samples that were taken: of 24 scenes
- * quoted at 20 and 32 samples, those off by more than 1.6 had more than half of their samples in blocks beyond that
- * (docs/results/quote.md). What has not been judged yet tells nothing. */
-static const double FARTHEST = 16.0, MOST_FAR = 0.5;
+/* Light that most pixels have not met tells what it needs from a hundred samples on: of 24 scenes quoted at 20, 32 and 64
+ * samples, those off by more than 1.6 had more than half of their samples in such blocks (docs/results/quote.md). What has
+ * not been judged yet tells nothing. */
+static const double ENOUGH = 100.0, MOST_SILENT = 0.5;
 
-static int is_far(const struct lull_host_quote *q, const struct lull_host_quote_asked *a, uint32_t i)
+static int tells_nothing(const struct lull_host_quote *q, const struct lull_host_quote_asked *a, uint32_t i)
 {
     const struct lull_host_block *b = &q->frame->blocks.list[i];
     const struct lull_host_criterion *judge = a->criterion ? a->criterion : q->frame->criterion;
     const struct lull_host_quote_block *said = &a->blocks[i];
-    return said->stop.known ? said->unmet && said->stop.spp > FARTHEST * (double)a->responses[i].last.spp
+    return said->stop.known ? said->unmet && (double)a->responses[i].last.spp < ENOUGH
                             : judge && b->spp < judge->needs.first_spp && b->spp < q->frame->blocks.spp_max;
 }
 
@@ -350,7 +350,7 @@ static void add_up(const struct lull_host_quote *q, const struct lull_host_quote
                    struct lull_host_work *work)
 {
     const struct lull_host_blocks *blocks = &q->frame->blocks;
-    double pixels = 0.0, far = 0.0;
+    double pixels = 0.0, silent = 0.0;
     *row = (struct lull_host_quote_row){.blocks = a->blocks,
                                         .asked = a->itself,
                                         .spp_min = INFINITY,
@@ -375,10 +375,10 @@ static void add_up(const struct lull_host_quote *q, const struct lull_host_quote
         row->unknown += (uint32_t)!stop.known;
         row->unmet += (uint32_t)to->unmet;
         row->capped += (uint32_t)(!(blocks->flags & LULL_HOST_UNIFORM) && stop.spp >= (double)blocks->spp_max);
-        far += is_far(q, a, i) ? size * stop.spp : 0.0;
+        silent += tells_nothing(q, a, i) ? size * stop.spp : 0.0;
         pixels += size;
     }
-    row->told = far <= MOST_FAR * row->spp_mean;
+    row->told = silent <= MOST_SILENT * row->spp_mean;
     row->spp_mean /= pixels;
     row->spp_mean_low /= pixels;
     row->spp_mean_high /= pixels;

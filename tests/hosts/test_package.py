@@ -983,7 +983,7 @@ def test_quote_says_what_it_does_not_know():
         noise = Rare(sigmas)
         noise.rare = rare
         d = lull.Driver(lull.Frame(lull.load("observer", **parameters), 64, 48, block=16, spp_max=1 << 20), noise)
-        while not quote.pilot_done(d, 96):
+        while not quote.pilot_done(d, 48):
             d.step()
         return d
     d = piloted(0)

@@ -285,16 +285,16 @@ static void light_that_few_pixels_met_is_told(void **state)
     end(&run);
 }
 
-/* What few pixels have met is told up to sixteen times the pilot's samples; beyond that there is no number as soon as more
- * than half of the samples hang on it. */
+/* What few pixels have met tells from a hundred samples on; before there is no number as soon as more than half of the
+ * samples hang on it. */
 static void a_pilot_that_met_too_little_is_told(void **state)
 {
     (void)state;
     static const struct {
         uint32_t blocks; /* with such light, of the twelve; the law asks for 160, 320, 480, 640 spp column by column */
-        double needs;    /* what they ask for, over the pilot's 64 */
+        uint64_t spp;    /* at which they were asked, for 1,030 */
         int told;
-    } cases[] = {{12, 15.9, 1}, {12, 16.1, 0}, {6, 16.1, 0}, {2, 16.1, 1}, {0, 16.1, 1}};
+    } cases[] = {{12, 100, 1}, {12, 99, 0}, {6, 99, 0}, {2, 99, 1}, {0, 99, 1}};
     struct base_err err = {0};
     for (size_t c = 0; c < sizeof cases / sizeof cases[0]; c++) {
         struct run run;
@@ -304,7 +304,7 @@ static void a_pilot_that_met_too_little_is_told(void **state)
         for (uint32_t i = 0; i < cases[c].blocks; i++)
             asked->responses[i].first = (struct lull_host_response){.spp = 8, .predicted = 8};
         for (uint32_t i = 0; i < cases[c].blocks; i++)
-            asked->responses[i].last = (struct lull_host_response){.spp = 64, .predicted = 64 * cases[c].needs};
+            asked->responses[i].last = (struct lull_host_response){.spp = cases[c].spp, .predicted = 1030};
         assert_int_equal(pt_quote_finish(run.quote, run.render, &err), 0);
         assert_int_equal(run.quote->rows[1].unmet, cases[c].blocks);
         assert_int_equal(run.quote->rows[1].told, cases[c].told);
