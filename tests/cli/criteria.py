@@ -123,7 +123,7 @@ def outcome_of(folder, action, out):
     if out.startswith("{"):
         rows = parsed(out)["rows"]
         assert sum(r["as_asked"] for r in rows) == 1
-        said += [", ".join(r["name"] + ("" if r["told"] else " (not told)") for r in rows)]
+        said += [", ".join(r["name"] for r in rows) + ("" if any(r["told"] for r in rows) else ": not told")]
     elif "spp min / mean / max" in out:
         said += [f"{len(re.findall(' x$|not known: ', out, re.M))} rows"]
     return " ".join(["0", *dict.fromkeys(said)])
