@@ -132,7 +132,9 @@ LAYOUT(lull_host_quote_row, F(lull_host_quote_row, blocks), F(lull_host_quote_ro
        F(lull_host_quote_row, spp_mean_high), F(lull_host_quote_row, thread_s), F(lull_host_quote_row, thread_low_s),
        F(lull_host_quote_row, thread_high_s), F(lull_host_quote_row, wall_s), F(lull_host_quote_row, wall_low_s),
        F(lull_host_quote_row, wall_high_s), F(lull_host_quote_row, against_uniform), F(lull_host_quote_row, unknown),
-       F(lull_host_quote_row, unmet), F(lull_host_quote_row, capped), F(lull_host_quote_row, asked));
+       F(lull_host_quote_row, unmet), F(lull_host_quote_row, capped), F(lull_host_quote_row, asked),
+       F(lull_host_quote_row, parameter), F(lull_host_quote_row, value), F(lull_host_quote_row, name),
+       F(lull_host_quote_row, told));
 
 /* The criterion's, then the host library's. */
 static const struct layout layouts[] = {
