@@ -329,7 +329,8 @@ static struct pt_hit hit_in(const struct pt_scene *scene, const struct piece *pi
 static int is_solid(const struct pt_scene *scene, float time, const struct piece *piece, const struct piece *other)
 {
     struct pt_hit hit = hit_in(scene, piece);
-    struct pt_ray ray = {piece->centre, piece->n, 0.0f, INFINITY, time};
+    const pt_vec3 *p = piece->corners, middle = v3_scale(v3_add(p[0], v3_add(p[1], p[2])), 1.0f / 3.0f);
+    struct pt_ray ray = {piece->quadric ? piece->centre : middle, piece->n, 0.0f, INFINITY, time};
     struct pt_place at;
     pt_place_at_hit(PT_FX_ALL, scene, &ray, &hit, &at);
     ray.direction = v3_neg(at.s.n_geometric);
