@@ -7,6 +7,7 @@
 
 #include "base/clock.h"
 #include "geom/accel.h"
+#include "integ/contact.h"
 #include "shade/camera.h"
 #include "shade/light_build.h"
 #include "shade/material.h"
@@ -234,6 +235,8 @@ static int finish(struct pt_builder *b, double *start)
     pt_camera_init(&scene->camera);
     double start_s = base_clock_wall_s();
     rc = pt_accel_build(scene, err);
+    if (!rc)
+        rc = pt_contacts_find(scene, err);
     scene->stats.accel_s = base_clock_wall_s() - start_s;
     if (!rc)
         *start = pt_build_far_view(b);

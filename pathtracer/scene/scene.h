@@ -12,7 +12,8 @@
  * Ownership. All arrays live in the scene's arena unless a field says otherwise.
  *
  * How a scene is made: zero the struct, fill camera … media, radiance_scale and effects, then call in this order
- * pt_camera_init (shade/camera.h), pt_accel_build (geom/accel.h), pt_lights_build (shade/light_build.h).
+ * pt_camera_init (shade/camera.h), pt_accel_build (geom/accel.h), pt_contacts_find (integ/contact.h), pt_lights_build
+ * (shade/light_build.h).
  * pt_accel_release, then pt_arena_release give everything back.
  */
 #ifndef PT_SCENE_SCENE_H
@@ -106,6 +107,12 @@ struct pt_quadric {
     struct pt_mat34 to_render, from_render; /* quadric's own space ↔ render (or the object's) space */
 };
 
+/* What a surface is where others are at the same place (integ/contact.h). */
+enum pt_layer {
+    PT_LAYER_OPAQUE,
+    PT_LAYER_SHEET, /* lets rays through, and what is on either side of it is on the outside */
+    PT_LAYER_SOLID  /* lets rays through; the side against its normal is within glass or fog, where nothing else is */
+};
 enum pt_shape_kind { PT_SHAPE_MESH, PT_SHAPE_QUADRIC };
 
 struct pt_shape {
@@ -120,6 +127,10 @@ struct pt_shape {
     int32_t has_alpha;     /* `alpha` is not constant 1 */
     int32_t has_opacity;   /* the material lets rays through, and into the medium behind; `alpha` has its share */
     struct pt_input alpha; /* float: probability that a hit counts */
+    /* derived by pt_contacts_find */
+    int32_t layer;                   /* enum pt_layer: which of two is met first where surfaces touch */
+    int32_t touches;                 /* there may be another surface at the same place … */
+    pt_vec3 touch_least, touch_most; /* … within this box of render space */
 };
 
 /* A group of shapes that instances place; its shapes are consecutive and in the object's own space. */
