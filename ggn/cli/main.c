@@ -134,10 +134,5 @@ int main(int argc, char **argv)
     }
     snprintf(name, sizeof name, "ggn %s", argv[1]);
     argv[1] = name;
-    int status = run(command, argc - 1, argv + 1);
-    if (fflush(stdout) || ferror(stdout)) {
-        fprintf(stderr, "%s: cannot write standard output\n", name);
-        return status ? status : BAD_INPUT;
-    }
-    return status;
+    return base_interrupt_end(name, run(command, argc - 1, argv + 1));
 }

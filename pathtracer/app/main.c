@@ -63,10 +63,7 @@ int main(int argc, char **argv)
         status = rc == BASE_EINVAL || rc == BASE_EIO ? PT_EXIT_BAD_INPUT : PT_EXIT_FAILED;
     }
     pt_cli_release(&cli);
-    if ((fflush(stdout) != 0 || ferror(stdout)) && status == 0) {
-        base_log_say(&log, "cannot write standard output");
-        status = PT_EXIT_BAD_INPUT;
-    }
+    status = base_interrupt_end(status == 0 && job_rank(job) == 0 ? "lull-render" : NULL, status);
     int all = job_close(job, status, err.text, &job_err);
     if (all != status && job_err.code)
         base_log_say(&log, "%s", job_err.text);

@@ -6,6 +6,7 @@ from __future__ import annotations
 import getopt
 import os
 import re
+import signal
 import sys
 import textwrap
 from typing import Any, Callable, NamedTuple, Sequence
@@ -64,6 +65,7 @@ def text_shown(text: str) -> str:
 
 OWN = (Option("help", "", "Print this and exit", letter="?"), Option("usage", "", "Print a short usage and exit"),
        Option("version", "", "Print the version and exit", letter="V"))
+_UNREAD = 128 + signal.SIGPIPE
 
 
 def _answer(command: Command, rows: Sequence[Option], what: str) -> str:
@@ -125,7 +127,7 @@ def parse(command: Command, arguments: Sequence[str]) -> tuple[list[str], dict[s
 
 def finish(command: str, run: Callable[[], None], packages: str) -> int:
     """Runs a command, and says what stopped it, in one line that begins with `command`. packages: how to get what it imports.
-    The exit status: 0 done, 1 out of memory, 2 refused, or an output could not be written."""
+    The exit status: 0 done, 1 out of memory, 2 refused, or an output could not be written, 141 (as by SIGPIPE) nobody reads it."""
     status, why = 0, ""
     try:
         run()
@@ -137,15 +139,17 @@ def finish(command: str, run: Callable[[], None], packages: str) -> int:
         status, why = 1, "out of memory"
     except SystemExit:  # --help was answered
         pass
+    except BrokenPipeError:  # whoever reads a pipe may stop reading, as head does
+        status = _UNREAD
     except OSError as error:
         status, why = 2, f"{error.filename}: {error.strerror}" if error.filename else "cannot write standard output"
-    if status:
+    if why:
         print(f"{command}: {why}", file=sys.stderr)
     try:
         sys.stdout.flush()
-    except OSError:
+    except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more is tried at the end
-        if not status:
+        if not status and not isinstance(error, BrokenPipeError):
             print(f"{command}: cannot write standard output", file=sys.stderr)
-        return status or 2
+        return status or (_UNREAD if isinstance(error, BrokenPipeError) else 2)
     return status
