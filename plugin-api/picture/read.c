@@ -11,12 +11,14 @@
 static const struct pic_library *library(const char *name, struct base_err *err)
 {
     const struct pic_library *linked = &pic_library;
-    const struct pic_library *l = linked ? linked : base_module_symbol("lull-images.so", "pic_library", 0);
-    if (!l)
+    struct base_err why = {0};
+    const struct pic_library *l = linked ? linked : base_module_symbol("lull-images.so", "pic_library", 0, &why);
+    if (!l && why.code == BASE_ENOMEM)
+        base_fail_nomem(err, name);
+    else if (!l)
         base_fail(err, BASE_EIO,
-                  "%s: images cannot be read: lib/lull/modules/lull-images.so, which belongs beside this program's bin/, or "
-                  "OpenImageIO cannot be loaded",
-                  name);
+                  "%.200s: images cannot be read: lib/lull/modules/lull-images.so beside this program's bin/: %.200s", name,
+                  why.text);
     return l;
 }
 
