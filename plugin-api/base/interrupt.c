@@ -13,8 +13,8 @@ enum { REQUESTS = sizeof requests / sizeof requests[0], BAD_OUTPUT = 2, BY_SIGNA
 
 static void on_request(int number)
 {
-    (void)number;
-    base_interrupted = 1;
+    if (number != SIGXCPU || !base_interrupted)
+        base_interrupted = base_interrupted + 1;
 }
 
 void base_interrupt_begin(void)

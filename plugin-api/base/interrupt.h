@@ -18,7 +18,7 @@ void base_interrupt_begin(void);
  * reading, as `head` does: then nothing is said, and the status is that of SIGPIPE. */
 int base_interrupt_end(const char *program, int status);
 
-/* Not 0: asked to end. */
+/* How often it was asked to end. */
 extern volatile sig_atomic_t base_interrupted;
 
 /* From here on the first signal of a kind asks and a second one kills, but SIGXCPU, which comes again and again, only asks.
