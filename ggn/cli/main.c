@@ -5,6 +5,7 @@
 
 #include "base/interrupt.h"
 #include "base/options.h"
+#include "base/threads.h"
 #include "cli/commands.h"
 #include "picture/draw.h"
 
@@ -121,7 +122,7 @@ static int run(const struct command *command, int argc, char **argv)
     return all;
 }
 
-int main(int argc, char **argv)
+static int run_program(int argc, char **argv)
 {
     char name[64], text[128];
     base_interrupt_begin();
@@ -136,3 +137,5 @@ int main(int argc, char **argv)
     argv[1] = name;
     return base_interrupt_end(name, run(command, argc - 1, argv + 1));
 }
+
+int main(int argc, char **argv) { return base_threads_main(argc, argv, run_program); }

@@ -4,6 +4,7 @@
 
 #include "actions.h"
 #include "base/interrupt.h"
+#include "base/threads.h"
 
 static int list_criteria(struct base_log *log, struct base_err *err)
 {
@@ -41,7 +42,7 @@ static int wants_plain_lines(void)
     return (no_color && *no_color) || (term && strcmp(term, "dumb") == 0);
 }
 
-int main(int argc, char **argv)
+static int run_program(int argc, char **argv)
 {
     static struct pt_cli cli;
     struct job *job = NULL;
@@ -69,3 +70,5 @@ int main(int argc, char **argv)
         base_log_say(&log, "%s", job_err.text);
     return all;
 }
+
+int main(int argc, char **argv) { return base_threads_main(argc, argv, run_program); }

@@ -10,6 +10,7 @@
 
 #include "base/interrupt.h"
 #include "base/options.h"
+#include "base/threads.h"
 
 enum { SPECS_MAX = 256 };
 
@@ -257,7 +258,7 @@ static int check_spec(struct arguments *a, const char *spec)
     return status;
 }
 
-int main(int argc, char **argv)
+static int run_program(int argc, char **argv)
 {
     static struct arguments a = {.lc = {.workers = 4, .misuse = 2000, .seed = 1}, .limit_s = 120};
     struct base_err err = {0};
@@ -281,3 +282,5 @@ int main(int argc, char **argv)
     printf("1..%d\n# %d checks, %d failed\n", a.checks, a.checks, a.failed);
     return base_interrupt_end("lull-check", a.failed > 0 ? LC_EXIT_FAILED : LC_EXIT_OK);
 }
+
+int main(int argc, char **argv) { return base_threads_main(argc, argv, run_program); }

@@ -3,6 +3,7 @@
  * library comes by dlopen: a dozen prototypes of ours, no header of theirs. One thread calls it.
  */
 #include "base/module.h"
+#include "base/threads.h"
 #include "denoise/program/shared.h"
 
 #include <dlfcn.h>
@@ -311,7 +312,7 @@ static void serve(struct library *library, const char *path, struct shared *s)
     s->text[sizeof s->text - 1] = '\0';
 }
 
-int main(int argc, char **argv)
+static int run_program(int argc, char **argv)
 {
     struct library library = {0}; /* to the end: its threads outlive their device for a moment */
     pthread_t watch;
@@ -334,3 +335,5 @@ int main(int argc, char **argv)
     }
     return 0;
 }
+
+int main(int argc, char **argv) { return base_threads_main(argc, argv, run_program); }

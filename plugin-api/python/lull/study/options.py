@@ -6,6 +6,7 @@ from __future__ import annotations
 import getopt
 import os
 import re
+import resource
 import signal
 import sys
 import textwrap
@@ -125,12 +126,28 @@ def parse(command: Command, arguments: Sequence[str]) -> tuple[list[str], dict[s
     return words, found
 
 
+def _lacks_stack() -> str:
+    """Why the libraries that draw would end by a signal: they take half a megabyte of the stack. Its limit is raised if it
+    may be."""
+    usual, least = 8 << 20, 1 << 20
+    soft, hard = resource.getrlimit(resource.RLIMIT_STACK)
+    if soft == resource.RLIM_INFINITY or soft >= least:
+        return ""
+    if hard != resource.RLIM_INFINITY and hard < least:
+        return f"the stack may grow to {hard >> 10} KB only (ulimit -s): expected at least {least >> 10}"
+    resource.setrlimit(resource.RLIMIT_STACK, (usual if hard == resource.RLIM_INFINITY else min(usual, hard), hard))
+    return ""
+
+
 def finish(command: str, run: Callable[[], None], packages: str) -> int:
     """Runs a command, and says what stopped it, in one line that begins with `command`. packages: how to get what it imports.
-    The exit status: 0 done, 1 out of memory, 2 refused, or an output could not be written, 141 (as by SIGPIPE) nobody reads it."""
-    status, why = 0, ""
+    The exit status: 0 done, 1 out of memory or of stack, 2 refused, or an output could not be written, 141 (as by SIGPIPE)
+    nobody reads it."""
+    lacking = _lacks_stack() if packages else ""
+    status, why = (1, lacking) if lacking else (0, "")
     try:
-        run()
+        if not lacking:
+            run()
     except Refused as error:
         status, why = 2, str(error)
     except ImportError as error:
