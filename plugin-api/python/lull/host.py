@@ -6,7 +6,6 @@ from __future__ import annotations
 import contextlib
 import ctypes as C
 import functools
-import os
 import weakref
 from typing import Iterator, Mapping, Optional, Sequence, Union
 
@@ -14,7 +13,7 @@ import numpy as np
 
 from . import abi, limits
 from .criterion import PLANES, Criterion, Handle, Plane, Rect
-from .library import LullError, bytes_of, call, library
+from .library import LullError, bytes_of, call, encoded, library
 
 TRANSFERS = {"linear": abi.TRANSFER_LINEAR, "srgb": abi.TRANSFER_SRGB, "gamma": abi.TRANSFER_GAMMA}
 MAX_PIXELS, MAX_BLOCKS = 1 << 28, 1 << 20  # a block is an object here: more would fill the memory
@@ -269,7 +268,7 @@ class HostFrame:
         """Into a frame like the saved one, limits aside: blocks that a limit or an interrupt had closed are active again as
         far as the limits of this frame allow. name: of the file, for messages. Refused bytes (LullError) change nothing."""
         with self.judge.alone():
-            call("host_load", self.handle.pointer, data, C.c_uint64(len(data)), os.fsencode(name))
+            call("host_load", self.handle.pointer, data, C.c_uint64(len(data)), encoded(name))
             library().lull_host_extend(C.byref(self.layout))
 
     def close(self) -> None:

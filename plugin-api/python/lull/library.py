@@ -22,6 +22,15 @@ _CODES = {getattr(abi, name): name for name in dir(abi) if name.startswith("E_")
 _PARAMETER_TYPES = ("int", "float", "bool", "choice", "file", "text")
 
 
+def encoded(text: str) -> bytes:
+    """A file's name, or what is made of such, as the bytes that it stands for. Names that the system's encoding has not, as
+    none but ASCII in the locale C of a renderer's own Python, are UTF-8."""
+    try:
+        return os.fsencode(text)
+    except UnicodeEncodeError:
+        return text.encode("utf-8", "surrogateescape")
+
+
 class LullError(Exception):
     """A call that failed. `code` is the LULL_E_ number (E_… of lull.abi), `name` its name."""
 
@@ -131,7 +140,7 @@ def _warn(_context: object, level: int, text: bytes) -> None:
 
 def _search(folders: Optional[Iterable[str]] = None) -> abi.Search:
     """folders: None: the library's usual ones."""
-    dirs = None if folders is None else [os.fsencode(f) for f in folders]
+    dirs = None if folders is None else [encoded(f) for f in folders]
     listed = (C.c_char_p * max(len(dirs or ()), 1))(*(dirs or ()))
     search = abi.Search(dirs=None if dirs is None else C.addressof(listed), dir_count=len(dirs or ()), log=abi.LogFn(_warn))
     search.kept = listed
@@ -153,7 +162,7 @@ def criteria(folders: Optional[Iterable[str]] = None) -> list[Info]:
 def find(spec: str) -> Info:
     """The criterion that spec names: NAME, PATH.so (its first criterion) or PATH.so:ID."""
     found, search = abi.Found(), _search()
-    call("open", C.byref(search), os.fsencode(spec), C.byref(found))
+    call("open", C.byref(search), encoded(spec), C.byref(found))
     return _info(found)
 
 
