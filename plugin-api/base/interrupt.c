@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <unistd.h>
 
+#include "base/guard.h"
+
 volatile sig_atomic_t base_interrupted;
 
 static const int requests[] = {SIGINT, SIGTERM, SIGHUP, SIGXCPU};
@@ -20,6 +22,7 @@ static void on_request(int number)
 void base_interrupt_begin(void)
 {
     signal(SIGXFSZ, SIG_IGN);
+    base_guard_enable();
     for (int fd = 0; fd < 3; fd++)
         if (fcntl(fd, F_GETFD) < 0)
             (void)!open("/dev/null", fd == 0 ? O_WRONLY : O_RDONLY); /* whoever uses it fails as before */
