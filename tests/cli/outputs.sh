@@ -35,6 +35,11 @@ for closed in "<&-" "<&- >&-" "<&- >&- 2>&-"; do
     t "  …whole, and nothing besides" sh -c 'oiiotool --info b.exr | grep -q " 8 x  *8, " && grep -q "^room;2;$" b.csv && ls -A && ! ls -A | grep tmp'
 done
 rm -f b.exr b.csv
+for closed in "2>&-" "<&- >&- 2>&-"; do
+    for command in "$ggn compare none none" "$ggn inspect none" "$P none" "$bin/lull-report none -o b.html" "$bin/lull-check --nonsense"; do
+        t "refused with $closed" sh -c "$command $closed; [ \$? = 2 ]"
+    done
+done
 
 # --- the soft limit of processor time: the picture so far, as after Ctrl-C ---
 t "a render that has used up its processor time" sh -c "ulimit -S -t 1; $long -t 2 --size 32x32 -o b.exr --checkpoint b.ckp; [ \$? -eq 130 ]"

@@ -3,6 +3,7 @@
 ones by an unambiguous beginning."""
 from __future__ import annotations
 
+import contextlib
 import getopt
 import os
 import re
@@ -161,7 +162,8 @@ def finish(command: str, run: Callable[[], None], packages: str) -> int:
     except OSError as error:
         status, why = 2, f"{error.filename}: {error.strerror}" if error.filename else "cannot write standard output"
     if why:
-        print(f"{command}: {why}", file=sys.stderr)
+        with contextlib.suppress(OSError):  # nobody can be told
+            print(f"{command}: {why}", file=sys.stderr)
     try:
         sys.stdout.flush()
     except OSError as error:
