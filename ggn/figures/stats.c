@@ -50,10 +50,7 @@ struct keyed {
 static const double tie = 1e-12; /* of a value: above what rounding does to sums of thousands */
 
 /* Whether rising values are one, however they were rounded on the way. */
-static int tied(double x, double y)
-{
-    return x == y || (isfinite(y - x) && y - x <= tie * fmax(fabs(x), fabs(y)));
-}
+static int tied(double x, double y) { return x == y || (isfinite(y - x) && y - x <= tie * fmax(fabs(x), fabs(y))); }
 
 /* rank[i] in 1..n; equal values share the mean of their ranks. */
 static int ranks(const double *x, size_t n, double *rank, struct base_err *err)

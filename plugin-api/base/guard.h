@@ -1,7 +1,7 @@
 /*
- * Around calls into libraries that do not live up to a lack of memory: constructors throw while a library is loaded, pointers
- * go unchecked, threads wait for one that never began. Nobody can go on behind such a call, but the process need not be aborted,
- * or wait for ever: it ends with one line and exit status 1, as for any other lack of memory.
+ * Around calls into libraries that do not live up to a lack of memory: constructors throw while a library is loaded,
+ * pointers go unchecked, threads wait for one that never began. Nobody can go on behind such a call, but the process need
+ * not be aborted, or wait for ever: it ends with one line and exit status 1, as for any other lack of memory.
  */
 #ifndef BASE_GUARD_H
 #define BASE_GUARD_H

@@ -13,9 +13,9 @@
  * connections would get their numbers, and what is said would go into them. */
 void base_interrupt_begin(void);
 
-/* What a program calls last: flushes standard output and returns the exit status. What did not get out is said in a line that
- * begins with `program` (NULL: nothing is said) and makes a status of 0 one of bad input; but whoever reads a pipe may stop
- * reading, as `head` does: then nothing is said, and the status is that of SIGPIPE. */
+/* What a program calls last: flushes standard output and returns the exit status. What did not get out is said in a line
+ * that begins with `program` (NULL: nothing is said) and makes a status of 0 one of bad input; but whoever reads a pipe may
+ * stop reading, as `head` does: then nothing is said, and the status is that of SIGPIPE. */
 int base_interrupt_end(const char *program, int status);
 
 /* How often it was asked to end. */

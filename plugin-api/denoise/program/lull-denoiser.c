@@ -51,7 +51,8 @@ static const char *const how_to_get_it = "lull-denoiser-setup fetches it, script
 
 static const char *const file_name = "libOpenImageDenoise.so.2";
 
-/* path: the library or a folder that holds it, itself or in lib/. *err says why there is none: BASE_EINVAL if nothing is there. */
+/* path: the library or a folder that holds it, itself or in lib/. *err says why there is none: BASE_EINVAL if nothing is
+ * there. */
 static void *open_at(const char *path, struct base_err *err)
 {
     static const char *const forms[] = {"%s/%s", "%s/lib/%s"};
