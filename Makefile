@@ -73,6 +73,7 @@ BASE_FOLDERS := base job picture sequence denoise
 INC_plugin-api         := $(API)
 $(foreach f,$(BASE_FOLDERS),$(eval INC_plugin-api_$(f) := $(BASE)))
 INC_plugin-api_mpi     := $(BASE) $(MPI_CFLAGS)# the only folder that knows MPI
+INC_plugin-api_src     := $(API) $(BASE)
 INC_plugin-api_tools   := $(API) $(BASE)
 INC_plugin-api_report  := $(API) $(BASE)
 INC_plugin-api_host    := $(API) $(BASE)
@@ -265,7 +266,7 @@ $(OUT)/tests/$(1)/ggn_%: $(OBJ)/tests/$(1)/ggn_%.c.o $(GGN_CORE_OBJ) $(SUPPORT_g
 	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
 $(OUT)/tests/$(1)/ggn_plugin%: $(OBJ)/tests/$(1)/ggn_plugin%.c.o $(GGN_PLUGIN_OBJ) $(GGN_CORE_OBJ) $(SUPPORT_ggn)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(GGN_LIBS) -lcmocka -o $$@
-$(OUT)/tests/$(1)/api_%: $(OBJ)/tests/$(1)/api_%.c.o $(LOADER_OBJ) $(SUPPORT_api)
+$(OUT)/tests/$(1)/api_%: $(OBJ)/tests/$(1)/api_%.c.o $(LOADER_OBJ) $(OBJ)/base.a $(SUPPORT_api)
 	$$(link) $$^ $$(LDFLAGS_ALL) -ldl -lm -lcmocka -o $$@
 $(OUT)/tests/$(1)/api_host%: $(OBJ)/tests/$(1)/api_host%.c.o $(HOST_OBJ) $(LOADER_OBJ) $(OBJ)/base.a $(SUPPORT_host)
 	$$(link) $$^ $$(LDFLAGS_ALL) $(BASE_LIBS) -ldl -lcmocka -o $$@

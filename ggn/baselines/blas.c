@@ -8,6 +8,7 @@
 #include <string.h>
 #include <sys/mman.h>
 
+#include "base/module.h"
 #include "base/threads.h"
 
 enum { CALLS_MOST = 64 };
@@ -46,14 +47,15 @@ static void load_library(void)
     const int chosen = getenv(variable) != NULL;
     if (!chosen)
         setenv(variable, "1", 1);
-    void *library = dlopen(file, RTLD_NOW | RTLD_LOCAL);
-    const char *why = library ? "it lacks one of the functions that are used" : dlerror();
+    void *library = base_module_open(file, RTLD_NOW | RTLD_LOCAL, &reason);
     if (!chosen)
         unsetenv(variable);
+    if (!library)
+        return;
     if (!find(library, "cblas_sgemm", &blas.sgemm) || !find(library, "openblas_set_num_threads", &blas.set_threads) ||
         !find(library, "dgesvd_", &blas.dgesvd) || !find(library, "blas_memory_alloc", &blas.take) ||
         !find(library, "blas_memory_free", &blas.give))
-        base_fail(&reason, BASE_EIO, "%s: %.200s", file, why);
+        base_fail(&reason, BASE_EIO, "%s: it lacks one of the functions that are used", file);
     else
         blas.set_threads(1);
 }

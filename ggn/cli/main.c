@@ -5,6 +5,7 @@
 
 #include "base/interrupt.h"
 #include "base/options.h"
+#include "base/threads.h"
 #include "cli/commands.h"
 #include "picture/draw.h"
 
@@ -121,7 +122,7 @@ static int run(const struct command *command, int argc, char **argv)
     return all;
 }
 
-int main(int argc, char **argv)
+static int run_program(int argc, char **argv)
 {
     char name[64], text[128];
     base_interrupt_begin();
@@ -134,10 +135,7 @@ int main(int argc, char **argv)
     }
     snprintf(name, sizeof name, "ggn %s", argv[1]);
     argv[1] = name;
-    int status = run(command, argc - 1, argv + 1);
-    if (fflush(stdout) || ferror(stdout)) {
-        fprintf(stderr, "%s: cannot write standard output\n", name);
-        return status ? status : BAD_INPUT;
-    }
-    return status;
+    return base_interrupt_end(name, run(command, argc - 1, argv + 1));
 }
+
+int main(int argc, char **argv) { return base_threads_main(argc, argv, run_program); }

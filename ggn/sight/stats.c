@@ -47,6 +47,11 @@ struct keyed {
     size_t index;
 };
 
+static const double tie = 1e-12; /* of a value: above what rounding does to sums of thousands */
+
+/* Whether rising values are one, however they were rounded on the way. */
+static int tied(double x, double y) { return x == y || (isfinite(y - x) && y - x <= tie * fmax(fabs(x), fabs(y))); }
+
 /* rank[i] in 1..n; equal values share the mean of their ranks. */
 static int ranks(const double *x, size_t n, double *rank, struct base_err *err)
 {
@@ -57,7 +62,7 @@ static int ranks(const double *x, size_t n, double *rank, struct base_err *err)
         k[i] = (struct keyed){x[i], i};
     qsort(k, n, sizeof *k, compare_doubles);
     for (size_t i = 0, j; i < n; i = j) {
-        for (j = i + 1; j < n && k[j].key == k[i].key;)
+        for (j = i + 1; j < n && tied(k[i].key, k[j].key);)
             j++;
         for (size_t m = i; m < j; m++)
             rank[k[m].index] = 0.5 * (double)(i + j + 1);

@@ -8,6 +8,7 @@
 #include <cjson/cJSON.h>
 
 #include "base/files.h"
+#include "base/interrupt.h"
 #include "render/checkpoint.h"
 #include "render/output.h"
 #include "watch.h"
@@ -81,15 +82,24 @@ static struct pt_output_info describe(const struct pt_open *o, const char *quote
                                    .quote = quote};
 }
 
+static int is_asked_again(void *before) { return base_interrupted != *(const sig_atomic_t *)before; }
+
 /* Writes what was asked for; goes on after a failure so that one missing folder, or a denoiser that fails, does not cost the
- * other files. */
-static int write_outputs(const struct pt_open *o, struct pt_output_info info, struct base_err *err)
+ * other files. Who is asked to end while the picture is denoised writes the noisy one. */
+static int write_outputs(const struct pt_open *o, struct pt_output_info info, int *status, struct base_err *err)
 {
     struct pt_denoised denoised = {0};
     struct base_err why = {0};
+    sig_atomic_t before = base_interrupted;
     double *noisy_error = NULL;
     if (o->picture != PT_PICTURE_NOISY) {
-        pt_denoised_make(o->render, o->picture, o->denoiser, NULL, &denoised, &why);
+        pt_denoised_make(o->render, o->picture, o->denoiser, is_asked_again, &before, &denoised, &why);
+        if (is_asked_again(&before)) {
+            *status = PT_EXIT_INTERRUPTED;
+            info.of.flags |= LULL_REPORT_INTERRUPTED;
+            if (o->frame->number >= 0)
+                return 0;
+        }
         info.denoised = why.code ? NULL : &denoised;
         info.noisy_error = noisy_error = o->criterion ? judge_noisy(o) : NULL;
     }
@@ -99,7 +109,9 @@ static int write_outputs(const struct pt_open *o, struct pt_output_info info, st
                       100.0 * denoised.weight_mean);
     pt_denoised_release(&denoised);
     free(noisy_error);
-    if (why.code && !err->code)
+    if (why.code && is_asked_again(&before))
+        base_log_say(o->log, "the picture is the noisy one: interrupted while it was denoised");
+    else if (why.code && !err->code)
         base_fail(err, why.code, "the picture is the noisy one: %s", why.text);
     return err->code;
 }
@@ -164,19 +176,17 @@ static int render_image(struct pt_open *o, const char *quote, int *status, struc
     rc = pt_render_run(o->render, &watch.hooks, &outcome, err);
     pt_watch_end(&watch);
     struct base_err write_err = {0};
-    if (frame->number >= 0 && (rc || pt_action_status(outcome) != 0)) {
-        *status = pt_action_status(outcome);
+    *status = pt_action_status(outcome);
+    if (frame->number >= 0 && (rc || *status != 0))
         return rc;
-    }
-    info.of.flags = pt_action_status(outcome) != 0 ? LULL_REPORT_INTERRUPTED : 0;
-    if (write_outputs(o, info, &write_err) != 0) {
+    info.of.flags = *status != 0 ? LULL_REPORT_INTERRUPTED : 0;
+    if (write_outputs(o, info, status, &write_err) != 0) {
         if (!rc)
             return base_fail(err, write_err.code, "%s", write_err.text);
         base_log_say(o->log, "%s", write_err.text); /* besides the render's own error: it tells where the image is */
         return rc;
     }
     pt_action_summary(o->render, o->log);
-    *status = pt_action_status(outcome);
     return rc;
 }
 

@@ -4,6 +4,7 @@
 
 #include "actions.h"
 #include "base/interrupt.h"
+#include "base/threads.h"
 
 static int list_criteria(struct base_log *log, struct base_err *err)
 {
@@ -41,7 +42,7 @@ static int wants_plain_lines(void)
     return (no_color && *no_color) || (term && strcmp(term, "dumb") == 0);
 }
 
-int main(int argc, char **argv)
+static int run_program(int argc, char **argv)
 {
     static struct pt_cli cli;
     struct job *job = NULL;
@@ -63,12 +64,11 @@ int main(int argc, char **argv)
         status = rc == BASE_EINVAL || rc == BASE_EIO ? PT_EXIT_BAD_INPUT : PT_EXIT_FAILED;
     }
     pt_cli_release(&cli);
-    if ((fflush(stdout) != 0 || ferror(stdout)) && status == 0) {
-        base_log_say(&log, "cannot write standard output");
-        status = PT_EXIT_BAD_INPUT;
-    }
+    status = base_interrupt_end(status == 0 && job_rank(job) == 0 ? "lull-render" : NULL, status);
     int all = job_close(job, status, err.text, &job_err);
     if (all != status && job_err.code)
         base_log_say(&log, "%s", job_err.text);
     return all;
 }
+
+int main(int argc, char **argv) { return base_threads_main(argc, argv, run_program); }

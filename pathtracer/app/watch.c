@@ -56,7 +56,7 @@ static void write_preview(const struct pt_watch *w, const struct pt_render *rend
     struct pt_denoised denoised = {0};
     const double so_far_s = base_clock_wall_s() - o->start_s, to_denoise_s = denoised_s * (double)render->film.pixels;
     if (o->picture != PT_PICTURE_NOISY && to_denoise_s / base_threads_count(o->threads) < share * so_far_s)
-        pt_denoised_make(render, PT_PICTURE_DENOISED, o->denoiser, is_interrupted, &denoised, err);
+        pt_denoised_make(render, PT_PICTURE_DENOISED, o->denoiser, is_interrupted, NULL, &denoised, err);
     const struct pt_output_info info = {.denoised = denoised.rgb ? &denoised : NULL};
     pt_output_preview(path_of(w, PT_PREVIEW), render, &info, err);
     pt_denoised_release(&denoised);

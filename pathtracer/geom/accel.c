@@ -1,13 +1,11 @@
-#define _GNU_SOURCE 1 /* RTLD_DEFAULT */
 #include "geom/accel.h"
 
-#include <dlfcn.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
+#include "base/guard.h"
 #include "geom/embree.h"
 #include "geom/quadric.h"
 
@@ -126,29 +124,6 @@ static void quadric_occluded(const struct RTCOccludedFunctionNArguments *args)
 
 /* What memory is wanted for, in errors. */
 #define WHAT "the acceleration structure"
-
-/*
- * When memory runs out in the middle of a parallel loop of a library in C++, its exception cannot leave the loop, and the
- * process is aborted with what C++ says of it. With this as its last word it ends with a line and exit status 1 instead, as
- * any other lack of memory does.
- */
-static void say_and_end(void)
-{
-    static const char line[] = "lull-render: out of memory (" WHAT ")\n";
-    (void)!write(STDERR_FILENO, line, sizeof line - 1);
-    _exit(1);
-}
-
-typedef void (*handler)(void);
-
-/* std::set_terminate: a program in C has it by the libraries that are in C++, or needs none. */
-static handler set_handler(handler now)
-{
-    handler (*set_terminate)(handler);
-    void *symbol = dlsym(RTLD_DEFAULT, "_ZSt13set_terminatePFvvE");
-    memcpy(&set_terminate, &symbol, sizeof set_terminate); /* a pointer to data into one to a function */
-    return set_terminate ? set_terminate(now) : NULL;
-}
 
 static bool count_bytes(void *user, ssize_t bytes, bool post)
 {
@@ -297,12 +272,23 @@ static int native_packet(RTCDevice device)
                                                                                      : 1;
 }
 
+/* By an empty scene: with that, TBB starts, which lacks memory in the middle of it, waits for itself, and never ends. */
+static int start(struct pt_accel *accel)
+{
+    base_guard_begin(WHAT, BASE_GUARD_START);
+    accel->device = rtcNewDevice(NULL);
+    RTCScene empty = accel->device ? rtcNewScene(accel->device) : NULL;
+    if (empty) {
+        rtcCommitScene(empty);
+        rtcReleaseScene(empty);
+    }
+    base_guard_end();
+    return empty && rtcGetDeviceError(accel->device) == RTC_ERROR_NONE;
+}
+
 static int build(struct pt_scene *scene, struct pt_accel *accel)
 {
     if (scene->object_count && !(accel->objects = calloc((size_t)scene->object_count, sizeof *accel->objects)))
-        return 0;
-    accel->device = rtcNewDevice(NULL);
-    if (!accel->device)
         return 0;
     accel->packet = native_packet(accel->device);
     accel->flags = RTC_SCENE_FLAG_ROBUST;
@@ -328,11 +314,12 @@ int pt_accel_build(struct pt_scene *scene, struct base_err *err)
     struct pt_accel *accel = calloc(1, sizeof *accel);
     if (!accel)
         return base_fail_nomem(err, WHAT);
-    handler before = set_handler(say_and_end); /* one thread at a time */
-    int built = build(scene, accel);
+    int built = start(accel);
+    base_guard_begin(WHAT, BASE_GUARD_CALLS); /* exceptions cannot leave Embree's parallel loops */
+    built = built && build(scene, accel);
     if (!built)
         destroy(scene, accel); /* Embree may lack memory for that, too */
-    set_handler(before);
+    base_guard_end();
     if (!built)
         return base_fail_nomem(err, WHAT);
     struct RTCBounds b;

@@ -389,7 +389,7 @@ static int make_ply_mesh(struct pt_builder *b, struct pt_params *p)
         rc = pt_ply_parse(path, bytes, size, &ply, &err);
     free(bytes);
     if (rc)
-        return pt_diag_fail_code(&b->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, loc, "cannot read %s", err.text);
+        return pt_diag_fail_read(&b->diag, loc, &err);
     if (ply.corner_uvs)
         pt_diag_warn(&b->diag, loc, "%s: texture coordinates per face corner are ignored (expected those of vertices)",
                      path);

@@ -148,7 +148,7 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
     if (!rc && use != PT_IMAGE_DATA)
         rc = pic_to_rec709(path, &image, &err);
     if (rc)
-        pt_diag_fail_code(&b->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, loc, "cannot read %s", err.text);
+        pt_diag_fail_read(&b->diag, loc, &err);
     else if (convert(b, path, &image, code, &map) == 0 && (id = pt_list_add(b, &b->images, &map)) >= 0 &&
              pt_names_set(&b->image_names, is_own ? own_key : key, id) != 0)
         pt_diag_nomem(&b->diag, "a texture");

@@ -35,6 +35,13 @@ int pt_diag_fail_code(struct pt_diag *diag, int code, struct pt_loc loc, const c
     return code;
 }
 
+int pt_diag_fail_read(struct pt_diag *diag, struct pt_loc loc, const struct base_err *why)
+{
+    const int lacks_memory = why->code == BASE_ENOMEM;
+    return pt_diag_fail_code(diag, lacks_memory ? BASE_ENOMEM : BASE_EINVAL, loc, "%s%s", lacks_memory ? "" : "cannot read ",
+                             why->text);
+}
+
 int pt_diag_nomem(struct pt_diag *diag, const char *what)
 {
     if (!diag->rc)

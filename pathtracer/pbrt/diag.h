@@ -33,6 +33,8 @@ struct pt_diag {
 int pt_diag_fail_code(struct pt_diag *diag, int code, struct pt_loc loc, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 #define pt_diag_fail(diag, loc, ...) pt_diag_fail_code(diag, BASE_EINVAL, loc, __VA_ARGS__)
+/* A file that the scene names could not be read. Returns the sticky code. */
+int pt_diag_fail_read(struct pt_diag *diag, struct pt_loc loc, const struct base_err *why);
 /* Out of memory while making `what`. */
 int pt_diag_nomem(struct pt_diag *diag, const char *what);
 /* Something is approximated or ignored: `file:line: warning: text`, a note, each text once. A failure when strict. */

@@ -22,7 +22,7 @@ int pt_lexer_include(struct pt_lexer *lexer, const char *path, struct pt_loc fro
     if (rc && from.line == 0)
         return pt_diag_fail_code(lexer->diag, rc, from, "%s", err.text);
     if (rc)
-        return pt_diag_fail_code(lexer->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, from, "cannot read %s", err.text);
+        return pt_diag_fail_read(lexer->diag, from, &err);
     file.loc = (struct pt_loc){pt_arena_strdup(lexer->arena, path), 1, 1};
     if (!file.loc.file) {
         free(file.bytes);

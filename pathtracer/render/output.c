@@ -26,7 +26,7 @@ uint32_t pt_denoised_planes(enum pt_picture picture)
 }
 
 int pt_denoised_make(const struct pt_render *r, enum pt_picture picture, const char *library, int (*cancelled)(void *data),
-                     struct pt_denoised *out, struct base_err *err)
+                     void *data, struct pt_denoised *out, struct base_err *err)
 {
     const size_t n = r->film.pixels;
     struct lull_error e = {.struct_size = sizeof e};
@@ -39,6 +39,7 @@ int pt_denoised_make(const struct pt_render *r, enum pt_picture picture, const c
                                                 .flags = picture == PT_PICTURE_DENOISED ? LULL_DENOISE_FULL : 0,
                                                 .threads = (uint32_t)base_threads_count(r->threads),
                                                 .library = library,
+                                                .context = data,
                                                 .cancelled = cancelled};
         const struct lull_host_picture made = {
             .struct_size = sizeof made, .rgb = out->rgb, .denoised = out->denoised, .weight = out->weight};

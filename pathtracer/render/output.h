@@ -22,10 +22,10 @@ struct pt_denoised {    /* over the film's pixels, row by row from the top */
     double weight_mean; /* over all pixels */
 };
 
-/* picture: not the noisy one. cancelled(NULL), which may be NULL, ends it. library: as for
+/* picture: not the noisy one. cancelled(data), which may be NULL, ends it. library: as for
  * lull_host_denoising. BASE_EINVAL: no denoiser, or one that fails; BASE_ENOMEM. On failure *out is zeroed. */
 int pt_denoised_make(const struct pt_render *render, enum pt_picture picture, const char *library,
-                     int (*cancelled)(void *data), struct pt_denoised *out, struct base_err *err);
+                     int (*cancelled)(void *data), void *data, struct pt_denoised *out, struct base_err *err);
 void pt_denoised_release(struct pt_denoised *denoised);
 
 struct pt_output_info {

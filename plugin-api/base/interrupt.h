@@ -13,7 +13,12 @@
  * connections would get their numbers, and what is said would go into them. */
 void base_interrupt_begin(void);
 
-/* Not 0: asked to end. */
+/* What a program calls last: flushes standard output and returns the exit status. What did not get out is said in a line
+ * that begins with `program` (NULL: nothing is said) and makes a status of 0 one of bad input; but whoever reads a pipe may
+ * stop reading, as `head` does: then nothing is said, and the status is that of SIGPIPE. */
+int base_interrupt_end(const char *program, int status);
+
+/* How often it was asked to end. */
 extern volatile sig_atomic_t base_interrupted;
 
 /* From here on the first signal of a kind asks and a second one kills, but SIGXCPU, which comes again and again, only asks.

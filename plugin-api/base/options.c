@@ -10,10 +10,11 @@
 #include <string.h>
 #include <strings.h>
 
+#include "base/interrupt.h"
 #include "base/paths.h"
 #include "base/version.h"
 
-enum { EXIT_UNWRITTEN = 2, MAX_OPTIONS = 96, KEY_LONG = 256, KEY_USAGE = KEY_LONG + MAX_OPTIONS, KEY_HELP, KEY_VERSION };
+enum { MAX_OPTIONS = 96, KEY_LONG = 256, KEY_USAGE = KEY_LONG + MAX_OPTIONS, KEY_HELP, KEY_VERSION };
 
 /* strtol and strtod pass over blanks before a number; an argument that has some is none. */
 static int begins_blank(const char *text) { return isspace((unsigned char)*text) != 0; }
@@ -236,10 +237,7 @@ _Noreturn static void answer(const struct base_options *options, const char *pro
         print_help(options, program, ARGP_HELP_USAGE);
     else
         print_help(options, program, ARGP_HELP_SHORT_USAGE | ARGP_HELP_LONG | ARGP_HELP_DOC);
-    if (!fflush(stdout) && !ferror(stdout))
-        exit(EXIT_SUCCESS);
-    fprintf(stderr, "%s: cannot write standard output\n", program);
-    exit(EXIT_UNWRITTEN);
+    exit(base_interrupt_end(program, EXIT_SUCCESS));
 }
 
 struct getopt_form {

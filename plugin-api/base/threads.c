@@ -10,7 +10,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <unistd.h>
+
+#include "base/files.h"
 
 struct worker {
     struct base_threads *pool;
@@ -41,6 +44,9 @@ struct base_threads {
     void *data;
     struct worker workers[];
 };
+
+/* Of threads, and of a program's own: what its limit (ulimit -s) usually is. */
+#define STACK_BYTES ((size_t)8 << 20)
 
 /* How often one looks before one sleeps: some fifty microseconds, about what waking would take. */
 enum { LOOKS = 2000 };
@@ -181,6 +187,68 @@ static void *worker_main(void *arg)
     return NULL;
 }
 
+/* With the stack that threads have, but no smaller one than usual. */
+static int start(pthread_t *thread, void *(*fn)(void *), void *arg)
+{
+    pthread_attr_t attributes;
+    size_t size;
+    int why = pthread_attr_init(&attributes);
+    if (why)
+        return why;
+    if (pthread_attr_getstacksize(&attributes, &size) == 0 && size < STACK_BYTES)
+        pthread_attr_setstacksize(&attributes, STACK_BYTES);
+    why = pthread_create(thread, &attributes, fn, arg);
+    pthread_attr_destroy(&attributes);
+    return why;
+}
+
+struct program {
+    int argc, status;
+    char **argv;
+    int (*run)(int argc, char **argv);
+};
+
+static void *run_program(void *data)
+{
+    struct program *p = data;
+    p->status = p->run(p->argc, p->argv);
+    return NULL;
+}
+
+/* Libraries that lack memory may die even of cleaning up behind a failure. */
+static int leave_with(int status)
+{
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) /* which look for leaks then */
+    if (status != 0) {
+        fflush(NULL);
+        _exit(status);
+    }
+#endif
+    return status;
+}
+
+int base_threads_main(int argc, char **argv, int (*run)(int argc, char **argv))
+{
+    struct program p = {.argc = argc, .argv = argv, .run = run};
+    struct rlimit limit;
+    pthread_attr_t attributes;
+    pthread_t thread;
+    if (getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= STACK_BYTES)
+        return leave_with(run(argc, argv));
+    if (pthread_attr_init(&attributes) == 0) { /* those that libraries start */
+        pthread_attr_setstacksize(&attributes, STACK_BYTES);
+        pthread_setattr_default_np(&attributes);
+        pthread_attr_destroy(&attributes);
+    }
+    if (start(&thread, run_program, &p) != 0) {
+        fprintf(stderr, "%s: out of memory (a stack of 8 MB; ulimit -s allows %llu KB)\n",
+                argc > 0 ? base_file_name(argv[0]) : "lull", (unsigned long long)limit.rlim_cur >> 10);
+        return 1;
+    }
+    pthread_join(thread, NULL);
+    return leave_with(p.status);
+}
+
 struct base_threads *base_threads_create(int count, struct base_err *err)
 {
     struct base_threads *t = calloc(1, sizeof *t + (size_t)count * sizeof t->workers[0]);
@@ -196,7 +264,7 @@ struct base_threads *base_threads_create(int count, struct base_err *err)
     t->looks = count <= base_threads_available() ? LOOKS : 0; /* who looks keeps no processor from who works */
     for (int i = 1; i < count; i++) {
         t->workers[i] = (struct worker){.pool = t, .id = i};
-        if (pthread_create(&t->workers[i].thread, NULL, worker_main, &t->workers[i]) != 0) {
+        if (start(&t->workers[i].thread, worker_main, &t->workers[i]) != 0) {
             base_fail(err, BASE_ENOMEM, "cannot start thread %d of %d", i + 1, count);
             base_threads_destroy(t);
             return NULL;

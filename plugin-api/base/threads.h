@@ -33,4 +33,9 @@ void base_threads_for(struct base_threads *threads, long n, void (*fn)(void *dat
 void base_threads_tasks(struct base_threads *threads, uint64_t count, void (*fn)(void *arg, uint64_t task, uint32_t worker),
                         void *arg);
 
+/* A program's main(): runs it, and where its stack may not grow as large as usual (ulimit -s) on a thread with such a one;
+ * what libraries start has one, too. The exit status; 1, and one line, where there is no memory for that. After a failure
+ * the process ends here: libraries that lack memory may die even of cleaning up. */
+int base_threads_main(int argc, char **argv, int (*run)(int argc, char **argv));
+
 #endif

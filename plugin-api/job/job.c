@@ -34,12 +34,16 @@ int job_open(struct job **out, struct base_err *err)
     *out = NULL;
     if (!was_launched())
         return 0;
-    void *symbol = base_module_symbol(MODULE, "job_mpi_open", 1); /* MPI libraries load parts of themselves */
+    struct base_err why = {0};
+    void *symbol = base_module_symbol(MODULE, "job_mpi_open", 1, &why); /* MPI libraries load parts of themselves */
     memcpy(&open, &symbol, sizeof open);
+    if (why.code == BASE_ENOMEM)
+        return base_fail_nomem(err, MODULE);
     if (!open)
         return base_fail(err, BASE_EINVAL,
-                         "started by an MPI launcher, but this program has no MPI (its lib/lull/modules/lull-mpi.so): "
-                         "build it with MPI installed, or start it without the launcher");
+                         "started by an MPI launcher, but this program has no MPI (%.200s): build it with MPI installed, or "
+                         "start it without the launcher",
+                         why.text);
     int rc = open(&transport, err);
     return rc || !transport ? rc : job_create(transport, out, err);
 }
@@ -47,7 +51,7 @@ int job_open(struct job **out, struct base_err *err)
 const char *job_mpi_version(void)
 {
     const char *(*version)(void) = NULL;
-    void *symbol = base_module_symbol(MODULE, "job_mpi_library", 1);
+    void *symbol = base_module_symbol(MODULE, "job_mpi_library", 1, NULL);
     memcpy(&version, &symbol, sizeof version);
     return version ? version() : "none (built without it)";
 }

@@ -5,32 +5,48 @@
 #include <stdlib.h>
 
 #include "base/colour.h"
+#include "base/guard.h"
 #include "base/module.h"
 #include "picture/oiio.h"
 
-static const struct pic_library *library(const char *name, struct base_err *err)
+static int find_library(const char *name, const struct pic_library **out, struct base_err *err)
 {
+    static _Atomic(const struct pic_library *) loaded;
     const struct pic_library *linked = &pic_library;
-    const struct pic_library *l = linked ? linked : base_module_symbol("lull-images.so", "pic_library", 0);
-    if (!l)
-        base_fail(err, BASE_EIO,
-                  "%s: images cannot be read: lib/lull/modules/lull-images.so, which belongs beside this program's bin/, or "
-                  "OpenImageIO cannot be loaded",
-                  name);
-    return l;
+    struct base_err why = {0};
+    *out = linked ? linked : loaded;
+    if (*out)
+        return 0;
+    base_guard_begin("the image library", BASE_GUARD_LOADING);
+    *out = loaded = base_module_symbol("lull-images.so", "pic_library", 0, &why);
+    base_guard_end();
+    return *out ? 0
+           : why.code == BASE_ENOMEM
+               ? base_fail_nomem(err, name)
+               : base_fail(err, BASE_EIO,
+                           "%.200s: images cannot be read: lib/lull/modules/lull-images.so beside this "
+                           "program's bin/: %.200s",
+                           name, why.text);
 }
 
 static int answer(const struct pic_request *request, struct pic_image *out, struct base_err *err)
 {
-    const struct pic_library *l = library(request->name, err);
-    return l ? l->read(request, out, err) : BASE_EIO;
+    const struct pic_library *l;
+    int rc = find_library(request->name, &l, err);
+    if (rc)
+        return rc;
+    base_guard_begin(request->name, BASE_GUARD_CALLS);
+    rc = l->read(request, out, err);
+    base_guard_end();
+    return rc;
 }
 
 int pic_read_header(const char *path, struct pic_window *window, struct pic_attribute *attributes, int count,
                     struct base_err *err)
 {
-    const struct pic_library *l = library(path, err);
-    return l ? l->read_header(path, window, attributes, count, err) : BASE_EIO;
+    const struct pic_library *l;
+    int rc = find_library(path, &l, err);
+    return rc ? rc : l->read_header(path, window, attributes, count, err);
 }
 
 int pic_read(const char *path, struct pic_image *out, struct base_err *err)

@@ -8,6 +8,7 @@
 #include "base/interrupt.h"
 #include "base/options.h"
 #include "base/paths.h"
+#include "base/threads.h"
 #include "picture/read.h"
 #include "report/report.h"
 
@@ -113,7 +114,7 @@ static int make_page(struct settings *s, struct base_err *err)
     return rc;
 }
 
-int main(int argc, char **argv)
+static int run_program(int argc, char **argv)
 {
     static struct settings s;
     struct base_err err = {0};
@@ -125,3 +126,5 @@ int main(int argc, char **argv)
         fprintf(stderr, "lull-report: %s\n", err.text);
     return rc == 0 ? 0 : rc == BASE_ENOMEM ? FAILED : BAD_INPUT;
 }
+
+int main(int argc, char **argv) { return base_threads_main(argc, argv, run_program); }

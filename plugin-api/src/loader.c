@@ -1,17 +1,13 @@
 /* SPDX-License-Identifier: MIT
  *
- * Loading: resolve a name to a file, see that the file is a complete ELF object, dlopen, take the entry, check its tables.
- * A file cut short would make dlopen die of SIGBUS, therefore the look at its headers first.
+ * Loading: resolve a name to a file, load it, take the entry, check its tables.
  */
 #define _GNU_SOURCE /* dladdr */
 #include <lull/loader.h>
 
 #include <dirent.h>
 #include <dlfcn.h>
-#include <elf.h>
 #include <errno.h>
-#include <fcntl.h>
-#include <link.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,6 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/module.h"
 #include "process_state.h"
 
 int32_t lull_error_set(struct lull_error *err, int32_t code, const char *format, ...)
@@ -47,35 +44,6 @@ __attribute__((format(printf, 3, 4))) static void say(const struct lull_search *
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
     search->log(search->log_context, level, text);
-}
-
-static int read_at(int fd, void *out, size_t size, uint64_t offset)
-{
-    return offset <= INT64_MAX && pread(fd, out, size, (off_t)offset) == (ssize_t)size;
-}
-
-/* NULL if the file is an ELF shared object of this machine's class whose segments all lie within the file; else what is
- * wrong with it. */
-static const char *find_fault(int fd)
-{
-    const unsigned char own_class = sizeof(void *) == 8 ? ELFCLASS64 : ELFCLASS32;
-    struct stat st;
-    ElfW(Ehdr) h;
-    ElfW(Phdr) p;
-    if (fstat(fd, &st) != 0 || !S_ISREG(st.st_mode))
-        return "not a file";
-    if (!read_at(fd, &h, sizeof h, 0) || memcmp(h.e_ident, ELFMAG, SELFMAG) != 0)
-        return "not a shared object";
-    if (h.e_ident[EI_CLASS] != own_class)
-        return "a shared object of another word size";
-    if (h.e_type != ET_DYN || h.e_phentsize != sizeof p)
-        return "not a shared object";
-    const uint64_t size = (uint64_t)st.st_size;
-    for (unsigned i = 0; i < h.e_phnum; i++)
-        if (h.e_phoff > size || !read_at(fd, &p, sizeof p, h.e_phoff + (uint64_t)i * sizeof p) ||
-            (p.p_type == PT_LOAD && (p.p_offset > size || p.p_filesz > size - p.p_offset)))
-            return "a shared object that was cut short";
-    return NULL;
 }
 
 /* Tells about, and where possible undoes, what loading did to the process. */
@@ -117,20 +85,13 @@ static int32_t entry_check(const char *path, lull_entry_fn entry, uint32_t *coun
 static int32_t load_library(const struct lull_search *search, const char *path, lull_entry_fn *entry, uint32_t *count,
                             struct lull_error *err)
 {
-    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    const char *fault = fd >= 0 ? find_fault(fd) : errno == ENOENT ? "no such file" : "cannot be opened";
-    if (fd >= 0)
-        close(fd);
-    if (fault)
-        return lull_error_set(err, LULL_E_IO, "%s: %s", path, fault);
-
     struct lull_process_state before;
+    struct base_err why = {0};
     lull_process_state_read(&before);
-    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    const char *why = !library ? dlerror() : NULL;
+    void *library = base_module_open(path, RTLD_NOW | RTLD_LOCAL, &why);
     compare_process(search, path, &before);
-    if (!library) /* dlerror's text begins with the path */
-        return lull_error_set(err, LULL_E_IO, "cannot load: %s", why ? why : path);
+    if (!library)
+        return lull_error_set(err, why.code == BASE_ENOMEM ? LULL_E_MEMORY : LULL_E_IO, "%s", why.text);
 
     void *symbol = dlsym(library, LULL_ENTRY_NAME);
     if (!symbol)

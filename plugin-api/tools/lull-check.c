@@ -10,6 +10,7 @@
 
 #include "base/interrupt.h"
 #include "base/options.h"
+#include "base/threads.h"
 
 enum { SPECS_MAX = 256 };
 
@@ -257,16 +258,7 @@ static int check_spec(struct arguments *a, const char *spec)
     return status;
 }
 
-/* A report that did not get out is none. */
-static int finish(int status)
-{
-    if (!fflush(stdout) && !ferror(stdout))
-        return status;
-    fprintf(stderr, "lull-check: cannot write standard output\n");
-    return LC_EXIT_USAGE;
-}
-
-int main(int argc, char **argv)
+static int run_program(int argc, char **argv)
 {
     static struct arguments a = {.lc = {.workers = 4, .misuse = 2000, .seed = 1}, .limit_s = 120};
     struct base_err err = {0};
@@ -280,7 +272,7 @@ int main(int argc, char **argv)
     if (a.list) {
         for (int k = 0; k < CHECKS; k++)
             printf("%-20s %s\n", checks[k].name, checks[k].title);
-        return finish(LC_EXIT_OK);
+        return base_interrupt_end("lull-check", LC_EXIT_OK);
     }
     for (int i = 0; i < a.spec_count; i++) {
         int status = check_spec(&a, a.specs[i]);
@@ -288,5 +280,7 @@ int main(int argc, char **argv)
             return status;
     }
     printf("1..%d\n# %d checks, %d failed\n", a.checks, a.checks, a.failed);
-    return finish(a.failed > 0 ? LC_EXIT_FAILED : LC_EXIT_OK);
+    return base_interrupt_end("lull-check", a.failed > 0 ? LC_EXIT_FAILED : LC_EXIT_OK);
 }
+
+int main(int argc, char **argv) { return base_threads_main(argc, argv, run_program); }

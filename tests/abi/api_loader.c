@@ -254,7 +254,7 @@ static void cut_libraries_are_refused(void **state)
     write_bytes(path, bytes, size);
     assert_refused("", path, LULL_E_IO, "word size");
     unlink(path);
-    assert_refused("", in_dir(scratch, "."), LULL_E_IO, "not a file");
+    assert_refused("", in_dir(scratch, "."), LULL_E_IO, "not a regular file");
 }
 
 static void side_effects_of_loading_are_told(void **state)

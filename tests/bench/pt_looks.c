@@ -101,7 +101,7 @@ static void write_pictures(const struct pt_render *r, uint64_t spp)
     name_picture(path, spp, kinds[2]);
     if (access(path, F_OK) == 0)
         return;
-    if (pt_denoised_make(r, PT_PICTURE_BLEND, NULL, NULL, &d, &err))
+    if (pt_denoised_make(r, PT_PICTURE_BLEND, NULL, NULL, NULL, &d, &err))
         die(&err);
     for (int k = 0; k < 3; k++) {
         struct pt_denoised shown = d;

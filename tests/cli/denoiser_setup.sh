@@ -12,7 +12,7 @@ for part in libOpenImageDenoise_core.so.2.5.0 libOpenImageDenoise_device_cpu.so.
 cat >fake/bin/python3 <<END
 #!/bin/sh
 [ "\$1 \$2" = "-m venv" ] || exec "$real" "\$@"
-mkdir -p "\$3/bin" && printf '#!/bin/sh\n[ ! -e "$PWD/offline" ] || { echo "no index" >&2; exit 1; }\nwhile [ "\$1" != --dest ]; do shift; done\ncp "$PWD/pyoidn-2.5.0.whl" "\$2"\n' >"\$3/bin/pip" && chmod +x "\$3/bin/pip"
+mkdir -p "\$3/bin" && printf '#!/bin/sh\n[ ! -e "$PWD/offline" ] || { cat "$PWD/offline" >&2; exit 1; }\nwhile [ "\$1" != --dest ]; do shift; done\ncp "$PWD/pyoidn-2.5.0.whl" "\$2"\n' >"\$3/bin/pip" && chmod +x "\$3/bin/pip"
 END
 chmod +x fake/bin/python3
 PATH=$PWD/fake/bin:$PATH
@@ -20,7 +20,7 @@ XDG_DATA_HOME=$PWD/data
 export PATH XDG_DATA_HOME
 unset LULL_OIDN
 to=$XDG_DATA_HOME/lull/oidn
-touch offline
+echo "no index" >offline
 said() { # said STATUS LINE COMMAND...: that status, and on the error's side one line with these words, or none
     status=0 wanted=$1 line=$2
     shift 2
@@ -30,7 +30,16 @@ said() { # said STATUS LINE COMMAND...: that status, and on the error's side one
 }
 t "without an index there is one line" said 1 "no Open Image Denoise: no index (a Python package index is needed)" "$program" "$to"
 t "  …and nothing is left" test ! -e "$to" -a ! -e "$to.part"
-rm offline
+echo "ERROR: Could not install packages due to an OSError: [Errno 28] No space left on device" >offline
+t "a full disk is no missing index" said 1 "no room in $XDG_DATA_HOME/lull.*No space left on device)$" "$program" "$to"
+printf '#!/bin/sh\necho aarch64\n' >fake/bin/uname && chmod +x fake/bin/uname
+echo "ERROR: No matching distribution found for pyoidn<3,>=2.5" >offline
+t "nor is another processor" said 1 "pyoidn is for x86-64, and this is aarch64" "$program" "$to"
+rm offline fake/bin/uname
+mv pyoidn-2.5.0.whl kept && head -c 4000000 /dev/zero >wheel/oidn/lib/large && (cd wheel && "$real" -m zipfile -c ../pyoidn-2.5.0.whl oidn)
+t "a disk that fills up while it is unpacked" said 1 "no room in .*File too large" sh -c "ulimit -f 4000 && exec '$program' '$to'"
+t "  …and nothing is left" test ! -e "$to" -a ! -e "$to.part"
+mv kept pyoidn-2.5.0.whl
 t "it is fetched" said 0 "" "$program" "$to"
 t "  …four files, no others" sh -c "[ \"\$(ls '$to' '$to/lib' | wc -l)\" = 8 ] && [ ! -e '$to.part' ] && cat out | grep -qx '$to'"
 t "a second time nothing is done" sh -c "touch offline && '$program' '$to' | grep -qx '$to'"

@@ -4,7 +4,8 @@ import os
 import random
 
 import tap
-from lull.judge import compare, cost, evaluate, rules, stats
+from lull.judge import compare, cost, evaluate, rules
+from lull.study import stats
 from lull.judge.replayed import Block, LawMethod, Method, Replay, ggn
 
 GGN = os.path.abspath(os.path.join(os.environ.get("BUILD", "build"), "bin", "ggn"))
@@ -37,6 +38,11 @@ def test_correlations():
     assert math.isnan(stats.pearson(x, [5] * 4)) and near(stats.spearman(x, y), 1)
     assert near(stats.spearman(x, [1, 1, 2, 3]), 4.5 / math.sqrt(5 * 4.5))  # ranks 1.5 1.5 3 4
     assert [stats.quantile([4, 1, 3, 2], q) for q in (0.25, 0.5, 1)] == [1.75, 2.5, 4] and math.isnan(stats.quantile([], 0.5))
+    one = [0.3, 0.1 + 0.2, 0.3, math.nextafter(0.3, 0)]  # rounded otherwise, as another compiler does
+    assert all(math.isnan(f(x, one)) and math.isnan(f(one, x)) for f in (stats.pearson, stats.spearman))
+    assert near(stats.spearman(x, [1, math.nextafter(1, 0), 2, 3]), 4.5 / math.sqrt(5 * 4.5))
+    assert stats.ranks([1, 1 + 2**-24, math.inf, math.inf]) == [1, 2, 3.5, 3.5]  # floats are not
+    assert stats.auc(one, [0, 0, 1, 1]) == stats.best_accuracy(one, [0, 0, 1, 1]) == 0.5
     assert stats.auc([0.1, 0.4, 0.35, 0.8], [0, 0, 1, 1]) == 0.75 and stats.auc([1] * 4, [0, 0, 1, 1]) == 0.5
     assert math.isnan(stats.auc([1, 2], [1, 1]))
     assert stats.best_accuracy([0.1, 0.4, 0.35, 0.8], [0, 0, 1, 1]) == 0.75 and stats.best_accuracy([1] * 4, [0, 0, 1, 1]) == 0.5

@@ -88,7 +88,30 @@ for name in pipe.png zero.png; do
 done
 sed 's/part.pbrt/pipe.pbrt/' whole.pbrt >including.pbrt
 refused "not a regular file" "$P" including.pbrt -q -o a.exr
-refused "not a file" "$P" "$here/room.pbrt" -q -c ./pipe -o a.exr
+refused "not a regular file" "$P" "$here/room.pbrt" -q -c ./pipe -o a.exr
+mkdir oidn && mkfifo oidn/libOpenImageDenoise.so.2
+for library in ./pipe pipe /dev/zero oidn; do
+    refused "not a regular file" env LULL_OIDN=$library timeout 60 "$P" "$here/room.pbrt" -q --size 8x8 --spp 1 --denoise -o a.exr
+done
+for bad_file in pipe /dev/zero .; do refused "not a regular file" timeout 60 "$bin/lull-plot" $bad_file -o a.png; done
+printf 'view,threshold,stop,censored\na,5,6,0\nb,50,70,0\n' >stops.csv
+t "lull-plot reads what a program writes" sh -c "cat stops.csv | $bin/lull-plot /dev/stdin -o a.png"
+mkdir study && mkfifo study/study.json
+refused "not a regular file" timeout 60 "$bin/lull-study" status study
+refused "not a regular file" timeout 60 "$bin/lull-report" pipe -o a.html
+
+# --- shared objects: what is wrong with them, and not with something else ---
+cp "$bin/../lib/lull/null.so" other.so
+printf '\377' | dd of=other.so bs=1 seek=18 conv=notrunc 2>/dev/null # e_machine of the ELF header
+refused "./other.so: a shared object for another processor" "$P" "$here/room.pbrt" -q -c ./other.so -o a.exr
+refused "other.so: a shared object for another processor" env LULL_OIDN=other.so "$P" "$here/room.pbrt" -q --size 8x8 --spp 1 --denoise -o a.exr
+head -c 5000 "$bin/../lib/lull/null.so" >other.so
+refused "other.so: a shared object that was cut short" env LULL_OIDN=other.so "$P" "$here/room.pbrt" -q --size 8x8 --spp 1 --denoise -o a.exr
+case ${BUILD:-build} in */asan | */tsan) ;; *) # a sanitizer reserves more addresses
+    cp "$here/../../scenes/textures/bricks.png" flipped.png
+    (ulimit -v 70000 && exec "$ggn" flip flipped.png flipped.png) >out 2>err
+    t "no room for the image library: out of memory" sh -c "[ $? = 1 ] && [ \$(wc -l <err) = 1 ] && grep -q 'out of memory' err" ;;
+esac
 mkdir data && mkfifo data/manifest.json
 refused "not a regular file" "$ggn" reconstruct data -o a.png
 

@@ -163,6 +163,7 @@ def test_roc():
     right = sum((a > b) + (a == b) / 2 for a, n in zip(score, noisy) for b, m in zip(score, noisy) if n == 1 and m == 0)
     assert abs(((x[1:] - x[:-1]) * (y[1:] + y[:-1])).sum() / 2 - right / 12) < 1e-12
     assert len(x) == 5 and (x[0], y[0], x[-1], y[-1]) == (0, 0, 1, 1)  # equal scores are one step
+    assert len(kinds.roc_curve([0.3, 0.1 + 0.2], [1, 0])[0]) == 2  # nor are they two when they were rounded otherwise
     x, y = kinds.roc_curve([2, 1], [1, 1])
     assert not x.any() and y[-1] == 1  # nothing is converged
 
@@ -171,7 +172,8 @@ def test_regression():
     """the regression is least squares, by hand"""
     a, b, r = kinds.regression(np.array([1., 2, 3, 4]), np.array([2., 4, 6, 9]))
     assert max(abs(b - 2.3), abs(a - (5.25 - 2.3 * 2.5)), abs(r - 11.5 / math.sqrt(5 * 26.75))) < 1e-12
-    assert math.isnan(kinds.regression(np.array([1., 1]), np.array([2., 3]))[1])
+    for same in ([1., 1], [0.3, 0.1 + 0.2]):
+        assert math.isnan(kinds.regression(np.array(same), np.array([2., 3]))[1])
 
 
 def test_blocks():

@@ -53,5 +53,22 @@ t "a denoiser that crashes: status not 0, one line, and the noisy picture is the
     sh -c "[ $status -ne 0 ] && [ \$(wc -l <err) = 1 ] && grep -q 'the picture is the noisy one: Open Image Denoise' err"
 plane crash.exr R,G,B c.exr && plane uniform.exr noisy.R,noisy.G,noisy.B u.exr
 t "  …with the samples that were taken" same c.exr u.exr
+
+# A denoiser that never ends, until somebody asks the program to.
+asked() { # asked SIGNAL ARGUMENTS...: the status after the signal, which comes while a picture is denoised
+    rm -f begun
+    sent=$1; shift
+    OIDN_STUB=endless OIDN_STUB_BEGUN=$PWD/begun timeout 100 "$P" "$@" >out 2>err & pid=$!
+    until [ -e begun ] || ! kill -0 $pid 2>/dev/null; do sleep 0.1; done
+    kill -"$sent" $pid; wait $pid; status=$?
+}
+for s in TERM INT; do
+    asked $s $picture --spp 8 --denoise -o asked.exr --report asked.json
+    t "SIG$s while the last picture is denoised: 130, one line" sh -c "[ $status = 130 ] && [ \$(wc -l <err) = 1 ] && grep -q 'the noisy one: interrupted' err"
+    plane asked.exr R,G,B c.exr
+    t "  …and the noisy picture is there, the report says interrupted" sh -c "oiiotool --fail 0 --warn 0 c.exr u.exr --diff && grep -q '\"interrupted\":[[:space:]]*true' asked.json"
+done
+asked TERM $picture --spp 8 --denoise --frames 1-2 -o frame_%d.exr
+t "  …of a frame of a shot: none is there, which would say that it is done" sh -c "[ $status = 130 ] && ! ls frame_* && [ ! -s err ]"
 echo "1..$n"
 exit $bad

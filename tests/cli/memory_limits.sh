@@ -35,6 +35,21 @@ swept() {
     done
     t "$name" sh -c 'cat "$1" && [ ! -s "$1" ]' - "$tmp/bad"
 }
+# The stack: threads have their own, whatever its limit.
+small() { # small STATUS COMMAND...: what it does with a stack of 100 KB
+    want=$1
+    shift
+    (ulimit -c 0 && ulimit -s 100 && exec "$@" >"$tmp/said" 2>"$tmp/err")
+    [ $? = "$want" ] && if [ "$want" = 0 ]; then [ ! -s "$tmp/err" ]; else [ "$(wc -l <"$tmp/err")" = 1 ]; fi
+}
+mkdir "$tmp/out"
+t "lull-render with a small stack" small 0 "$BUILD/bin/lull-render" $room -q --size 32x32 -t 3 -c ggn --spp-max 32 -o "$tmp/out/a.exr" --html "$tmp/out/a.html"
+t "  …lull-report" small 0 "$BUILD/bin/lull-report" "$tmp/out/a.exr" -o "$tmp/out/b.html"
+t "  …ggn, which starts a Python" small 0 "$BUILD/bin/ggn" evaluate -d $data -w 4
+t "  …ggn, which reads pictures" small 0 "$BUILD/bin/ggn" flip scenes/textures/bricks.png scenes/textures/bricks.png
+t "  …lull-check" small 0 "$BUILD/bin/lull-check" -q -o requirements "$BUILD/lib/lull/ggn.so"
+t "  …lull-plot says so" small 1 "$BUILD/bin/lull-plot" "$tmp/none.csv" -o "$tmp/out/a.png"
+t "  …and may raise it" sh -c "ulimit -S -s 100 && ! '$BUILD/bin/lull-plot' '$tmp/none.csv' -o '$tmp/out/a.png' 2>'$tmp/err'; grep -q 'No such file' '$tmp/err'"
 "$BUILD/bin/lull-render" $room -q --size 32x32 --spp 4 -o "$tmp/a.exr" --report "$tmp/a.json"
 "$BUILD/bin/lull-render" $room -q --size 32x32 --spp 64 --seed 2 -o "$tmp/b.exr"
 for c in observer halfbuf ggn denoised noise-mask; do

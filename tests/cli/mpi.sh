@@ -99,7 +99,7 @@ t "  …the checkpoint goes on, with one process" "$P" $long --checkpoint c.ckp 
 t "  …to the same image" same long.exr part.exr
 
 begin 2
-kill -INT "$(pid_of 0)"
+signal INT 0
 n=$((n + 1)); wait $job; status=$?
 if [ $status -eq 130 ]; then echo "ok $n - interrupted at rank 0"; else echo "not ok $n - interrupted at rank 0 ($status)"; bad=1; fi
 t "  …the image so far is there" test -s part.exr

@@ -3,6 +3,9 @@
  * that reads and writes JSON for it, fails once. Not by starting the program again: it forks there, the child is refused the memory
  * and goes on to its end, the parent waits and has it. Of child K the folder $OOM_FOLDER holds K.out and K.err; `log` has K and its
  * wait status.
+ *
+ * With OOM_FROM=N nothing is forked: from the Nth allocation after the program's first one on, whoever asks, all fail; OOM_COUNT=FILE
+ * gets their number.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -45,11 +48,36 @@ static void to_file(int fd, const char *folder, const char *kind)
     close(file);
 }
 
+static long count, from;
+
+static int is_over(void *caller)
+{
+    if (!from && concerns(caller))
+        from = atol(getenv("OOM_FROM"));
+    return from && __sync_add_and_fetch(&count, 1) >= from;
+}
+
+__attribute__((destructor)) static void tell(void)
+{
+    const char *path = getenv("OOM_COUNT");
+    FILE *file = path ? fopen(path, "w") : NULL;
+    if (file) {
+        fprintf(file, "%ld\n", count);
+        fclose(file);
+    }
+}
+
 /* In a child that is to go on without the memory: 1. */
 static int refused(void *caller)
 {
     const char *folder = getenv("OOM_FOLDER");
     size_t s = ((size_t)caller >> 1) % SITES;
+    if (!busy && getenv("OOM_FROM")) {
+        busy = !from;
+        const int over = is_over(caller);
+        busy = 0;
+        return over;
+    }
     if (busy || in_child || !folder || !concerns(caller))
         return 0;
     while (site[s].caller && site[s].caller != caller)

@@ -35,6 +35,11 @@ for closed in "<&-" "<&- >&-" "<&- >&- 2>&-"; do
     t "  …whole, and nothing besides" sh -c 'oiiotool --info b.exr | grep -q " 8 x  *8, " && grep -q "^room;2;$" b.csv && ls -A && ! ls -A | grep tmp'
 done
 rm -f b.exr b.csv
+for closed in "2>&-" "<&- >&- 2>&-"; do
+    for command in "$ggn compare none none" "$ggn inspect none" "$P none" "$bin/lull-report none -o b.html" "$bin/lull-check --nonsense"; do
+        t "refused with $closed" sh -c "$command $closed; [ \$? = 2 ]"
+    done
+done
 
 # --- the soft limit of processor time: the picture so far, as after Ctrl-C ---
 t "a render that has used up its processor time" sh -c "ulimit -S -t 1; $long -t 2 --size 32x32 -o b.exr --checkpoint b.ckp; [ \$? -eq 130 ]"
@@ -230,6 +235,25 @@ if [ -c /dev/full ]; then
     full "$bin/lull-check" --list
     full "$bin/lull-check" --version
 fi
+
+# --- whoever reads standard output may stop reading, as head does: no word, the status of SIGPIPE, caught, ignored or not ---
+mkfifo unread && exec 4<>unread && exec 5>unread && exec 4<&-
+unread() { n=$((n + 1)); "$@" >&5 2>err; status=$?; (trap '' PIPE; exec "$@" >&5 2>err2); ignored=$?
+    if [ $status -eq 141 ] && [ $ignored -eq 141 ] && [ ! -s err ] && [ ! -s err2 ]; then echo "ok $n - unread: $*"
+    else echo "not ok $n - unread: $* (status $status, ignored $ignored)"; sed 's/^/# /' err err2; bad=1; fi; }
+unread "$ggn" --help
+unread "$ggn" flip a.png a.png
+unread "$ggn" inspect m.ggn
+unread "$ggn" label data
+unread "$ggn" compare stops.csv stops.csv
+unread "$P" --version
+unread "$P" --list-criteria
+unread "$P" room.pbrt -q --debug-path 3,3,0
+unread "$P" room.pbrt -q --size 32x32 -c halfbuf --spp-max 32 --quote
+unread "$bin/lull-check" --list
+unread "$bin/lull-check" -q -o table halfbuf
+for program in lull-plot lull-report lull-study; do unread "$bin/$program" --help; done
+exec 5>&-
 
 # --- a preview while rendering ---
 "$P" room.pbrt -q -c null --spp-max 100000000 --preview early.png & early=$!

@@ -219,7 +219,7 @@ static void a_picture(void **state)
     subject = *state;
     know();
     if (pt_render_create(&config, NULL, kernel, pool, criterion, &r, &err) || pt_render_run(r, &hooks, &outcome, &err) ||
-        pt_denoised_make(r, PT_PICTURE_BLEND, NULL, NULL, &made, &err))
+        pt_denoised_make(r, PT_PICTURE_BLEND, NULL, NULL, NULL, &made, &err))
         fail_msg("%s", err.text);
     assert_int_equal(r->totals->failed_checks, 0);
     for (uint32_t i = 0; i < r->blocks->count; i++) {

@@ -727,6 +727,35 @@ def test_outputs():
     assert json.loads(Path(tmp("o.json")).read_text())["criterion"]["params"]["threshold"] == "0.02"
 
 
+def test_names_in_locale_c():
+    """names that are not ASCII are UTF-8 where the locale has none: a renderer's own Python in the locale C"""
+    script = """if True:
+        import sys
+        import lull
+        from lull import checkpoint, outputs
+        from renderer import Noise
+        assert sys.getfilesystemencoding() == "ascii"
+        frame = lull.Frame(lull.load("halfbuf"), width=32, height=16, block=16, spp_max=64)
+        d = lull.Driver(frame, Noise([[.01, .5]]))
+        name, scene = sys.argv[1] + "/b\\u00fcro", "zimmer-\\u00fc.blend"  # bytes that ASCII has not, and a name from Unicode
+        lull.files.check_outputs([lull.files.Output("-o", name + ".exr", (".exr",))], [scene])
+        d.run()
+        written, failed = lull.files.write_each([
+            (name + ".exr", lambda p: outputs.write_exr(p, d, scene)), (name + ".json", lambda p: outputs.write_report(p, d, scene, scene)),
+            (name + ".html", lambda p: outputs.write_page(p, d, scene)), (name + ".csv", lambda p: outputs.write_stop_map(p, frame, scene)),
+            (name + ".npz", lambda p: checkpoint.save(p, d))])
+        assert len(written) == 5 and not failed, failed
+        assert outputs.is_ours(name + ".exr") and checkpoint.is_one(name + ".npz")
+    """
+    folder = tmp("b\u00fc")
+    os.mkdir(folder)
+    env = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    done = subprocess.run([sys.executable, "-c", script, folder], env=env, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert sorted(os.listdir(folder)) == [f"b\u00fcro.{e}" for e in ("csv", "exr", "html", "json", "npz")]
+    assert json.loads(Path(folder, "b\u00fcro.json").read_text())["scene"] == "zimmer-\u00fc.blend"
+
+
 def pictures_of(page):
     """The PNG files of a page of lull-report, written to the temporary folder, by layer."""
     found = re.findall(r'data-layer="([^"]*)" src="data:image/png;base64,([^"]*)"', Path(page).read_text())

@@ -6,7 +6,7 @@
  *     no-device, commit (fails when a filter is committed), crash (there), memory (fails when one is executed), endless,
  *     auxiliary (albedo + normal), despeckle (the box where a value is more than four times its mean)
  *
- * Albedo or normal alone become their box: clean auxiliaries.
+ * endless makes the file OIDN_STUB_BEGUN first, if that is set. Albedo or normal alone become their box: clean auxiliaries.
  *
  * It also refuses what the real library would take in silence and get wrong: pictures that are not finite, no inputScale.
  */
@@ -244,6 +244,9 @@ void oidnExecuteFilter(void *filter)
         fail(f->device, INVALID_ARGUMENT, "a picture is not finite or out of its range");
     if (kind == MEMORY)
         fail(f->device, OUT_OF_MEMORY, "the stub was told to have none");
+    const char *begun = getenv("OIDN_STUB_BEGUN");
+    if (kind == ENDLESS && begun)
+        fclose(fopen(begun, "w"));
     while (kind == ENDLESS)
         pause();
     for (size_t y = 0, k = 0; y < in->height && !f->device->error; y++)

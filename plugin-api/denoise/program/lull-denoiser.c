@@ -2,6 +2,8 @@
  * lull-denoiser: runs Open Image Denoise for another process of ours, as often as it asks; see denoise/oidn.h, shared.h. The
  * library comes by dlopen: a dozen prototypes of ours, no header of theirs. One thread calls it.
  */
+#include "base/module.h"
+#include "base/threads.h"
 #include "denoise/program/shared.h"
 
 #include <dlfcn.h>
@@ -49,73 +51,77 @@ static const char *const how_to_get_it = "lull-denoiser-setup fetches it, script
 
 static const char *const file_name = "libOpenImageDenoise.so.2";
 
-/* path: the library or a folder that holds it, itself or in lib/. */
-static void *open_at(const char *path)
+/* path: the library or a folder that holds it, itself or in lib/. *err says why there is none: BASE_EINVAL if nothing is
+ * there. */
+static void *open_at(const char *path, struct base_err *err)
 {
     static const char *const forms[] = {"%s/%s", "%s/lib/%s"};
     struct stat s;
-    char full[4096];
-    void *library = NULL;
-    if (stat(path, &s) != 0)
-        return NULL;
-    if (!S_ISDIR(s.st_mode))
-        return dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    for (size_t i = 0; i < 2 && !library; i++)
+    char full[4200];
+    if (stat(path, &s) == 0 && !S_ISDIR(s.st_mode)) {
+        snprintf(full, sizeof full, "%s%.4096s", strchr(path, '/') ? "" : "./", path);
+        return base_module_open(full, RTLD_NOW | RTLD_LOCAL, err);
+    }
+    for (size_t i = 0; i < 2; i++)
         if (snprintf(full, sizeof full, forms[i], path, file_name) < (int)sizeof full && stat(full, &s) == 0)
-            library = dlopen(full, RTLD_NOW | RTLD_LOCAL);
-    return library;
+            return base_module_open(full, RTLD_NOW | RTLD_LOCAL, err);
+    base_fail(err, BASE_EINVAL, "no such file");
+    return NULL;
 }
 
 /* oidn/ beside this program, or up to five folders above it. */
-static void *open_nearby(void)
+static void *open_nearby(struct base_err *err)
 {
     char folder[4096], path[4200];
     void *library = NULL;
     ssize_t n = readlink("/proc/self/exe", folder, sizeof folder - 1);
-    if (n <= 0)
-        return NULL;
-    folder[n] = '\0';
-    for (int up = 0; up < 6 && !library; up++) {
+    folder[n > 0 ? n : 0] = '\0';
+    for (int up = 0; up < 6 && !library && err->code == BASE_EINVAL; up++) {
         char *slash = strrchr(folder, '/');
         if (!slash)
             break;
         *slash = '\0';
         snprintf(path, sizeof path, "%s/oidn", folder);
-        library = open_at(path);
+        library = open_at(path, err);
     }
     return library;
 }
 
 /* Where lull-denoiser-setup puts it. */
-static void *open_fetched(void)
+static void *open_fetched(struct base_err *err)
 {
     const char *data = getenv("XDG_DATA_HOME"), *home = getenv("HOME");
     char path[4200];
-    void *library = NULL;
     if (data && *data == '/')
         snprintf(path, sizeof path, "%.4000s/lull/oidn", data);
     else
         snprintf(path, sizeof path, "%.4000s/.local/share/lull/oidn", home && *home == '/' ? home : "/nonexistent");
-    library = open_at(path);
-    return library ? library : open_at("/usr/local/lib/lull/oidn");
+    void *library = open_at(path, err);
+    return library || err->code != BASE_EINVAL ? library : open_at("/usr/local/lib/lull/oidn", err);
+}
+
+/* At the usual places. The first one that has a file decides, whether or not that can be loaded. */
+static void *search(struct base_err *err)
+{
+    void *library = base_module_open(file_name, RTLD_NOW | RTLD_LOCAL, err);
+    if (library || err->code == BASE_ENOMEM)
+        return library;
+    err->code = BASE_EINVAL; /* the system has none */
+    library = open_nearby(err);
+    return library || err->code != BASE_EINVAL ? library : open_fetched(err);
 }
 
 static void *find(const char *path, struct base_err *err)
 {
-    const char *named = *path ? path : getenv("LULL_OIDN");
-    if (named && *named) {
-        void *library = open_at(named);
-        if (!library) {
-            const char *why = dlerror();
-            base_fail(err, BASE_EINVAL, "%s: no Open Image Denoise 2 there (%s)", named, why ? why : "no such file");
-        }
-        return library;
-    }
-    void *library = dlopen(file_name, RTLD_NOW | RTLD_LOCAL);
-    library = library ? library : open_nearby();
-    library = library ? library : open_fetched();
-    if (!library)
-        base_fail(err, BASE_EINVAL, "no Open Image Denoise: %s", how_to_get_it);
+    const char *from = *path ? path : getenv("LULL_OIDN"), *named = from && *from ? from : NULL;
+    struct base_err why = {0};
+    void *library = named ? open_at(named, &why) : search(&why);
+    if (!library && why.code == BASE_ENOMEM)
+        base_fail_nomem(err, "Open Image Denoise");
+    else if (!library && named)
+        base_fail(err, BASE_EINVAL, "%.200s: no Open Image Denoise 2 there (%.200s)", named, why.text);
+    else if (!library)
+        base_fail(err, BASE_EINVAL, "no Open Image Denoise: %s", why.code == BASE_EINVAL ? how_to_get_it : why.text);
     return library;
 }
 
@@ -307,7 +313,7 @@ static void serve(struct library *library, const char *path, struct shared *s)
     s->text[sizeof s->text - 1] = '\0';
 }
 
-int main(int argc, char **argv)
+static int run_program(int argc, char **argv)
 {
     struct library library = {0}; /* to the end: its threads outlive their device for a moment */
     pthread_t watch;
@@ -330,3 +336,5 @@ int main(int argc, char **argv)
     }
     return 0;
 }
+
+int main(int argc, char **argv) { return base_threads_main(argc, argv, run_program); }

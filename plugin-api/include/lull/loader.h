@@ -2,9 +2,9 @@
  *
  * lull/loader.h - the host's side: find, load and check criteria (lull/criterion.h).
  *
- * Not part of the ABI: liblull-host.so has it (lull/host.h), or a host compiles src/ in. Stateless; a library once loaded
- * is never unloaded (a criterion's static tables live for ever, and unloading code that may have registered anything with
- * the runtime is not safe).
+ * Not part of the ABI: liblull-host.so has it (lull/host.h), or a host compiles src/ in, with base/module.c and base/err.c.
+ * Stateless; a library once loaded is never unloaded (a criterion's static tables live for ever, and unloading code that may
+ * have registered anything with the runtime is not safe).
  * Every library is loaded RTLD_NOW | RTLD_LOCAL, so that all its symbols resolve and none reaches other libraries.
  *
  * Threads: calls may overlap, but the check that loading changes neither the floating-point control register nor the

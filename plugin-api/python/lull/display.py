@@ -10,7 +10,7 @@ from __future__ import annotations
 import ctypes as C
 
 from .host import HostFrame
-from .library import call, library
+from .library import call, encoded, library
 
 
 class Display:
@@ -19,7 +19,7 @@ class Display:
 
     def __init__(self, frame: HostFrame, address: str, name: str = "lull"):
         self.frame, self._pointer = frame, C.c_void_p()
-        call("host_display_open", frame.handle.pointer, address.encode(), name.encode(), C.byref(self._pointer))
+        call("host_display_open", frame.handle.pointer, address.encode(), encoded(name), C.byref(self._pointer))
 
     def update(self) -> None:
         """Between samples, as often as one likes: it copies what has changed four times a second at most."""

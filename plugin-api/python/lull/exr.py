@@ -2,6 +2,7 @@
 """OpenEXR scan-line files of float channels: ZIP-compressed ones are written, uncompressed ones are read."""
 from __future__ import annotations
 
+import os
 import struct
 import zlib
 from typing import Mapping, Optional, Union
@@ -69,10 +70,16 @@ def write(path: str, channels: Mapping[str, np.ndarray], size: tuple[int, int], 
         file.write(head + offsets.astype("<u8").tobytes() + b"".join(chunks))
 
 
+def _bytes(path: str, most: int = -1) -> bytes:
+    if os.path.exists(encoded(path)) and not os.path.isfile(encoded(path)):  # a FIFO that nobody writes to would be waited for
+        raise ValueError(f"{path}: not a regular file")
+    with open(encoded(path), "rb") as file:
+        return file.read(most)
+
+
 def read(path: str) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
     """All channels by name, [h, w] float32, of an uncompressed file; its data window's origin (x, y)."""
-    with open(encoded(path), "rb") as file:
-        data = file.read()
+    data = _bytes(path)
     try:
         return _decode(data)
     except (ValueError, struct.error, KeyError, IndexError) as error:
@@ -81,8 +88,7 @@ def read(path: str) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
 
 def texts(path: str) -> dict[str, str]:
     """The attributes that are text."""
-    with open(encoded(path), "rb") as file:
-        return {name: value.decode(errors="replace") for name, kind, value in _head(file.read(1 << 16))[0] if kind == "string"}
+    return {name: value.decode(errors="replace") for name, kind, value in _head(_bytes(path, 1 << 16))[0] if kind == "string"}
 
 
 def _head(data: bytes) -> tuple[list[tuple[str, str, bytes]], int]:

@@ -110,7 +110,7 @@ def _report(driver: Driver, scene: str, kernel: str, interrupted: bool, mask: Op
         if denoised else {}
     return abi.sized(
         abi.HostReport, flags=flags, scene=encoded(scene), mask=None if mask is None else encoded(mask),
-        kernel=kernel.encode(), threads=driver.threads, processes=1, film_pixels=frame.view.pixels, scene_bytes=math.nan,
+        kernel=encoded(kernel), threads=driver.threads, processes=1, film_pixels=frame.view.pixels, scene_bytes=math.nan,
         film_bytes=sum(a.nbytes for a in frame.arrays().values()), phases=C.cast(phases, C.c_void_p),
         phase_count=len(phases), **kept)
 

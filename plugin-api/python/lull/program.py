@@ -97,6 +97,20 @@ def _end(command: str, status: int, why: str) -> int:
     return status or (UNREAD if unread else 0)
 
 
+def _lacks_stack() -> str:
+    """Why the libraries that draw would end by a signal: they take half a megabyte of the stack. Its limit is raised if it
+    may be."""
+    import resource  # not on Windows, whose Blender loads this file, too
+    usual, least = 8 << 20, 1 << 20
+    soft, hard = resource.getrlimit(resource.RLIMIT_STACK)
+    if soft == resource.RLIM_INFINITY or soft >= least:
+        return ""
+    if hard != resource.RLIM_INFINITY and hard < least:
+        return f"the stack may grow to {hard >> 10} KB only (ulimit -s): expected at least {least >> 10}"
+    resource.setrlimit(resource.RLIMIT_STACK, (usual if hard == resource.RLIM_INFINITY else min(usual, hard), hard))
+    return ""
+
+
 def say(text: str, out: Optional[TextIO] = None, end: str = "\n") -> None:
     """Prints a line, if that can be: a render is worth more than what it says. out: default standard error."""
     out = out or sys.stderr
@@ -107,13 +121,14 @@ def say(text: str, out: Optional[TextIO] = None, end: str = "\n") -> None:
 
 def run(command: str, work: Callable[[], Optional[int]], packages: str = "") -> int:
     """Does the work and says what stopped it, in one line that begins with `command`. packages: how to get what it imports.
-    The exit status: what the work returns, None being 0; 1 out of memory; 2 refused, or an output could not be written; 130
+    The exit status: what the work returns, None being 0; 1 out of memory or of stack; 2 refused, or an output could not be written; 130
     interrupted; 141, as by SIGPIPE, where nobody reads its output to the end."""
     status, why = 0, ""
     with _streams():
         _know_all_letters()
         try:
-            status = work() or 0
+            lacking = _lacks_stack() if packages else ""
+            status, why = (1, lacking) if lacking else (work() or 0, "")
         except Refused as error:
             status, why = 2, str(error)
         except ImportError as error:

@@ -97,7 +97,7 @@ class Watched:
         name = preview_name(report)
         path = self.inside(name) if name else None
         try:
-            if path is None or path.stat().st_size > MOST_BYTES:
+            if path is None or not path.is_file() or path.stat().st_size > MOST_BYTES:
                 return None
             data = path.read_bytes()
         except OSError:

@@ -6,9 +6,10 @@ import math
 import os
 from typing import Any, NamedTuple, Optional, Sequence
 
+from ..study import stats
 from ..study.files import Refused, make_folder, replaced
 from ..study.options import Command, Option, block_size, real
-from . import rules, stats
+from . import rules
 from .options import protect
 from .replayed import ggn
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any, Callable, Optional, Sequence
 
+from ..study import stats
 from ..study.files import Refused, print_json, replaced
 from ..study.options import Command, Option, real, word
-from . import rules, stats
+from . import rules
 from .options import HOW, JUDGES, THRESHOLDS, WHERE, forwarded, inputs_of, needed, protect
 from .replayed import SPLITS, Block, Method, Replay
 

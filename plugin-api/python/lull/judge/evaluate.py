@@ -6,12 +6,12 @@ import math
 import os
 from typing import Any, Optional, Sequence
 
+from ..study import stats
 from ..study.files import Refused, make_folder, print_json, replaced
 from ..study.options import Command, Option, integer, real
-from . import stats
+from ..study.stats import NAN
 from .options import HOW, JUDGES, POLICY, SCENES, THRESHOLDS, WHERE, forwarded, inputs_of, needed, protect
 from .replayed import SPLITS, Method, Replay
-from .stats import NAN
 
 REPLAYED = (*WHERE, *SCENES, *JUDGES, *POLICY, *HOW)
 COMMAND = Command(

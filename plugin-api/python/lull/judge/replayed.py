@@ -9,8 +9,8 @@ import sys
 from typing import Any, Callable, Optional, Sequence
 
 from ..study.files import Refused, loads
+from ..study.stats import NAN, quantile
 from . import rules
-from .stats import NAN, quantile
 
 SPLITS = ("train", "validation", "test", "people", "none")
 

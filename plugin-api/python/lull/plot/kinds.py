@@ -9,6 +9,7 @@ from typing import Any, Callable, Iterable, Sequence
 import numpy as np
 
 from ..study.files import Refused
+from ..study.stats import TIE, pearson, tied
 from .canvas import Figure, LogNorm, MaxNLocator, ScalarMappable
 from .charts import COLOURS, Chart, Rule, Series, figure_of, new_figure
 from .sources import Blocks, Cost, Evaluation, Table, Wanted
@@ -50,7 +51,8 @@ def roc_curve(score: Sequence[float], noisy: Sequence[int]) -> tuple[np.ndarray,
     """Shares of converged and of noisy windows whose score is at least a cut, from (0, 0) on."""
     order = np.argsort(-np.asarray(score, float), kind="stable")
     falling, labels = np.asarray(score, float)[order], np.asarray(noisy)[order]
-    ends = np.append(np.flatnonzero(np.diff(falling)), len(falling) - 1)  # equal scores are called together
+    steps = ~np.isclose(falling[1:], falling[:-1], rtol=TIE, atol=0)
+    ends = np.append(np.flatnonzero(steps), len(falling) - 1)  # equal scores are called together
     hits, misses = np.cumsum(labels == 1)[ends], np.cumsum(labels == 0)[ends]
     shares = [np.append(0, n / n[-1]) if n[-1] else np.zeros(len(n) + 1) for n in (misses, hits)]
     return shares[0], shares[1]
@@ -101,8 +103,8 @@ def regression(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
     """Least squares y = a + b x, and Pearson's r; NaN where x, or y, is all the same."""
     mx, my = x - x.mean(), y - y.mean()
     xx, yy, xy = mx @ mx, my @ my, mx @ my
-    b = xy / xx if xx > 0 else math.nan
-    return y.mean() - b * x.mean(), b, xy / math.sqrt(xx * yy) if xx * yy > 0 else math.nan
+    b = math.nan if tied(x.min(), x.max()) else xy / xx
+    return y.mean() - b * x.mean(), b, pearson(x.tolist(), y.tolist())
 
 
 def scatter(source: Any, wanted: Wanted) -> Figure:

@@ -7,6 +7,7 @@ import json
 import math
 import os
 import re
+import stat
 from typing import Any, Iterator, TextIO
 
 from ..program import Refused
@@ -54,9 +55,22 @@ def print_json(value: Any, pretty: bool, depth: int = 0) -> str:
 
 # --- reading ---
 
+def _open(path: str, flags: int) -> int:
+    """Waits for nothing, as a FIFO that nobody writes to would; a shell's <(…) or | ends with its writer."""
+    descriptor = os.open(path, flags | os.O_NONBLOCK)
+    mode = os.fstat(descriptor).st_mode
+    if stat.S_ISREG(mode):
+        return descriptor
+    if stat.S_ISFIFO(mode) and os.path.realpath(path).startswith("/proc/"):
+        os.set_blocking(descriptor, True)
+        return descriptor
+    os.close(descriptor)
+    raise Refused(f"{path}: not a regular file")
+
+
 def read_file(path: str, most: int) -> bytes:
     try:
-        with open(path, "rb") as file:
+        with open(path, "rb", opener=_open) as file:
             data = file.read(most + 1)
     except OSError as error:
         raise Refused(f"{path}: {error.strerror}") from None

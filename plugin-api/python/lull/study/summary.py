@@ -9,10 +9,10 @@ from typing import Optional
 
 import numpy as np
 from scipy.special import ndtri
-from scipy.stats import rankdata
 
 from .people import Cell, People
 from .psychometric import Estimate, t975, wilson
+from .stats import pearson, spearman
 
 NAN = math.nan
 
@@ -130,12 +130,6 @@ class Ceiling:
     within_one_lower: float = NAN
 
 
-def pearson(x: np.ndarray, y: np.ndarray) -> float:
-    """NaN where one of them does not vary."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return float(np.corrcoef(x, y)[0, 1]) if np.ptp(x) > 0 and np.ptp(y) > 0 else NAN
-
-
 def ceiling(people: People) -> Ceiling:
     table, figures, c = estimates(people), [], Ceiling()
     for person, own in enumerate(table):
@@ -147,8 +141,9 @@ def ceiling(people: People) -> Ceiling:
         for name, rest in (("lower", others), ("upper", table)):
             mean = np.nanmean(rest[:, known], 0)
             errors = np.abs(own[known] - mean)
-            of_person |= {"pearson_" + name: pearson(own[known], mean), "median_abs_log2_" + name: np.median(errors),
-                          "spearman_" + name: pearson(rankdata(own[known]), rankdata(mean))}
+            pair = own[known].tolist(), mean.tolist()
+            of_person |= {"pearson_" + name: pearson(*pair), "median_abs_log2_" + name: np.median(errors),
+                          "spearman_" + name: spearman(*pair)}
             if name == "lower":
                 of_person |= {"within_half_lower": np.mean(errors <= 0.5), "within_one_lower": np.mean(errors <= 1.0)}
         figures.append(of_person)

@@ -6,6 +6,7 @@ import math
 from typing import Any, Sequence
 
 NAN = math.nan
+TIE = 1e-12  # of a value: above what rounding does to sums of thousands
 
 
 def mean(x: Sequence[float]) -> float:
@@ -22,11 +23,16 @@ def quantile(x: Sequence[float], q: float) -> float:
     return x[i] + (at - i) * (x[i + 1] - x[i]) if i + 1 < len(x) else x[-1]
 
 
+def tied(a: float, b: float) -> bool:
+    """Whether two values are one, however they were rounded on the way."""
+    return math.isclose(a, b, rel_tol=TIE)
+
+
 def pearson(x: Sequence[float], y: Sequence[float]) -> float:
     mx, my = mean(x), mean(y)
     xy = sum((a - mx) * (b - my) for a, b in zip(x, y))
     xx, yy = sum((a - mx) * (a - mx) for a in x), sum((b - my) * (b - my) for b in y)
-    return xy / math.sqrt(xx * yy) if xx > 0 and yy > 0 else NAN
+    return NAN if not xx * yy > 0 or tied(min(x), max(x)) or tied(min(y), max(y)) else xy / math.sqrt(xx * yy)
 
 
 def ranks(x: Sequence[float]) -> list[float]:
@@ -34,7 +40,7 @@ def ranks(x: Sequence[float]) -> list[float]:
     order, rank, i = sorted(range(len(x)), key=x.__getitem__), [0.0] * len(x), 0
     while i < len(x):
         j = i + 1
-        while j < len(x) and x[order[j]] == x[order[i]]:
+        while j < len(x) and tied(x[order[j]], x[order[i]]):
             j += 1
         for k in order[i:j]:
             rank[k] = 0.5 * (i + j + 1)
@@ -60,7 +66,7 @@ def best_accuracy(score: Sequence[float], label: Sequence[int]) -> float:
     right = best = sum(label)  # below all scores: everything is called 1
     for i, (value, one) in enumerate(pairs):
         right += -1 if one else 1
-        if i + 1 == len(pairs) or pairs[i + 1][0] != value:
+        if i + 1 == len(pairs) or not tied(pairs[i + 1][0], value):
             best = max(best, right)
     return best / len(pairs) if pairs else NAN
 
