@@ -198,5 +198,5 @@ void base_process_release(struct base_process *c)
         munmap(c->memory, c->bytes);
     if (c->memory_fd >= 0)
         close(c->memory_fd);
-    *c = (struct base_process){.memory_fd = -1, .caller_fd = -1, .life_fd = -1};
+    *c = (struct base_process)BASE_PROCESS_NONE;
 }

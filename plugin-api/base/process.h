@@ -29,6 +29,11 @@ struct base_process {
     unsigned char asked; /* the last question */
 };
 
+#define BASE_PROCESS_NONE \
+    { \
+        .memory_fd = -1, .caller_fd = -1, .life_fd = -1 \
+    }
+
 int base_process_init(struct base_process *child, const char *name, struct base_err *err);
 /* Memory of so many bytes, zero where it grows. BASE_ENOMEM, and it is as before. */
 int base_process_resize(struct base_process *child, size_t bytes, struct base_err *err);
