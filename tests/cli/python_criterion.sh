@@ -183,8 +183,13 @@ outlived() { # outlived SIGNAL
     until [ -s pids ] || ! kill -0 $host; do sleep 0.05; done
     kill -"$1" $host
     wait $host
+    tries=0
     for pid in $(cat pids); do
-        while [ -e "/proc/$pid" ] && ! grep -q '^State:.Z' "/proc/$pid/status" 2>/dev/null; do sleep 0.05; done
+        while [ -e "/proc/$pid" ] && ! grep -q '^State:.Z' "/proc/$pid/status" 2>/dev/null; do
+            tries=$((tries + 1))
+            [ $tries -lt 1200 ] || { kill -KILL "$pid"; echo "$pid is left"; return 1; }
+            sleep 0.1
+        done
     done
 }
 t "a host that is killed takes its python3 along, and what that has started" outlived KILL
