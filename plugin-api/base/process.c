@@ -19,7 +19,7 @@ enum { ASK_EVERY_MS = 20, ITS_END_MS = 1000 };
 
 extern char **environ;
 
-/* The program finds its own descriptors below 10. */
+/* The program finds its own descriptors below 10; and where standard streams are closed, nothing else is to be one. */
 static int above_those(int low)
 {
     int fd = low < 0 ? -1 : fcntl(low, F_DUPFD_CLOEXEC, 10);
@@ -114,13 +114,13 @@ static int connect_both(struct base_process *c, int ends[2])
     int sockets[2], pipes[2];
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, sockets) != 0)
         return errno;
-    c->caller_fd = sockets[0];
+    c->caller_fd = above_those(sockets[0]);
     ends[0] = above_those(sockets[1]);
-    if (ends[0] < 0 || pipe2(pipes, O_CLOEXEC) != 0)
+    if (c->caller_fd < 0 || ends[0] < 0 || pipe2(pipes, O_CLOEXEC) != 0)
         return errno;
-    c->life_fd = pipes[1];
+    c->life_fd = above_those(pipes[1]);
     ends[1] = above_those(pipes[0]);
-    return ends[1] < 0 ? errno : 0;
+    return c->life_fd < 0 || ends[1] < 0 ? errno : 0;
 }
 
 static int start(struct base_process *c, char *const *arguments, struct base_err *err)

@@ -146,6 +146,9 @@ sys.stdout.close(); sys.stderr.close()
 threading.Thread(target=lambda: time.sleep(1000)).start()
 os.chdir("/"); os.environ.clear()
 E2
+printf 'requires = ["color"]\ndef check(block):\n    print("x" * 100)\n    return block.spp > 20\n' >prints.py
+t "no standard streams" sh -c "'$P' $blocks -c prints.py -o n.exr --report n.json <&- >&- 2>&-"
+t "  ...and the blocks stop" [ "$(says n.json '{b["reason"] for b in r["blocks"]}')" = "{'criterion'}" ]
 
 # --- without what it takes
 rm -f out err

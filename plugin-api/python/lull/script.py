@@ -269,9 +269,11 @@ def main() -> None:
     nowhere = os.open(os.devnull, os.O_RDWR)
     os.dup2(nowhere, 0)
     try:
+        os.write(2, b"")
         os.dup2(2, 1)  # what it prints is no output of the renderer
-    except OSError:
+    except OSError:  # which has no standard error
         os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
     sys.stdout, own = sys.stderr, os.getpid()
     warnings.simplefilter("ignore", RuntimeWarning)
     signal.signal(signal.SIGALRM, _alarm)
