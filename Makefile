@@ -77,6 +77,7 @@ INC_plugin-api_src     := $(API) $(BASE)
 INC_plugin-api_tools   := $(API) $(BASE)
 INC_plugin-api_report  := $(API) $(BASE)
 INC_plugin-api_host    := $(API) $(BASE)
+INC_plugin-api_script  := $(API) $(BASE)
 INC_pathtracer         := -Ipathtracer $(BASE) $(EXR_CFLAGS)
 INC_pathtracer_geom    := $(INC_pathtracer) -DPT_EMBREE=$(EMBREE)# the only folder that knows Embree
 INC_pathtracer_render  := $(INC_pathtracer) $(API)# with app/ the only hosts of criteria
@@ -135,7 +136,8 @@ EXAMPLES := $(BIN)/host-example
 DENOISER := $(OUT)/lib/lull/modules/lull-denoiser# a program that denoise/oidn.h runs
 IMAGES   := $(OUT)/lib/lull/modules/lull-images.so
 JUDGE    := $(OUT)/lib/lull/modules/ggn-judge# what ggn starts for the commands that are Python
-MODULES  := $(DENOISER) $(MPI_MODULE) $(IMAGES) $(JUDGE)
+SCRIPTS  := $(OUT)/lib/lull/modules/lull-python.so# criteria that are Python files
+MODULES  := $(DENOISER) $(MPI_MODULE) $(IMAGES) $(JUDGE) $(SCRIPTS)
 CRITERIA := $(EXAMPLE_SRC:plugin-api/examples/%.c=$(LIB)/%.so) $(GGN_ENTRIES:ggn/plugin/entry_%.c=$(LIB)/%.so)
 TESTS    := $(patsubst tests/%.c,$(OUT)/tests/%,$(TEST_SRC))
 SANE     := $(patsubst tests/%.c,build/asan/tests/%,$(SANE_SRC))
@@ -178,6 +180,7 @@ $(OBJ)/%.c.double.o: %.c
 
 # What it takes in by .incbin no compiler lists.
 $(OBJ)/plugin-api/host/page.c.o: plugin-api/host/page.html
+$(OBJ)/plugin-api/script/script.c.o: plugin-api/python/lull/script.py
 
 $(OBJ)/%.cpp.o: %.cpp
 	@mkdir -p $(@D)
@@ -209,6 +212,8 @@ $(IMAGES): $(call o,$(IMAGES_SRC)) $(OBJ)/base.a
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(IMAGE_LIBS) -lz -lm -o $@
 $(DENOISER): $(call o,$(wildcard plugin-api/denoise/program/*.c)) $(OBJ)/base.a
 	$(link) $^ $(LDFLAGS_ALL) -ldl -lm -o $@
+$(SCRIPTS): $(call o,$(wildcard plugin-api/script/*.c)) $(OBJ)/base.a
+	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL -Wl,-z,defs $^ $(LDFLAGS_ALL) -lm -o $@
 $(OUT)/lib/lull/modules/lull-mpi.so: $(call o,$(MPI_SRC)) $(OBJ)/base.a
 	@mkdir -p $(@D); echo "  SO   $@"; $(CC) -shared -Wl,--exclude-libs,ALL $^ $(LDFLAGS_ALL) $(MPI_LIBS) -lm -o $@
 # As the wheel and the Blender extension carry them: for systems that have the C library and zlib, and without symbols.
@@ -217,7 +222,7 @@ BUNDLE := $(OUT)/bundle/lib
 CARRIED := denoised fixed ggn halfbuf observer variance
 BESIDE := $(BUNDLE)/libcjson.so.1 $(BUNDLE)/libpng16.so.16
 BUNDLED := $(BUNDLE)/liblull-host.so.1 $(BESIDE) $(CARRIED:%=$(BUNDLE)/lull/%.so) $(BUNDLE)/lull/lull-3.ggn \
-    $(BUNDLE)/lull/modules/lull-denoiser
+    $(BUNDLE)/lull/modules/lull-denoiser $(BUNDLE)/lull/modules/lull-python.so
 $(BUNDLE)/liblull-host.so.1: BASE_LIBS += -s -Wl,-rpath,'$$ORIGIN'
 $(BUNDLE)/lull/ggn.so: GGN_LIBS += -s -Wl,-rpath,'$$ORIGIN/..'
 $(BUNDLE)/lull/ggn.so: $(OBJ)/ggn/plugin/entry_ggn.c.o $(OBJ)/ggn-plugin.a $(OBJ)/ggn.a plugin-api/plugin.map

@@ -267,7 +267,7 @@ static const char *const exr[] = {"exr", NULL}, *const png[] = {"png", NULL}, *c
 const struct base_option pt_cli_options[] = {
     {.help = "When to stop:"},
     {"criterion", 'c', "NAME|PATH[:ID]", TO(criterion),
-     .help = "Stopping criterion: a name (see --list-criteria) or a shared object; default observer"},
+     .help = "Stopping criterion: a name (see --list-criteria), a shared object or a Python file; default observer"},
     {"visible", 0, "SHARE", .set = set_visible,
      .help = "Stop a block when at most this share of viewers would still see noise, of criteria that can tell (observer "
              "and denoised: default 0.35, ggn: the model's own)"},

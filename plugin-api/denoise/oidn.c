@@ -1,37 +1,25 @@
-#define _GNU_SOURCE /* dladdr, memfd_create */
+#define _GNU_SOURCE /* dladdr */
 #include "denoise/oidn.h"
 
 #include <dlfcn.h>
-#include <errno.h>
-#include <fcntl.h>
 #include <float.h>
 #include <limits.h>
 #include <math.h>
-#include <poll.h>
-#include <signal.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <sys/socket.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/process.h"
 #include "denoise/program/shared.h"
 
-enum { ASK_EVERY_MS = 20 };
-
-extern char **environ;
-
 struct lull_oidn {
+    struct base_process child;
     char program[PATH_MAX + 64], *library; /* owns library, "": the usual places */
-    int memory_fd;
-    struct shared *shared; /* NULL: nothing is prepared */
-    size_t bytes;
-    pid_t pid;      /* of the program; 0: it does not run */
-    int program_fd; /* the connection to it, or -1 */
+    int prepared;
 };
+
+static struct shared *shared_of(const struct lull_oidn *o) { return o->child.memory; }
 
 /* The file that this code is in, as it was loaded or what that links to; a program that was found by PATH only knows its
  * own name. 0: no telling. */
@@ -63,101 +51,18 @@ static int find_program(struct lull_oidn *o, struct base_err *err)
                      "no program lull-denoiser in lib/lull/modules: is this tree built, or installed, as a whole?");
 }
 
-static void end_program(struct lull_oidn *o)
-{
-    int status;
-    if (o->program_fd >= 0)
-        close(o->program_fd);
-    if (o->pid > 0 && waitpid(o->pid, &status, WNOHANG) == 0) { /* else it has ended, and its number may be another's */
-        kill(o->pid, SIGKILL);
-        waitpid(o->pid, &status, 0);
-    }
-    o->program_fd = -1;
-    o->pid = 0;
-}
-
-/* `caller` is the program's end of the connection. Returns an errno. The memory's descriptor is neither of those that the
- * program finds. */
-static int spawn(struct lull_oidn *o, int caller)
-{
-    char *arguments[] = {o->program, o->library, NULL};
-    posix_spawn_file_actions_t actions;
-    int why = posix_spawn_file_actions_init(&actions);
-    if (why)
-        return why;
-    why = posix_spawn_file_actions_adddup2(&actions, caller, SHARED_CALLER);
-    if (!why)
-        why = posix_spawn_file_actions_adddup2(&actions, o->memory_fd, SHARED_MEMORY);
-    if (!why)
-        why = posix_spawn(&o->pid, o->program, &actions, NULL, arguments, environ);
-    posix_spawn_file_actions_destroy(&actions);
-    return why;
-}
-
-static int start_program(struct lull_oidn *o, struct base_err *err)
-{
-    int ends[2];
-    int why = socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) == 0 ? 0 : errno;
-    if (!why) {
-        o->program_fd = ends[0];
-        why = spawn(o, ends[1]);
-        close(ends[1]);
-    }
-    if (!why)
-        return 0;
-    o->pid = 0;
-    end_program(o);
-    return why == ENOMEM ? base_fail_nomem(err, "lull-denoiser")
-                         : base_fail(err, BASE_EIO, "cannot run %s: %s", o->program, strerror(why));
-}
-
-/* Waits for the program's answer, or until it is no longer wanted. */
-static int wait_for(const struct lull_oidn *o, int (*cancelled)(void *data), void *data, struct base_err *err)
-{
-    struct pollfd answer = {.fd = o->program_fd, .events = POLLIN};
-    char byte;
-    while (poll(&answer, 1, ASK_EVERY_MS) <= 0)
-        if (cancelled && cancelled(data))
-            return base_fail(err, BASE_ECANCELLED, "cancelled");
-    if (recv(o->program_fd, &byte, 1, 0) == 1)
-        return 0;
-    return base_fail(err, BASE_EINVAL, "Open Image Denoise ended its process: a crash, or no memory");
-}
-
-/* The program does what the shared memory says. One that has ended is started anew, one that fails is ended. */
+/* The program does what the shared memory says. One that fails is ended. */
 static int ask_program(struct lull_oidn *o, int (*cancelled)(void *data), void *data, struct base_err *err)
 {
-    int status;
-    struct shared *s = o->shared;
-    if (o->pid > 0 && waitpid(o->pid, &status, WNOHANG) != 0)
-        end_program(o);
-    int rc = o->pid > 0 ? 0 : start_program(o, err);
-    if (rc)
-        return rc;
-    send(o->program_fd, "", 1, MSG_NOSIGNAL); /* that it is gone is seen by waiting */
-    rc = wait_for(o, cancelled, data, err);
+    char *arguments[] = {o->program, o->library, NULL};
+    struct shared *s = shared_of(o);
+    int rc = base_process_ask(&o->child, arguments, 0, cancelled, data, err);
     s->text[sizeof s->text - 1] = '\0';
-    if (!rc && s->code)
+    if (!rc && s->code) {
         rc = base_fail(err, s->code, "%s", s->text);
-    if (rc)
-        end_program(o);
+        base_process_end(&o->child);
+    }
     return rc;
-}
-
-static void drop_memory(struct lull_oidn *o)
-{
-    if (o->shared)
-        munmap(o->shared, o->bytes);
-    o->shared = NULL;
-}
-
-/* The program finds its own descriptors below 10. */
-static int create_memory(void)
-{
-    int low = memfd_create("lull-denoiser", MFD_CLOEXEC), fd = low < 0 ? -1 : fcntl(low, F_DUPFD_CLOEXEC, 10);
-    if (low >= 0)
-        close(low);
-    return fd;
 }
 
 int lull_oidn_prepare(struct lull_oidn *o, const struct lull_oidn_form *form, struct base_err *err)
@@ -165,24 +70,20 @@ int lull_oidn_prepare(struct lull_oidn *o, const struct lull_oidn_form *form, st
     const size_t around = 2 * (size_t)form->margin;
     const size_t width = (size_t)form->width + around, height = (size_t)form->height + around;
     const size_t pictures = SHARED_PICTURES * 3 * width * height;
-    void *memory = MAP_FAILED;
-    drop_memory(o);
-    o->bytes = sizeof *o->shared + pictures * sizeof(float);
-    if (ftruncate(o->memory_fd, 0) == 0 && posix_fallocate(o->memory_fd, 0, (off_t)o->bytes) == 0)
-        memory = mmap(NULL, o->bytes, PROT_READ | PROT_WRITE, MAP_SHARED, o->memory_fd, 0);
-    if (memory == MAP_FAILED)
+    o->prepared = 0;
+    if (base_process_resize(&o->child, sizeof(struct shared) + pictures * sizeof(float), NULL) != 0)
         return base_fail_nomem(err, "the denoiser's pictures");
-    o->shared = memory;
-    o->shared->form = *form;
-    o->shared->form.width = (int32_t)width;
-    o->shared->form.height = (int32_t)height;
+    o->prepared = 1;
+    shared_of(o)->form = *form;
+    lull_oidn_resize(o, form->width, form->height);
     return 0;
 }
 
 void lull_oidn_resize(struct lull_oidn *o, int32_t width, int32_t height)
 {
-    o->shared->form.width = width + 2 * o->shared->form.margin;
-    o->shared->form.height = height + 2 * o->shared->form.margin;
+    struct lull_oidn_form *form = &shared_of(o)->form;
+    form->width = width + 2 * form->margin;
+    form->height = height + 2 * form->margin;
 }
 
 int lull_oidn_open(const char *library, struct lull_oidn **out, struct base_err *err)
@@ -190,10 +91,10 @@ int lull_oidn_open(const char *library, struct lull_oidn **out, struct base_err 
     struct lull_oidn *o = calloc(1, sizeof *o);
     if (!o)
         return base_fail_nomem(err, "Open Image Denoise");
-    o->program_fd = -1;
-    o->memory_fd = create_memory();
+    int rc = base_process_init(&o->child, "Open Image Denoise", err);
     o->library = strdup(library ? library : "");
-    int rc = o->library && o->memory_fd >= 0 ? find_program(o, err) : base_fail_nomem(err, "Open Image Denoise");
+    if (!rc)
+        rc = o->library ? find_program(o, err) : base_fail_nomem(err, "Open Image Denoise");
     if (!rc)
         rc = lull_oidn_prepare(o, &(struct lull_oidn_form){.threads = 1}, err);
     if (!rc)
@@ -202,7 +103,7 @@ int lull_oidn_open(const char *library, struct lull_oidn **out, struct base_err 
         lull_oidn_close(o);
         return rc;
     }
-    drop_memory(o);
+    o->prepared = 0;
     *out = o;
     return 0;
 }
@@ -211,10 +112,7 @@ void lull_oidn_close(struct lull_oidn *o)
 {
     if (!o)
         return;
-    end_program(o);
-    drop_memory(o);
-    if (o->memory_fd >= 0)
-        close(o->memory_fd);
+    base_process_release(&o->child);
     free(o->library);
     free(o);
 }
@@ -248,8 +146,8 @@ static void take(struct shared *s, int which, float *to)
 int lull_oidn_run(struct lull_oidn *o, const struct lull_oidn_pictures *p, int (*cancelled)(void *data), void *data,
                   struct base_err *err)
 {
-    struct shared *s = o->shared;
-    if (!s)
+    struct shared *s = shared_of(o);
+    if (!o->prepared)
         return base_fail(err, BASE_EINVAL, "Open Image Denoise is not prepared");
     for (s->colors = 0; s->colors < LULL_OIDN_COLORS && p->color[s->colors]; s->colors++)
         clean(p->color[s->colors], &s->form, 0.0f, FLT_MAX, shared_picture(s, SHARED_COLOR + s->colors));

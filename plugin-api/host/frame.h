@@ -136,7 +136,7 @@ void lull_host_withdraw(struct lull_host_criterion *criterion);
 /* A line to the renderer's log, of LULL_LOG_INFO once a frame, and, of this or worse, for the report; the first warning
  * without a log is kept for lull_host_pass_warning. */
 void lull_host_say(struct lull_host_criterion *criterion, int32_t level, const char *text);
-/* "criterion ID: ", `what` and its message as one line; returns its code. */
+/* "criterion ID: ", `what` and its message as one line, for the report, too; returns its code. */
 int32_t lull_host_blame(const struct lull_host_criterion *criterion, const char *what, int32_t code,
                         const struct lull_error *why, struct lull_error *err);
 /* Passes a warning that was logged nowhere to err, once, with the code LULL_OK; returns LULL_OK. */

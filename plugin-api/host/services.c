@@ -15,16 +15,6 @@ static void copy_line(char *to, size_t room, const char *text)
         *at = iscntrl((unsigned char)*at) ? ' ' : *at;
 }
 
-int32_t lull_host_blame(const struct lull_host_criterion *c, const char *what, int32_t code, const struct lull_error *why,
-                        struct lull_error *err)
-{
-    char whole[sizeof why->message + 1], text[sizeof whole];
-    memcpy(whole, why->message, sizeof why->message);
-    whole[sizeof why->message] = '\0'; /* it may have forgotten that */
-    copy_line(text, sizeof text, whole);
-    return lull_error_set(err, code < LULL_OK ? code : LULL_E_INTERNAL, "criterion %s: %s%s", c->table->id, what, text);
-}
-
 /* Whether it is new. */
 static int keep_message(struct lull_host_criterion *c, const char *line)
 {
@@ -37,6 +27,18 @@ static int keep_message(struct lull_host_criterion *c, const char *line)
         snprintf(c->messages[c->message_count++], LULL_HOST_LINE, "%s", line);
     pthread_mutex_unlock(&c->messages_lock);
     return i == count;
+}
+
+int32_t lull_host_blame(const struct lull_host_criterion *c, const char *what, int32_t code, const struct lull_error *why,
+                        struct lull_error *err)
+{
+    char whole[sizeof why->message + 1], text[sizeof whole], line[LULL_HOST_LINE];
+    memcpy(whole, why->message, sizeof why->message);
+    whole[sizeof why->message] = '\0'; /* it may have forgotten that */
+    copy_line(text, sizeof text, whole);
+    snprintf(line, sizeof line, "criterion %s: %s%s", c->table->id, what, text);
+    keep_message((void *)(uintptr_t)c, line);
+    return lull_error_set(err, code < LULL_OK ? code : LULL_E_INTERNAL, "%s", line);
 }
 
 void lull_host_say(struct lull_host_criterion *c, int32_t level, const char *text)

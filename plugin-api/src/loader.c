@@ -250,6 +250,60 @@ static int32_t open_path(const struct lull_search *search, const char *path, con
     return LULL_OK;
 }
 
+/* A Python file is run by a module of ours (../script), which lies in a folder of the directories, or of the usual ones. */
+static void *script_symbol(const struct lull_search *search, const char *name, struct lull_error *err)
+{
+    static const char file[] = "modules/lull-python.so";
+    const struct lull_search usual = {0};
+    char path[LULL_PATH_MAX];
+    if (!find_file(search, file, "", path) && !find_file(&usual, file, "", path)) {
+        lull_error_set(err, LULL_E_IO, "no %s in the criterion directories: is this tree built, or installed, as a whole?",
+                       file);
+        return NULL;
+    }
+    void *module = dlopen(path, RTLD_NOW | RTLD_LOCAL), *symbol = module ? dlsym(module, name) : NULL;
+    const char *why = symbol ? NULL : dlerror();
+    if (!symbol)
+        lull_error_set(err, LULL_E_IO, "cannot load: %s", why ? why : path);
+    return symbol;
+}
+
+static int32_t open_script(const struct lull_search *search, const char *path, const char *id, struct lull_found *found,
+                           struct lull_error *err)
+{
+    struct lull_error why = {.struct_size = sizeof why};
+    const struct lull_criterion *criterion;
+    int32_t (*find)(const char *path, const struct lull_criterion **out, struct lull_error *err);
+    if (!is_file(path))
+        return lull_error_set(err, LULL_E_IO, "%s: %s", path, access(path, F_OK) != 0 ? "no such file" : "not a file");
+    void *symbol = script_symbol(search, "lull_script_find", err);
+    if (!symbol)
+        return LULL_E_IO;
+    memcpy(&find, &symbol, sizeof symbol);
+    int32_t status = find(path, &criterion, &why);
+    if (status != LULL_OK)
+        return lull_error_set(err, status, "%s", why.message);
+    status = lull_table_check(criterion, &why);
+    if (status != LULL_OK)
+        return lull_error_set(err, status, "%s: %s", path, why.message);
+    if (id && strcmp(id, criterion->id) != 0)
+        return lull_error_set(err, LULL_E_KEY, "%s: holds no criterion with the id %s, but %s", path, id, criterion->id);
+    found->criterion = criterion;
+    snprintf(found->path, sizeof found->path, "%s", path);
+    return LULL_OK;
+}
+
+int32_t lull_answer_scripts(void (*answer)(void *request, uint64_t bytes), struct lull_error *err)
+{
+    void *symbol = script_symbol(NULL, "lull_script_answer_here", err);
+    void (*tell)(void (*answer)(void *request, uint64_t bytes));
+    if (!symbol)
+        return LULL_E_IO;
+    memcpy(&tell, &symbol, sizeof symbol);
+    tell(answer);
+    return LULL_OK;
+}
+
 struct name_query {
     const char *id;
     struct lull_found *found;
@@ -300,9 +354,10 @@ int32_t lull_open(const struct lull_search *search, const char *spec, struct lul
     }
     if (id && (*id == '\0' || *base == '\0'))
         return lull_error_set(err, LULL_E_INVALID, "%s: a criterion is named NAME, PATH or PATH:ID", spec);
-    if (!strchr(base, '/') && !has_suffix(base, ".so"))
+    const int script = has_suffix(base, ".py");
+    if (!strchr(base, '/') && !script && !has_suffix(base, ".so"))
         return open_name(search, base, id, found, err);
     char path[LULL_PATH_MAX + 2]; /* without a '/' dlopen would search the system's directories */
     snprintf(path, sizeof path, "%s%s", strchr(base, '/') ? "" : "./", base);
-    return open_path(search, path, id, found, err);
+    return (script ? open_script : open_path)(search, path, id, found, err);
 }

@@ -322,6 +322,8 @@ int32_t lc_state_save(const struct lull_state *state, const struct lc_session *s
 
 /* The entry of a library that the loader has accepted before; NULL if that fails. */
 lull_entry_fn lc_entry(const char *path);
+/* A Python file has no entry: the loader makes its table. */
+int lc_is_script(const char *path);
 
 /* The i-th parameter of the criterion. */
 const struct lull_param *lc_param(const struct lc *c, uint32_t i);

@@ -70,9 +70,10 @@ static void short_session(struct lc *c)
 
 void lc_check_leaks(struct lc *c)
 {
-    repeat(c, create_destroy, 50, "create and destroy");
+    const int fewer = lc_is_script(c->path) ? 10 : 1; /* an instance is a process */
+    repeat(c, create_destroy, 50 / fewer, "create and destroy");
     repeat(c, failing_create, 100, "a failing create");
-    repeat(c, short_session, 10, "a frame with RESTART");
+    repeat(c, short_session, 10 / fewer, "a frame with RESTART");
 }
 
 /* create and begin_frame with the k-th allocation failing, for every k: an error or success, never a crash or a leak. */

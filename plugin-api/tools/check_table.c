@@ -22,6 +22,8 @@ lull_entry_fn lc_entry(const char *path)
     return entry;
 }
 
+int lc_is_script(const char *path) { return base_file_has_ending(path, "py"); }
+
 const struct lull_param *lc_param(const struct lc *c, uint32_t i)
 {
     return (const void *)((const char *)c->criterion->params + (size_t)i * c->criterion->param_stride);
@@ -82,6 +84,10 @@ void lc_check_symbols(struct lc *c)
     char *data;
     size_t size;
     int entries = -1;
+    if (lc_is_script(c->path)) {
+        lc_skip(c, "a Python file exports nothing");
+        return;
+    }
     if (base_file_read(c->path, SIZE_MAX, &data, &size, NULL) == 0) {
         entries = look_at_exports(c, &(struct bytes){data, size});
         free(data);
@@ -119,6 +125,10 @@ void lc_check_load(struct lc *c)
 
 void lc_check_entry(struct lc *c)
 {
+    if (lc_is_script(c->path)) {
+        lc_skip(c, "a Python file has none");
+        return;
+    }
     lull_entry_fn entry = lc_entry(c->path);
     uint32_t count = 0;
     for (; count < 1000 && entry(count); count++)

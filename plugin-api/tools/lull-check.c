@@ -82,7 +82,7 @@ static const struct base_options options = {
     .doc =
         "Holds stopping criteria against the whole contract of lull/criterion.h."
         "\vCRITERION is NAME (looked for in LULL_PLUGIN_PATH and in lib/lull beside this program), PATH (every criterion of "
-        "the library) or PATH:ID. Each check runs in a process of its own; the output is TAP.\n\n"
+        "the library, or a Python file) or PATH:ID. Each check runs in a process of its own; the output is TAP.\n\n"
         "Exit status: 0 all checks passed, 1 one failed, 2 wrong usage or no such criterion."};
 
 /* In a child: reports the path and then the ids to check as notes; refuses what is no criterion. */
@@ -105,9 +105,9 @@ static void find(struct lc *c, const void *arg)
     lc_note(c, "%s", found.path);
     const char *id = found.criterion->id;
     size_t length = strlen(spec), id_length = strlen(id);
-    int is_path = strchr(spec, '/') || (length > 3 && strcmp(spec + length - 3, ".so") == 0);
+    int is_path = !lc_is_script(found.path) && (strchr(spec, '/') || (length > 3 && strcmp(spec + length - 3, ".so") == 0));
     int names_id = length > id_length && spec[length - id_length - 1] == ':' && strcmp(spec + length - id_length, id) == 0;
-    lull_entry_fn entry = lc_entry(found.path);
+    lull_entry_fn entry = is_path ? lc_entry(found.path) : NULL;
     if (!is_path || names_id)
         lc_note(c, "%s", id);
     else
@@ -119,8 +119,11 @@ static void find(struct lc *c, const void *arg)
 static int find_table(struct lc *c, const char *id)
 {
     lc_doing(c, "in loading the library, or in its entry");
-    lull_entry_fn entry = lc_entry(c->path);
-    c->criterion = NULL;
+    lull_entry_fn entry = lc_is_script(c->path) ? NULL : lc_entry(c->path);
+    struct lull_found found = {0};
+    if (!entry)
+        lull_open(&(struct lull_search){0}, c->path, &found, NULL);
+    c->criterion = found.criterion;
     for (uint32_t i = 0; entry && !c->criterion && entry(i); i++)
         if (strcmp(entry(i)->id, id) == 0)
             c->criterion = entry(i);

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+import lull
 import tap
 from tap import Skip
 
@@ -25,7 +26,7 @@ PAGES = ["README.md", *map(str, sorted(Path("docs").rglob("*.md"))), "plugin-api
 
 # Shell snippets, by page and place: what is run of them. A regular expression: lines that are not, and why.
 NOT_HERE = r"tev|scripts/setup|lull-denoiser-setup|python3 -m lull\.blender"  # a viewer with a window; from the network; tests/hosts/test_blender_command.py
-RUN = {("docs/denoised.md", 1): NOT_HERE, ("docs/quote.md", 1): None, ("docs/shots.md", 1): None, ("docs/watching.md", 1): NOT_HERE,
+RUN = {("docs/denoised.md", 1): NOT_HERE, ("docs/python-criterion.md", 1): "lull-check", ("docs/quote.md", 1): None, ("docs/shots.md", 1): None, ("docs/watching.md", 1): NOT_HERE,
        ("docs/watching.md", 3): NOT_HERE, ("plugin-api/README.md", 1): None}
 # Those of which only the words are checked, and where they are run, or why not.
 CHECKED = {("README.md", 1): "tests/packages/readme.sh", ("docs/hosts.md", 1): "tests/hosts/test_blender_command.py, tests/packages/wheel.sh",
@@ -35,7 +36,7 @@ CHECKED = {("README.md", 1): "tests/packages/readme.sh", ("docs/hosts.md", 1): "
            ("docs/results/scale.md", 3): "a measurement, hours", ("docs/study.md", 1): "a server, a training; tests/cli/lull_study.sh, ggn_train.sh",
            ("docs/watching.md", 2): "a server; tests/cli/watch.sh",
            ("plugin-api/python/README.md", 1): "tests/packages/wheel.sh"}
-CODE = {("docs/denoised.md", "python", 1), ("docs/hosts.md", "python", 1), ("docs/hosts.md", "python", 2), ("docs/hosting.md", "cpp", 1), ("plugin-api/README.md", "c", 1),
+CODE = {("docs/denoised.md", "python", 1), ("docs/hosts.md", "python", 1), ("docs/hosts.md", "python", 2), ("docs/hosting.md", "cpp", 1), ("docs/python-criterion.md", "python", 1), ("plugin-api/README.md", "c", 1),
         ("plugin-api/README.md", "c", 2), ("plugin-api/README.md", "c", 3), ("plugin-api/README.md", "cpp", 1), ("plugin-api/README.md", "rust", 1), ("plugin-api/python/README.md", "python", 1), ("plugin-api/python/README.md", "python", 2)}
 
 
@@ -100,6 +101,17 @@ def test_python_of_the_package():
         names = {"my_renderer": mine, "sums": mine.sums, "half_sums": mine.half_sums}
         exec(small(FOUND["plugin-api/python/README.md", "python", 2]), names)
         assert not names["frame"].active and {b.reason for b in names["frame"].blocks} == {"criterion"}
+
+
+def test_python_criterion():
+    """docs/python-criterion.md: the criterion of the page stops blocks"""
+    with elsewhere():
+        Path("mine.py").write_text(FOUND["docs/python-criterion.md", "python", 1])
+        with lull.load("mine.py", threshold=.02) as criterion:
+            frame = lull.Frame(criterion, 96, 64, spp_max=256)
+            mine = Renderer()
+            result = lull.Driver(frame, lambda rects, first, count, half: [mine(*r, (*r[:2], first), count) for r in rects], warn=print).run()
+            assert result.outcome == "done" and {b.reason for b in frame.blocks} == {"criterion"}
 
 
 def test_python_of_the_denoiser():
@@ -294,7 +306,8 @@ def set_up(folder):
     (folder / "bin/lull-render").chmod(0o755)
     for name in ("lull-report", "lull-check"):
         os.symlink(BUILD / "bin" / name, folder / "bin" / name)
-    os.symlink(ROOT / "scenes", "scenes")
+    for name in ("scenes", "plugin-api"):
+        os.symlink(ROOT / name, name)
     for name in ("examples", "include", "plugin.map"):
         os.symlink(ROOT / "plugin-api" / name, name)
     for name in ("scene", "SCENE", "room", "room_0007", "room_0008"):

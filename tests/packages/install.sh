@@ -10,6 +10,8 @@ t "a renderer that finds its criteria" sh -c "cd $tmp && $at/bin/lull-render $ro
 t "the same picture as from the build tree" sh -c "$BUILD/bin/lull-render $room --preview $tmp/b.png && cmp $tmp/a.png $tmp/b.png"
 t "networks that find their models" "$at/bin/lull-render" $room -c ggn -o "$tmp/c.exr"
 t "modules that the programs find" sh -c "$at/bin/ggn flip scenes/demo-reference.png scenes/demo-reference.png && [ -x $at/lib/lull/modules/lull-denoiser ]"
+t "  …criteria that are Python files among them" sh -c "python3 -c 'import numpy' || exit 0
+    cd $tmp && $at/bin/lull-render $room -c $repo/plugin-api/examples/dammertz.py -o d.exr"
 t "a study, with the pictures of ggn and the words of its page" sh -c "$at/bin/lull-study init $tmp/study --task thresholds --views \
     tests/data/recorded/train/one-view0 --asked-by Ada --contact here && [ -s $tmp/study/texts.json ] && [ -s $tmp/study/stimuli/v0/b0-8.png ]"
 t "a picture of numbers" sh -c "printf 'view;block;threshold;censored;stop;score\\na;0;100;0;110;\\na;1;200;0;190;\\n' >$tmp/stops.csv && $at/bin/lull-plot $tmp/stops.csv -o $tmp/stops.png && [ -s $tmp/stops.png ]"

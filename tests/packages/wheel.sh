@@ -32,7 +32,7 @@ wheel.extractall(folder)
 minor = int(re.search(r"-py3-none-manylinux_2_(\d+)_x86_64[.]whl$", sys.argv[1])[1])
 elf = [path for path in Path(folder).rglob("*") if path.is_file() and path.read_bytes()[:4] == b"\x7fELF"]
 names = {path.name for path in elf}
-assert len(elf) == 10, names
+assert len(elf) == 11, names
 assert "lull/py.typed" in wheel.namelist(), "type checkers would not look at its types"
 assert len([name for name in wheel.namelist() if name.endswith(".ggn")]) == 1, "a model of before is no part of it"
 for path in elf:
@@ -89,6 +89,7 @@ else n=$((n + 1)); echo "ok $n - python -m lull.blender # SKIP no blender: make 
 extras() { for e in denoise:pyoidn mitsuba:mitsuba luxcore:pyluxcore blender:bpy plot:matplotlib study:aiohttp; do
     unzip -p "$wheel" '*/METADATA' | grep -q "^Requires-Dist: ${e#*:}.*extra == \"${e%:*}\"" || return; done; }
 t "the extras denoise, mitsuba, luxcore, blender, plot and study" extras
+t "a criterion that is a Python file" sh -c "$python -c 'import lull; assert lull.load(\"plugin-api/examples/dammertz.py\").info.id == \"dammertz\"'"
 t "one version everywhere" sh -c "$python -c 'import lull; print(lull.__version__)' | grep -qxF \"\$(build/bin/lull-render --version | sed -n '1s/.* //p')\" &&
     unzip -p $wheel '*/METADATA' | grep -qxF \"Version: \$($python -c 'import lull; print(lull.__version__)')\""
 t "the programs' and the packages'" sh -c "head -n 1 debian/changelog | grep -qF \"(\$($python -c 'import lull; print(lull.__version__)'))\""

@@ -18,6 +18,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/process.h"
+
 /* Of the library's C interface, version 2: what is used here. */
 enum { DEVICE_CPU = 1, FORMAT_FLOAT3 = 3, ERROR_MEMORY = 4, MAJOR_VERSION = 2 };
 typedef void *device_t;
@@ -289,7 +291,7 @@ static int denoise(struct library *o, const char *path, struct shared *s, struct
 static void *end_with_caller(void *unused)
 {
     (void)unused;
-    struct pollfd caller = {.fd = SHARED_CALLER};
+    struct pollfd caller = {.fd = BASE_PROCESS_CALLER};
     while (!caller.revents)
         poll(&caller, 1, -1);
     _exit(0);
@@ -299,10 +301,10 @@ static void *end_with_caller(void *unused)
 static struct shared *map(size_t *bytes)
 {
     struct stat size;
-    if (fstat(SHARED_MEMORY, &size) != 0 || (size_t)size.st_size < sizeof(struct shared))
+    if (fstat(BASE_PROCESS_MEMORY, &size) != 0 || (size_t)size.st_size < sizeof(struct shared))
         return MAP_FAILED;
     *bytes = (size_t)size.st_size;
-    return mmap(NULL, *bytes, PROT_READ | PROT_WRITE, MAP_SHARED, SHARED_MEMORY, 0);
+    return mmap(NULL, *bytes, PROT_READ | PROT_WRITE, MAP_SHARED, BASE_PROCESS_MEMORY, 0);
 }
 
 static void serve(struct library *library, const char *path, struct shared *s)
@@ -328,10 +330,10 @@ static int run_program(int argc, char **argv)
     signal(SIGINT, SIG_IGN); /* whoever runs it is asked to end, and ends it */
     signal(SIGHUP, SIG_IGN);
     signal(SIGTERM, SIG_IGN);
-    while (read(SHARED_CALLER, &byte, 1) == 1 && (s = map(&bytes)) != MAP_FAILED) {
+    while (read(BASE_PROCESS_CALLER, &byte, 1) == 1 && (s = map(&bytes)) != MAP_FAILED) {
         serve(&library, argv[1], s);
         munmap(s, bytes);
-        if (write(SHARED_CALLER, &byte, 1) != 1)
+        if (write(BASE_PROCESS_CALLER, &byte, 1) != 1)
             return 1;
     }
     return 0;

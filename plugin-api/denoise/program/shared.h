@@ -1,7 +1,7 @@
 /*
- * The memory that lull-denoiser shares with the process that runs it: this, and then pictures, [height][width][3] floats
- * each, in the order of their names. The program is lull-denoiser LIBRARY, "" for the usual places, with the memory as
- * descriptor 3 and as descriptor 4 a socket: a byte asks for a run of what the memory holds then, a byte answers.
+ * The memory that lull-denoiser shares with the process that runs it (base/process.h): this, and then pictures,
+ * [height][width][3] floats each, in the order of their names. The program is lull-denoiser LIBRARY, "" for the usual
+ * places.
  */
 #ifndef DENOISE_PROGRAM_SHARED_H
 #define DENOISE_PROGRAM_SHARED_H
@@ -10,7 +10,6 @@
 
 #include "denoise/oidn.h"
 
-enum { SHARED_MEMORY = 3, SHARED_CALLER = 4 };
 enum {
     SHARED_COLOR,
     SHARED_ALBEDO = LULL_OIDN_COLORS,

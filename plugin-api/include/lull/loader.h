@@ -42,12 +42,17 @@ struct lull_found {
  *     NAME       the criterion with this id in DIR/NAME.so, else the first library in the directories that holds one; a
  *                DIR/NAME.so that holds others only is refused;
  *     PATH       (it contains a '/' or ends in ".so") the first criterion of this library;
- *     PATH:ID    the one with this id.
+ *     PATH:ID    the one with this id;
+ *     PATH.py    the criterion that this Python file is (docs/python-criterion.md), of the id that its name gives it.
  * Returns LULL_OK and fills *found, or a LULL_E_ code with *found untouched and err (may be NULL) filled:
  * LULL_E_IO nothing there or not loadable, LULL_E_VERSION not an ABI 1 criterion, LULL_E_INVALID a broken table, LULL_E_KEY
  * the library holds no such id. */
 LULL_EXPORT int32_t lull_open(const struct lull_search *search, const char *spec, struct lull_found *found,
                               struct lull_error *err);
+
+/* From now on answer() answers for criteria that are Python files, in this process instead of a python3 of their own: that
+ * of the package lull for Python (script.py), whose hosts need no other process. NULL: as before. */
+LULL_EXPORT int32_t lull_answer_scripts(void (*answer)(void *request, uint64_t bytes), struct lull_error *err);
 
 /* Calls visit for every valid criterion of every *.so in the directories, in directory order and by name within one.
  * A library name that appeared in an earlier directory is skipped. Broken libraries are logged and skipped. Stops early

@@ -97,7 +97,8 @@ class Handle:
 
 def load(spec: str = "observer", *, threads: Optional[int] = None, log: Optional[Callable[[int, str], None]] = None,
          **parameters: object) -> Criterion:
-    """Makes an instance: load("observer", visible=0.35), load("./mine.so"), load("lib.so:id", first_spp=32).
+    """Makes an instance: load("observer", visible=0.35), load("./mine.so"), load("lib.so:id", first_spp=32),
+    load("mine.py"), which runs in this process.
 
     threads: workers that it may use, default as many as the process has processors. log(level, text): its messages,
     default a Python warning for errors and warnings. Parameters' underscores stand for hyphens. Raises LullError.

@@ -14,7 +14,7 @@ import warnings
 from pathlib import Path
 from typing import Any, Iterable, NamedTuple, Optional, Union
 
-from . import abi
+from . import abi, script
 
 NAME = "liblull-host.so.1"
 CARRIED = Path(__file__).resolve().parent / "lib"
@@ -159,9 +159,19 @@ def criteria(folders: Optional[Iterable[str]] = None) -> list[Info]:
     return found
 
 
+@functools.lru_cache(maxsize=None)
+def _answer_scripts() -> Any:
+    """Criteria that are Python files run in this process."""
+    answer = C.CFUNCTYPE(None, C.c_void_p, C.c_uint64)(lambda at, _size: script.answer(at))
+    call("answer_scripts", answer)
+    return answer
+
+
 def find(spec: str) -> Info:
-    """The criterion that spec names: NAME, PATH.so (its first criterion) or PATH.so:ID."""
+    """The criterion that spec names: NAME, PATH.so (its first criterion), PATH.so:ID or PATH.py."""
     found, search = abi.Found(), _search()
+    if b".py" in encoded(spec):
+        _answer_scripts()
     call("open", C.byref(search), encoded(spec), C.byref(found))
     return _info(found)
 

@@ -102,7 +102,7 @@ def known(b: Blocks, path: str) -> tuple[np.ndarray, np.ndarray]:
 def regression(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
     """Least squares y = a + b x, and Pearson's r; NaN where x, or y, is all the same."""
     mx, my = x - x.mean(), y - y.mean()
-    xx, yy, xy = mx @ mx, my @ my, mx @ my
+    xx, xy = mx @ mx, mx @ my
     b = math.nan if tied(x.min(), x.max()) else xy / xx
     return y.mean() - b * x.mean(), b, pearson(x.tolist(), y.tolist())
 
