@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/colour.h"
 #include "base/files.h"
 #include "render/checkpoint.h"
 #include "sequence/recording.h"
@@ -44,23 +45,34 @@ struct source {
     const struct lull_host_block *block;
 };
 
-/* What a criterion makes of the sums of a pixel, to the last bit before it is a float. */
+/* What a criterion makes of the sums of a pixel, in the form of FORMAT.md. */
 static void estimate(const struct source *s, enum seq_plane_number plane, size_t i, double v[3])
 {
     const struct pt_film *f = s->film;
-    const uint64_t spp = s->block->spp;
-    const double each = 1.0 / (double)spp, kept = spp > f->dropped[i] ? 1.0 / (double)(spp - f->dropped[i]) : 0.0;
+    const uint64_t spp = s->block->spp, half_spp = pt_film_half_spp(spp);
+    const double n = (double)spp, h = (double)half_spp,
+                 kept = spp > f->dropped[i] ? 1.0 / (double)(spp - f->dropped[i]) : 0.0;
     const double *sum = plane == SEQ_PLANE_ALBEDO ? f->albedo : f->normal;
+    double mean[3], half[3];
+    pt_film_mean(f, i, spp, mean);
+    if (plane == SEQ_PLANE_HALF || plane == SEQ_PLANE_REST)
+        pt_film_half_mean(f, i, half_spp, half);
     switch (plane) {
-    case SEQ_PLANE_COLOR: pt_film_mean(f, i, spp, v); break;
-    case SEQ_PLANE_HALF: pt_film_half_mean(f, i, pt_film_half_spp(spp), v); break;
-    case SEQ_PLANE_MOMENT2: v[0] = f->moment2[i] * kept; break;
+    case SEQ_PLANE_MOMENT2: {
+        const double y = base_luminance(mean[0], mean[1], mean[2]);
+        v[0] = f->moment2[i] * kept - y * y;
+        break;
+    }
     case SEQ_PLANE_DEPTH: v[0] = f->depth[i]; break;
     case SEQ_PLANE_DROPPED: v[0] = f->dropped[i]; break;
     case SEQ_PLANE_DROPPED_HALF: v[0] = f->dropped_half[i]; break;
     default:
         for (size_t c = 0; c < 3; c++)
-            v[c] = sum[3 * i + c] * each;
+            v[c] = plane == SEQ_PLANE_COLOR  ? mean[c]
+                   : plane == SEQ_PLANE_HALF ? half[c]
+                   : plane != SEQ_PLANE_REST ? sum[3 * i + c] * (1.0 / n)
+                   : half[c] == mean[c]      ? half[c]
+                                             : (n * mean[c] - h * half[c]) / (n - h);
     }
 }
 
@@ -113,6 +125,8 @@ static int add_block(const struct recorder *r, struct seq_builder *file, const s
     struct source source = {&render->film, b};
     struct seq_stat stats[8];
     uint32_t planes = r->part == SEQ_PART_REFERENCE ? 1u << SEQ_PLANE_COLOR : r->m.planes;
+    if (planes >> SEQ_PLANE_HALF & 1 && b->half_spp > 0 && b->half_spp < b->spp) /* the mean follows from both */
+        planes = (planes & ~(1u << SEQ_PLANE_COLOR)) | 1u << SEQ_PLANE_REST;
     if (b->dropped > 0)
         planes |= 1u << SEQ_PLANE_DROPPED | (planes >> SEQ_PLANE_HALF & 1) << SEQ_PLANE_DROPPED_HALF;
     const struct seq_record record = {.kind = r->part == SEQ_PART_REFERENCE ? SEQ_REFERENCE

@@ -21,17 +21,18 @@ enum seq_plane_number {
     SEQ_PLANE_COLOR = 16,
     SEQ_PLANE_WEIGHT = 17,
     SEQ_PLANE_SPP = 18,
-    SEQ_PLANE_MOMENT2 = 19,
+    SEQ_PLANE_MOMENT2 = 19, /* less the square of the luminance of COLOR */
     SEQ_PLANE_HALF = 20,
     SEQ_PLANE_ALBEDO = 21,
     SEQ_PLANE_NORMAL = 22,
     SEQ_PLANE_DEPTH = 23,
     SEQ_PLANE_DROPPED = 24, /* samples that are missing in COLOR and MOMENT2; in HALF */
     SEQ_PLANE_DROPPED_HALF = 25,
-    SEQ_PLANE_DENOISED = 26, /* COLOR denoised; then what HALF is, and what is in COLOR and not in HALF */
-    SEQ_PLANE_DENOISED_HALF = 27,
-    SEQ_PLANE_DENOISED_REST = 28,
-    SEQ_PLANES_END = 29
+    SEQ_PLANE_REST = 26,     /* what is in COLOR and not in HALF, in the place of COLOR */
+    SEQ_PLANE_DENOISED = 27, /* of COLOR; of HALF; of REST */
+    SEQ_PLANE_DENOISED_HALF = 28,
+    SEQ_PLANE_DENOISED_REST = 29,
+    SEQ_PLANES_END = 30
 };
 enum { SEQ_FILTER_SHUFFLE = 1, SEQ_FILTER_AVERAGE = 2, SEQ_FILTER_GREEN = 4 };
 

@@ -15,9 +15,9 @@
 enum { MAX_TEXT = 1 << 26, MAX_BLOCKS = 1 << 20, MAX_FILES = 1 << 20, MAX_SPP = INT32_MAX };
 
 /* Names of planes, by number from SEQ_PLANE_COLOR on; of parts. */
-static const char *const plane_names[] = {"color",    "weight",        "spp",           "moment2", "half",
-                                          "albedo",   "normal",        "depth",         "dropped", "dropped_half",
-                                          "denoised", "denoised_half", "denoised_rest", NULL};
+static const char *const plane_names[] = {"color",  "weight",   "spp",           "moment2",       "half",
+                                          "albedo", "normal",   "depth",         "dropped",       "dropped_half",
+                                          "rest",   "denoised", "denoised_half", "denoised_rest", NULL};
 static const char *const part_names[] = {"looks", "beyond", "reference", "added", NULL};
 
 static int index_of(const char *const *words, const cJSON *v)
