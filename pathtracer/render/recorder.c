@@ -489,8 +489,10 @@ static int describe(struct recorder *r, struct base_err *err)
                                             .exposure = 1.0,
                                             .sample_clamp = isfinite(clamp) ? clamp : 0.0,
                                             .max_seam = render.max_seam,
-                                            .spp_min = render.spp_min,
-                                            .spp_max = render.spp_max};
+                                            .spp_min = c->render.spp_min,
+                                            .spp_max = c->render.spp_max};
+    if (m->of.n_levels > 0 && m->frame.spp_max < render.spp_max) /* levels may go further than a render */
+        m->frame.spp_max = render.spp_max;
     memcpy(m->frame.rgb_to_xyz, (const double[9])BASE_RGB_TO_XYZ, sizeof m->frame.rgb_to_xyz);
     return describe_blocks(r, err);
 }
