@@ -512,8 +512,14 @@ static int resume(struct recorder *r, struct base_err *err)
     seq_recording_identity(&r->m, &ours);
     seq_recording_identity(&old, &theirs);
     rc = pt_sequence_same(&ours, &theirs, path, err);
-    for (uint32_t i = 0; i < old.n_files && !rc; i++)
-        rc = seq_recording_add(&r->m, &old.files[i], err);
+    for (uint32_t i = 0; i < old.n_files && !rc; i++) {
+        struct seq_look look;
+        rc = seq_recording_read_look(r->config->directory, &old, i, &look, err); /* damaged, it could not be made again */
+        if (!rc)
+            seq_look_release(&look);
+        if (!rc)
+            rc = seq_recording_add(&r->m, &old.files[i], err);
+    }
     r->m.finished = old.finished;
     base_identity_release(&ours);
     base_identity_release(&theirs);
