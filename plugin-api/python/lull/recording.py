@@ -217,9 +217,10 @@ def _plane(place: _Place, name: str, rect: Rect) -> np.ndarray:
 class Recording:
     """A folder that `read` has opened. Pixels stay in the files until they are asked for.
 
-    blocks: rectangles, the index is the id. names: planes of every look. frame: what a criterion is told. criterion: who was asked
-    while recording, a mapping with spec, id, version, parameters, or None. seed. answers: what it said, in order. in_step:
-    all blocks have the same levels. finished: the render is whole.
+    blocks: rectangles, the index is the id. names: planes of every look. frame: what a criterion is told. criterion: who was
+    asked while recording, a mapping with spec, id, version, parameters, or None. answers: what it said, in order. looks: in
+    order, of each the (block, spp) that were looked at. in_step: all blocks have the same levels. finished: the render is whole. layers: of
+    added planes.
     """
 
     def __init__(self, folder: str):
@@ -230,6 +231,7 @@ class Recording:
         self.names, self.frame, self.criterion = tuple(m["planes"]), m["frame"], m.get("criterion")
         self.in_step, self.finished = bool(m["levels"]), "looks" in m["finished"]
         self.answers: list[Answer] = []
+        self.looks: list[list[tuple[int, int]]] = []
         self.layers = sorted({f["layer"] for f in m["files"] if f["part"] == "added"})
         self._planes: dict[tuple[int, int, str, str], _Place] = {}  # by block, spp, layer, plane
         self._levels: list[dict[int, _Found]] = [{} for _ in self.blocks]
@@ -238,6 +240,8 @@ class Recording:
         for f in m["files"]:
             path = os.path.join(folder, f["file"])
             _need(os.path.getsize(path) == f["bytes"], f"{path}: not the file that the manifest lists (size)")
+            if f["part"] in ("looks", "beyond"):
+                self.looks.append([])
             for r in _scan(path, self.width, self.height):
                 self._take(r, f.get("layer", ""), path, stopped)
 
@@ -251,6 +255,7 @@ class Recording:
             self._planes[r.block, r.spp, layer, name] = place
         if not layer:
             self._levels[r.block].setdefault(r.spp, r)
+            self.looks[-1].append((r.block, r.spp))
         if "action" in r.stats and not layer:
             s = r.stats
             self.answers.append(Answer(r.block, r.spp, int(s["action"]), s.get("error", math.nan), s.get("p_noisy", math.nan),
@@ -298,6 +303,10 @@ class Recording:
                 found[name] = found[name] + _luminance(color, self.frame["rgb_to_xyz"]) ** 2
         return found[name]
 
+    def has_added(self, layer: str, number: int) -> bool:
+        """Is file `number` of these planes there?"""
+        return any(f["file"] == _added(layer, number) for f in self.manifest["files"])
+
     def has(self, block: int, spp: int, name: str, layer: str = "") -> bool:
         """Is the plane there?"""
         return (block, spp, layer, name) in self._planes
@@ -333,15 +342,20 @@ class Recording:
         _need(layer and len(layer) < 64 and layer.isprintable(), f"layer {layer!r}: expected a text of 1 to 63 characters")
         for r in records:
             _need(r.spp in self._levels[r.block], f"block {r.block} has no look at {r.spp} spp")
-        name = f"added-{zlib.crc32(layer.encode()):08x}-{number:05d}.lseq"
+        name = _added(layer, number)
         manifest = _manifest(self.folder)  # as it is now
         _need(all(f["file"] != name for f in manifest["files"]), f"{self.folder}: {name} is there")
         manifest["files"].append({**_put(self.folder, name, pack(records, self.width, self.height, number, self.seed), "added"),
                                   "layer": layer})
         _write_manifest(self.folder, manifest)
-        for r in _scan(os.path.join(self.folder, name), self.width, self.height):
-            self._take(r, layer, name, set())
+        self.manifest = manifest
+        for found in _scan(os.path.join(self.folder, name), self.width, self.height):
+            self._take(found, layer, name, set())
         self.layers = sorted({*self.layers, layer})
+
+
+def _added(layer: str, number: int) -> str:
+    return f"added-{zlib.crc32(layer.encode()):08x}-{number:05d}.lseq"
 
 
 def read(folder: str) -> Recording:

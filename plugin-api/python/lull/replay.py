@@ -24,12 +24,13 @@ from typing import Any, Callable, Mapping, Optional, Sequence
 
 import numpy as np
 
-from . import abi
+from . import abi, limits
 from .criterion import Criterion, Plane, Rect, load
+from .denoising import denoise as lull_denoise
 from .files import Output, check_outputs, replaced
 from .host import Block, HostFrame
 from .library import LullError, call
-from .recording import NUMBERS, Answer, Recording, channels, read
+from .recording import NUMBERS, Answer, Record, Recording, channels, read
 
 SIMULATED = ("color", "half", "moment2")  # planes that lull_host_simulate makes
 STEP = 1.15  # between looks that the criterion did not place, as the host library's
@@ -108,7 +109,9 @@ class Replay:
                 raise ValueError(f"{recording.folder}: its blocks are not in step: no others can be cut from them")
             del settings["layout"]
             settings["block"] = block
-        settings["spp_max"] = max(spp_max or settings["spp_max"], simulate_to)
+        if simulate_to:
+            limits.checked("simulate_to", simulate_to)
+        settings["spp_max"] = max(settings["spp_max"] if spp_max is None else limits.checked("spp_max", spp_max), simulate_to)
         settings["spp_min"] = min(settings["spp_min"], settings["spp_max"])
         needed = [name for name, number in NUMBERS.items() if number < 24 and criterion.needs.planes_required >> (number - 16) & 1]
         lacking = [name for name in needed if name not in recording.names and name not in ("spp", "weight")]
@@ -120,7 +123,7 @@ class Replay:
         self.frame = HostFrame(criterion, recording.width, recording.height, names, **settings)
         self.levels = _Levels(recording, [b.rect for b in self.frame.blocks], names)
         size = self.frame.view.height, self.frame.view.width
-        self.shown = {name: np.zeros((*size, channels(name)), np.float64 if name in ("color", "moment2") else np.float32) for name in names}
+        self.shown = {name: np.zeros((*size, channels(name)), np.float64 if name in SIMULATED else np.float32) for name in names}
         if any(recording.has(k, spp, "dropped") for k in range(len(recording.blocks)) for spp in recording.levels(k)):
             self.shown.update(dropped=np.zeros((*size, 1), np.float32), dropped_half=np.zeros((*size, 1), np.float32))
         self.answers: list[Answer] = []
@@ -152,29 +155,33 @@ class Replay:
             return True
         level = 0 if self._made[i] else self.levels.at_least(i, wanted)
         if level and level <= most:
-            half, seconds, dropped = self.levels.load(i, level, self.shown, self.frame.view)
-            b.spp, b.half_spp, b.thread_s, b.dropped = level, half, seconds, dropped
+            self._load(i, level)
             return True
-        if self._simulate(b, wanted):
+        if wanted <= self.simulate_to and self.levels.of[i]:
+            if not self._made[i]:
+                self._load(i, self.levels.of[i][-1])
+            self._simulate(b, wanted)
             self._made[i] = True
             return True
         abi.HostBlock.reason.__set__(b, abi.REASON_INTERRUPT)
         return False
 
-    def _simulate(self, b: Block, spp: int) -> bool:
-        if spp > self.simulate_to or b.spp == 0:
-            return False
+    def _load(self, i: int, spp: int) -> None:
+        b = self.frame.blocks[i]
+        b.half_spp, b.thread_s, b.dropped = self.levels.load(i, spp, self.shown, self.frame.view)
+        b.spp = spp
+
+    def _simulate(self, b: Block, spp: int) -> None:
         v, r = self.frame.view, b.rect
         at = slice(r.y0 - v.y0, r.y1 - v.y0), slice(r.x0 - v.x0, r.x1 - v.x0)
-        planes = {name: np.ascontiguousarray(self.shown[name][at], np.float32) for name in SIMULATED if name in self.shown}
+        planes = {name: np.ascontiguousarray(self.shown[name][at], np.float64) for name in SIMULATED if name in self.shown}
         call("host_simulate", C.byref(abi.sized(
             abi.HostSimulation, pixels=r.pixels, spp=b.spp, half_spp=b.half_spp, to_spp=spp,
             rgb_to_xyz=tuple(self.recording.frame["rgb_to_xyz"]), **{name: a.ctypes.data for name, a in planes.items()})))
-        for name in planes:
+        for name in set(planes) - {"color"}:
             self.shown[name][at] = planes[name]
         b.thread_s *= spp / b.spp
         b.spp, b.half_spp = spp, spp // 2 if "half" in planes else 0
-        return True
 
     def _view(self) -> dict[str, Plane]:
         return {name: Plane(a[..., 0].astype(np.uint32) if name.startswith("dropped") else a) for name, a in self.shown.items()}
@@ -211,6 +218,42 @@ class Replay:
     def answers_at(self, i: int) -> int:
         """Samples at the last answer about a block."""
         return int(self.frame.blocks[i].asked_spp) if self.frame.blocks[i].asked else 0
+
+
+def denoise(recording: Recording, layer: str, by: Optional[Callable[[Mapping[str, np.ndarray]], Mapping[str, np.ndarray]]] = None,
+            progress: Optional[Callable[[float], None]] = None) -> None:
+    """Adds denoised planes to a recording, look by look; those that are there are not made again. layer: what they are,
+    such as the denoiser with its version. by: gets the whole picture as it was at the look, planes by name [height, width, channels], and gives
+    "denoised", perhaps "denoised_half" and "denoised_rest", [height, width, 3]; by default what lull.denoise gives, alone and with albedo
+    and normal if they were recorded. Where blocks are not in step each has its own samples, as in the render."""
+    names = [*recording.names, *(["rest"] if "half" in recording.names else [])]
+    whole = Rect(0, 0, recording.width, recording.height)
+    shown = {name: np.zeros((whole.height, whole.width, channels(name)), np.float64) for name in names}
+    spps = [0] * len(recording.blocks)
+    for number, look in enumerate(recording.looks, 1):
+        for k, spp in look:
+            r = recording.blocks[k]
+            for name in names:
+                if name != "rest" or recording.has(k, spp, name):
+                    shown[name][r.y0:r.y1, r.x0:r.x1] = recording.planes(k, spp, [name])[name]
+            spps[k] = spp
+        if not recording.has_added(layer, number):
+            made = by(shown) if by else {"denoised": _denoised(recording, shown, spps)}
+            recording.add(layer, number, [
+                Record(1, spp, recording.half_spp(k, spp), k, r, {n: a[r.y0:r.y1, r.x0:r.x1] for n, a in made.items()})
+                for k, spp in sorted(set(look)) for r in [recording.blocks[k]]])
+        if progress:
+            progress(number / len(recording.looks))
+
+
+def _denoised(recording: Recording, shown: Mapping[str, np.ndarray], spps: Sequence[int]) -> np.ndarray:
+    """What lull.denoise makes of a picture, alone."""
+    names = [name for name in ("color", "half", "albedo", "normal") if name in shown]
+    with load("fixed", threads=1) as nobody:
+        frame = HostFrame(nobody, recording.width, recording.height, names, **recording.settings())
+        for k, b in enumerate(frame.blocks):
+            b.spp, b.half_spp = spps[k], recording.half_spp(k, spps[k]) if spps[k] else 0
+        return lull_denoise(frame, {name: Plane(shown[name]) for name in names}, full=True).denoised
 
 
 # --- the command ------------------------------------------------------------------------------------------------------

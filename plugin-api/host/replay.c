@@ -11,21 +11,19 @@ static void simulate_moment(const struct lull_host_simulation *s, const double y
     const double from = (double)s->spp, to = (double)s->to_spp;
     const double scale = from > 1 ? from / (from - 1) * (to - 1) / to : 1.0;
     for (uint64_t i = 0; i < s->pixels; i++) {
-        const float *c = s->color + 3 * i;
-        const double y = y_of[0] * (double)c[0] + y_of[1] * (double)c[1] + y_of[2] * (double)c[2];
-        s->moment2[i] = (float)(y * y + scale * ((double)s->moment2[i] - y * y));
+        const double *c = s->color + 3 * i, y = y_of[0] * c[0] + y_of[1] * c[1] + y_of[2] * c[2];
+        s->moment2[i] = y * y + scale * (s->moment2[i] - y * y);
     }
 }
 
-/* HALF at halves of to_spp: the difference D = (A - B) / 2 has the noise of to_spp samples, and A - M is 2 (n - h) / n of it. */
+/* HALF at halves of to_spp: the difference D = (A - B) / 2 has the noise of to_spp samples, A - M is 2 (n - h) / n of it. */
 static void simulate_half(const struct lull_host_simulation *s)
 {
     const double n = (double)s->spp, h = (double)s->half_spp, to = (double)s->to_spp, to_h = (double)(s->to_spp / 2);
     const double scale =
         seq_noise_scale(n, to) * seq_half_scale(n, h) / seq_half_scale(to, to_h) * ((to - to_h) / to) / ((n - h) / n);
     for (uint64_t i = 0; i < 3 * s->pixels; i++)
-        s->half[i] -= s->color[i];
-    seq_simulate(s->color, s->half, 3 * (size_t)s->pixels, scale, s->half);
+        s->half[i] = s->color[i] + scale * (s->half[i] - s->color[i]);
 }
 
 int32_t lull_host_simulate(const struct lull_host_simulation *s, struct lull_error *err)
