@@ -265,8 +265,8 @@ LULL_EXPORT void lull_host_apply(struct lull_host_frame *frame, const uint32_t *
 
 /* --- replay: since 1.2 ---------------------------------------------------------------------------------------------- */
 
-/* Pixels of a block that were recorded at `spp` samples, as they would be shown at to_spp > spp. The mean stays as it is, its
- * noise falls: HALF differs from it by less, as 1/sqrt(samples), and is of to_spp / 2 samples; MOMENT2 is of the same
+/* Pixels of a block that were recorded at `spp` samples, as they would be shown at to_spp > spp. The mean stays, its noise
+ * falls: HALF differs from it by less, as 1/sqrt(samples), and is of to_spp / 2 samples; MOMENT2 is of the same
  * variance of a sample. For criteria that read no other planes. Light that no sample has met is not in them. */
 struct lull_host_simulation {
     uint32_t struct_size;
