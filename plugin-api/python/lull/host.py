@@ -69,8 +69,8 @@ class HostFrame:
     [height, width] in [0, 1], black leaves the criterion's quality parameter (`visible`, else `threshold`) as it is, white
     takes a quarter of it, grey g 4^(-g), in steps of an eighth; the lightest pixel of a block counts. exposure: linear
     factor before the display transfer ("srgb", "linear", "gamma"). independent: a pixel's samples are not stratified.
-    shared: neighbouring pixels share samples (a splatted filter). open_ended: checks stand where they would without spp_max.
-    rgb_to_xyz: nine numbers, row by row; all 0: linear sRGB.
+    shared: neighbouring pixels share samples (a splatted filter). open_ended: checks stand where they would without
+    spp_max. rgb_to_xyz: nine numbers, row by row; all 0: linear sRGB.
     view: the rectangle of pixels that planes hold, all blocks among them. first_spp: samples at the first check, at least.
     """
 
@@ -220,7 +220,8 @@ class HostFrame:
         count = library().lull_host_due(self.handle.pointer, due, final)
         return due[:count], [bool(value) for value in final[:count]]
 
-    def ask(self, due: Sequence[int], final: Sequence[bool], planes: Optional[Mapping[str, Plane]] = None) -> list[abi.Decision]:
+    def ask(self, due: Sequence[int], final: Sequence[bool],
+            planes: Optional[Mapping[str, Plane]] = None) -> list[abi.Decision]:
         """The criterion's answers about the blocks that are due; nothing is noted."""
         view, count = self.view_of(planes), len(due)
         answers = (abi.Decision * max(count, 1))()

@@ -28,8 +28,9 @@ from .files import LUMINANCE, replaced
 
 MAGIC, FILE_HEADER, RECORD_HEADER, PLANE_HEADER, STAT = b"LULLSEQ1", 64, 64, 16, 32
 LOOK, REFERENCE, BEYOND = 1, 2, 3  # kinds of records
-NUMBERS = {name: 16 + i for i, name in enumerate(("color", "weight", "spp", "moment2", "half", "albedo", "normal", "depth", "dropped",
-                                                  "dropped_half", "rest", "denoised", "denoised_half", "denoised_rest"))}
+NUMBERS = {name: 16 + i for i, name in enumerate((
+    "color", "weight", "spp", "moment2", "half", "albedo", "normal", "depth", "dropped", "dropped_half", "rest", "denoised",
+    "denoised_half", "denoised_rest"))}
 NAMES = {number: name for name, number in NUMBERS.items()}
 SHUFFLE, MAX_FILE, MAX_SIDE, MAX_BLOCK_SIDE = 1, 1 << 30, 1 << 15, 4096
 ANSWER = ("action", "flags", "next_spp", "error", "p_noisy", "predicted_spp")  # statistics that are a criterion's answer
@@ -120,8 +121,10 @@ def pack(records: Sequence[Record], width: int, height: int, number: int, seed: 
     for r in records:
         stats = b"".join(struct.pack("<24sd", name.encode()[:23], v) for name, v in r.stats.items() if math.isfinite(v))
         planes = _stored(r, rgb_to_xyz)
-        payload = stats + b"".join(_packed_plane(name, planes[name], r.rect) for name in sorted(planes, key=NUMBERS.__getitem__))
-        head = struct.pack("<7I", r.kind, r.spp, r.half_spp, len(stats) // STAT, len(planes), len(payload), zlib.crc32(payload))
+        names = sorted(planes, key=NUMBERS.__getitem__)
+        payload = stats + b"".join(_packed_plane(name, planes[name], r.rect) for name in names)
+        head = struct.pack("<7I", r.kind, r.spp, r.half_spp, len(stats) // STAT, len(planes), len(payload),
+                           zlib.crc32(payload))
         head += struct.pack("<I4i3I", r.block, *r.rect, 0, 0, 0)
         parts += [head, struct.pack("<I", zlib.crc32(head)), payload]
     return b"".join(parts)
@@ -219,8 +222,8 @@ class Recording:
 
     blocks: rectangles, the index is the id. names: planes of every look. frame: what a criterion is told. criterion: who was
     asked while recording, a mapping with spec, id, version, parameters, or None. answers: what it said, in order. looks: in
-    order, of each the (block, spp) that were looked at. in_step: all blocks have the same levels. finished: the render is whole. layers: of
-    added planes.
+    order, of each the (block, spp) that were looked at. in_step: all blocks have the same levels. finished: the render is
+    whole. layers: of added planes.
     """
 
     def __init__(self, folder: str):
@@ -258,9 +261,9 @@ class Recording:
             self.looks[-1].append((r.block, r.spp))
         if "action" in r.stats and not layer:
             s = r.stats
-            self.answers.append(Answer(r.block, r.spp, int(s["action"]), s.get("error", math.nan), s.get("p_noisy", math.nan),
-                                       int(s.get("next_spp", 0)), s.get("predicted_spp", math.nan), int(s.get("flags", 0)),
-                                       r.block in stopped))
+            self.answers.append(Answer(
+                r.block, r.spp, int(s["action"]), s.get("error", math.nan), s.get("p_noisy", math.nan),
+                int(s.get("next_spp", 0)), s.get("predicted_spp", math.nan), int(s.get("flags", 0)), r.block in stopped))
             if s["action"] == 1:
                 stopped.add(r.block)
 
@@ -277,8 +280,8 @@ class Recording:
         return self._levels[block][spp].stats
 
     def planes(self, block: int, spp: int, names: Optional[Iterable[str]] = None, layer: str = "") -> dict[str, np.ndarray]:
-        """Pixels of a block, [height, width, channels] float32, of color and moment2 perhaps float64; default all that were
-        recorded. layer: of added planes."""
+        """Pixels of a block, [height, width, channels] float32, of color and moment2 perhaps float64; default all that
+        were recorded. layer: of added planes."""
         if names is None:
             names = self.names if not layer else [n for b, s, of, n in self._planes if (b, s, of) == (block, spp, layer)]
         found: dict[str, np.ndarray] = {}
@@ -345,8 +348,8 @@ class Recording:
         name = _added(layer, number)
         manifest = _manifest(self.folder)  # as it is now
         _need(all(f["file"] != name for f in manifest["files"]), f"{self.folder}: {name} is there")
-        manifest["files"].append({**_put(self.folder, name, pack(records, self.width, self.height, number, self.seed), "added"),
-                                  "layer": layer})
+        data = pack(records, self.width, self.height, number, self.seed)
+        manifest["files"].append({**_put(self.folder, name, data, "added"), "layer": layer})
         _write_manifest(self.folder, manifest)
         self.manifest = manifest
         for found in _scan(os.path.join(self.folder, name), self.width, self.height):
@@ -371,31 +374,39 @@ def _manifest(folder: str) -> dict[str, Any]:
     except (ValueError, RecursionError):
         raise ValueError(f"{path}: not the manifest of a sequence") from None
     _need(isinstance(m, dict) and m.get("format") == "lull-sequence", f"{path}: not the manifest of a sequence")
-    _need(m.get("version") != 1, f"{path}: blocks alone (version 1 of the format), expected looks at a whole frame (version 2)")
+    _need(m.get("version") != 1,
+          f"{path}: blocks alone (version 1 of the format), expected looks at a whole frame (version 2)")
     _need(m.get("version") == 2, f"{path}: this version of the format is not known")
-
-    def whole(value: object, low: int, high: int) -> bool:
-        return isinstance(value, int) and not isinstance(value, bool) and low <= value <= high
     try:
-        _need(whole(m["width"], 1, MAX_SIDE) and whole(m["height"], 1, MAX_SIDE), f"{path}: width or height is missing or out of range")
-        _need(isinstance(m["levels"], list) and isinstance(m["finished"], list) and whole(m["seed"], 0, (1 << 64) - 1),
-              f"{path}: levels, finished or seed is not usable")
-        _need("color" in m["planes"] and all(p in NUMBERS for p in m["planes"]), f"{path}: no list of planes, color among them")
-        _need(m["blocks"] and all(len(r) == 4 and all(whole(v, 0, MAX_SIDE) for v in r) and
-                                  r[0] < r[2] <= m["width"] and r[1] < r[3] <= m["height"] for r in m["blocks"]),
-              f"{path}: a block is no rectangle of the picture")
-        f = m["frame"]
-        _need(whole(f["flags"], 0, 1 << 32) and whole(f["spp_min"], 1, 1 << 31) and whole(f["spp_max"], f["spp_min"], 1 << 31) and
-              len(f["rgb_to_xyz"]) == 9 and f["transfer"] in ("srgb", "linear", "gamma") and
-              all(math.isfinite(v) for v in (f["gamma"], f["exposure"], f["sample_clamp"], f["max_seam"], *f["rgb_to_xyz"])),
-              f"{path}: frame is missing or has a number out of range")
-        for entry in m["files"]:
-            _need(isinstance(entry["file"], str) and entry["file"] and os.path.basename(entry["file"]) == entry["file"] and
-                  entry["part"] in ("looks", "beyond", "reference", "added") and whole(entry["bytes"], 1, MAX_FILE) and
-                  (entry["part"] != "added" or isinstance(entry["layer"], str)), f"{path}: an entry of files is not usable")
+        for holds, what in _claims(m):
+            _need(holds, f"{path}: {what}")
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"{path}: not the manifest of a whole frame: {error}") from None
     return m
+
+
+def _whole(value: object, low: int, high: int) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and low <= value <= high
+
+
+def _claims(m: dict[str, Any]) -> Iterator[tuple[object, str]]:
+    """What must hold of a manifest, and what is said if it does not."""
+    yield _whole(m["width"], 1, MAX_SIDE) and _whole(m["height"], 1, MAX_SIDE), "width or height is missing or out of range"
+    yield isinstance(m["levels"], list) and isinstance(m["finished"], list), "levels or finished is no list"
+    yield _whole(m["seed"], 0, (1 << 64) - 1), "the seed is out of range"
+    yield "color" in m["planes"] and all(p in NUMBERS for p in m["planes"]), "no list of planes, color among them"
+    for k, r in enumerate(m["blocks"]):
+        yield (len(r) == 4 and all(_whole(v, 0, MAX_SIDE) for v in r) and r[0] < r[2] <= m["width"] and
+               r[1] < r[3] <= m["height"]), f"block {k} is no rectangle of the picture"
+    f = m["frame"]
+    numbers = *f["rgb_to_xyz"], f["gamma"], f["exposure"], f["sample_clamp"], f["max_seam"]
+    yield (_whole(f["flags"], 0, 1 << 32) and _whole(f["spp_min"], 1, 1 << 31) and
+           _whole(f["spp_max"], f["spp_min"], 1 << 31) and len(numbers) == 13 and all(map(math.isfinite, numbers)) and
+           f["transfer"] in ("srgb", "linear", "gamma")), "frame is missing or has a number out of range"
+    for k, e in enumerate(m["files"]):
+        yield (isinstance(e["file"], str) and e["file"] and os.path.basename(e["file"]) == e["file"] and
+               e["part"] in ("looks", "beyond", "reference", "added") and _whole(e["bytes"], 1, MAX_FILE) and
+               (e["part"] != "added" or isinstance(e["layer"], str))), f"entry {k} of files is not usable"
 
 
 # --- writing ----------------------------------------------------------------------------------------------------------
@@ -430,42 +441,48 @@ def write(folder: str, looks: Sequence[Look], *, scene: str, block: int = 200, c
           renderer: str = "lull for Python", seed: int = 0, references: Sequence[np.ndarray] = (), reference_spp: int = 0,
           exposure: float = 1.0, transfer: str = "srgb", gamma: float = 2.2, sample_clamp: float = 0.0,
           independent: bool = False, shared: bool = False) -> None:
-    """Writes whole pictures at rising sample counts as a recorded frame, all blocks in step, into `folder`, which is made and must hold no
-    recording. references: none, or two pictures of reference_spp samples that are independent of the looks and of each other.
-    The rest as HostFrame takes it. TypeError, ValueError and OSError, one line, the first two before anything is written."""
+    """Writes whole pictures at rising sample counts as a recorded frame, all blocks in step, into `folder`, which is made
+    and must hold no recording. references: none, or two pictures of reference_spp samples that are independent of the looks
+    and of each other. The rest as HostFrame takes it. TypeError, ValueError and OSError, one line, the first two before
+    anything is written."""
     for name, text in (("scene", scene), ("camera", camera), ("source", source), ("renderer", renderer)):
         _need(isinstance(text, str) and text == text.encode(errors="replace").decode(), f"{name} {text!r}: expected text")
     _need(scene != "", "the scene has no name")
     _need(len(looks) > 0 and "color" in looks[0].planes, "no looks with a plane color")
     _need(len(references) in (0, 2), f"{len(references)} references: expected none or two")
+    _need(transfer in ("srgb", "linear", "gamma"), f"transfer {transfer!r}: expected srgb, linear or gamma")
     block, seed = limits.checked("block", block), limits.checked("seed", seed)
     spps = [limits.checked("spp", look.spp) for look in looks]
     _need(all(a < b for a, b in zip(spps, spps[1:])), f"samples {spps}: expected rising ones")
     shape = np.shape(looks[0].planes["color"])
     _need(len(shape) == 3 and 0 < min(shape[:2]) and max(shape[:2]) <= MAX_SIDE, f"a picture of shape {shape}")
-    pictures = [_checked(look, shape, set(looks[0].planes)) for look in looks]
-    pictures += [_checked(Look(limits.checked("spp", reference_spp), {"color": r}), shape, {"color"}) for r in references]
-    halves = [0 if "half" not in look.planes else spp // 2 if look.half_spp is None else look.half_spp for look, spp in zip(looks, spps)]
+    names = sorted(looks[0].planes, key=lambda name: NUMBERS.get(name, 0))
+    pictures = [_checked(look, shape, set(names)) for look in looks]
+    more = [_checked(Look(limits.checked("spp", reference_spp), {"color": r}), shape, {"color"}) for r in references]
+    halves = [0 if "half" not in names else look.spp // 2 if look.half_spp is None else look.half_spp for look in looks]
     _need(all(0 <= h <= n for h, n in zip(halves, spps)), f"samples in half {halves}: expected at most {spps}")
+    shown = {"flags": 2 | 4 * limits.flag("independent", independent) | 8 * limits.flag("shared", shared), "transfer": transfer,
+             "gamma": limits.checked("gamma", gamma), "exposure": limits.checked("exposure", exposure),
+             "sample_clamp": limits.checked("sample_clamp", sample_clamp), "rgb_to_xyz": [0.0] * 9, "max_seam": 0,
+             "spp_min": spps[0], "spp_max": spps[-1]}
     os.makedirs(folder, exist_ok=True)
     _need(not os.path.exists(os.path.join(folder, "manifest.json")), f"{folder}: it holds a recording")
     height, width = shape[:2]
-    rects = [Rect(x, y, min(x + block, width), min(y + block, height)) for y in range(0, height, block) for x in range(0, width, block)]
-    files = []
-    for i, planes in enumerate(pictures):
-        refers = i >= len(looks)
-        kind, spp, half = (REFERENCE, reference_spp, 0) if refers else (LOOK, spps[i], halves[i])
-        records = [Record(kind, spp, half, k, r, {n: p[r.y0:r.y1, r.x0:r.x1] for n, p in planes.items()}) for k, r in enumerate(rects)]
-        name = f"reference-{i - len(looks) + 1}.lseq" if refers else f"look-{i + 1:05d}.lseq"
-        files.append(_put(folder, name, pack(records, width, height, i + 1, seed), "reference" if refers else "looks"))
+    rects = [Rect(x, y, min(x + block, width), min(y + block, height))
+             for y in range(0, height, block) for x in range(0, width, block)]
+
+    def put(name: str, number: int, kind: int, spp: int, half_spp: int, planes: Mapping[str, np.ndarray]) -> dict[str, Any]:
+        records = [Record(kind, spp, half_spp, k, r, {n: p[r.y0:r.y1, r.x0:r.x1] for n, p in planes.items()})
+                   for k, r in enumerate(rects)]
+        return _put(folder, name, pack(records, width, height, number, seed), "looks" if kind == LOOK else "reference")
+    files = [put(f"look-{i:05d}.lseq", i, LOOK, spp, half, planes)
+             for i, (spp, half, planes) in enumerate(zip(spps, halves, pictures), 1)]
+    files += [put(f"reference-{i}.lseq", i, REFERENCE, reference_spp, 0, planes) for i, planes in enumerate(more, 1)]
     _write_manifest(folder, {
         "format": "lull-sequence", "version": 2, "scene": scene, "source": source, "camera": camera, "renderer": renderer,
-        "width": width, "height": height, "seed": seed, "reference_seed": seed, "reference_spp": reference_spp if references else 0,
-        "levels": spps, "planes": sorted(looks[0].planes, key=NUMBERS.__getitem__),
-        "frame": {"flags": 2 | 4 * bool(independent) | 8 * bool(shared), "transfer": transfer, "gamma": limits.checked("gamma", gamma),
-                  "exposure": limits.checked("exposure", exposure), "sample_clamp": limits.checked("sample_clamp", sample_clamp),
-                  "rgb_to_xyz": [0.0] * 9, "max_seam": 0, "spp_min": spps[0], "spp_max": spps[-1]},
-        "blocks": [list(r) for r in rects], "finished": ["looks", *(["reference"] if references else [])], "files": files})
+        "width": width, "height": height, "seed": seed, "reference_seed": seed,
+        "reference_spp": reference_spp if references else 0, "levels": spps, "planes": names, "frame": shown,
+        "blocks": rects, "finished": ["looks", *(["reference"] if references else [])], "files": files})
 
 
 _LETTERS = {3: ("RGB", "XYZ", "rgb", "xyz"), 1: ("V", "Y", "Z", "R", "X")}
@@ -481,8 +498,8 @@ def _layer(found: Mapping[str, np.ndarray], layer: str, count: int) -> Optional[
 
 
 def from_exr(path: str, spp: int, layers: Optional[Mapping[str, str]] = None, half_spp: Optional[int] = None) -> Look:
-    """A renderer's EXR file of so many samples as a look. layers: plane to layer, "" being the picture itself; by default
-    that is "color", and layers called half, moment2, albedo, normal and depth are what their names say, where they are there."""
+    """A renderer's EXR file of so many samples as a look. layers: plane to layer, "" being the picture itself; by default that
+    is "color", and layers called half, moment2, albedo, normal and depth are what their names say, where they are there."""
     found, _ = exr.read(path)
     given = {"color": "", **{name: name for name in CHANNELS if name != "color"}} if layers is None else layers
     planes = {}

@@ -6,8 +6,8 @@
     found = replay.Replay(frame, lull.load("observer", visible=0.5)).run()
     found.stops, found.answers                         # samples of each block at its stop, 0: none; everything it said
 
-Looks fall on recorded levels, rounded up. A replay of the criterion that a frame was recorded with, at its looks, gives its stops and
-answers again. `python3 -m lull replay` is this as a command.
+Looks fall on recorded levels, rounded up. A replay of the criterion that a frame was recorded with, at its looks, gives its
+stops and answers again. `python3 -m lull replay` is this as a command.
 """
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from typing import Any, Callable, Mapping, Optional, Sequence
 import numpy as np
 
 from . import abi, limits
-from .criterion import Criterion, Plane, Rect, load
+from .criterion import PLANES, Criterion, Plane, Rect, load
 from .denoising import denoise as lull_denoise
 from .files import Output, check_outputs, replaced
 from .host import Block, HostFrame
 from .library import LullError, call
-from .recording import NUMBERS, Answer, Record, Recording, channels, read
+from .recording import LOOK, Answer, Record, Recording, channels, read
 
 SIMULATED = ("color", "half", "moment2")  # planes that lull_host_simulate makes
 STEP = 1.15  # between looks that the criterion did not place, as the host library's
@@ -95,14 +95,15 @@ class Replay:
     """A recorded frame as a host of a criterion.
 
     block: blocks of another size, pixels, of a recording whose blocks are in step. spp_max: the most samples of the render
-    that is replayed, by default that of the recording. go_on: after all stops the criterion is asked about each stopped block at every further level.
-    simulate_to: levels beyond the recording are made up to so many samples, where the criterion asks for them
-    (lull_host_simulate); never for `denoised`, nor for criteria that require other planes. ValueError for what makes no sense.
+    that is replayed, by default that of the recording. go_on: after all stops the criterion is asked about each stopped
+    block at every further level. simulate_to: levels beyond the recording are made up to so many samples, where the
+    criterion asks for them (lull_host_simulate); never for `denoised`, nor for criteria that require other planes.
+    ValueError for what makes no sense.
     """
 
-    def __init__(self, recording: Recording, criterion: Criterion, *, block: Optional[int] = None, spp_max: Optional[int] = None,
-                 go_on: bool = False, simulate_to: int = 0):
-        self.recording, self.criterion, self.go_on, self.simulate_to = recording, criterion, go_on, simulate_to
+    def __init__(self, recording: Recording, criterion: Criterion, *, block: Optional[int] = None,
+                 spp_max: Optional[int] = None, go_on: bool = False, simulate_to: int = 0):
+        self.recording, self.go_on, self.simulate_to = recording, go_on, simulate_to
         settings = recording.settings()
         if block is not None:
             if not recording.in_step:
@@ -111,21 +112,23 @@ class Replay:
             settings["block"] = block
         if simulate_to:
             limits.checked("simulate_to", simulate_to)
-        settings["spp_max"] = max(settings["spp_max"] if spp_max is None else limits.checked("spp_max", spp_max), simulate_to)
+        most = settings["spp_max"] if spp_max is None else limits.checked("spp_max", spp_max)
+        settings["spp_max"] = max(most, simulate_to)
         settings["spp_min"] = min(settings["spp_min"], settings["spp_max"])
-        needed = [name for name, number in NUMBERS.items() if number < 24 and criterion.needs.planes_required >> (number - 16) & 1]
-        lacking = [name for name in needed if name not in recording.names and name not in ("spp", "weight")]
+        needed = [name for name, bit in PLANES.items() if criterion.needs.planes_required >> bit & 1]
+        lacking = [name for name in needed if name not in (*recording.names, "spp", "weight")]
         if lacking:
-            raise ValueError(f"criterion {criterion.info.id} reads {', '.join(lacking)}, which {recording.folder} has not recorded")
+            raise ValueError(f"criterion {criterion.info.id} reads {', '.join(lacking)}, which {recording.folder} has not "
+                             "recorded")
         if simulate_to and (criterion.info.id == "denoised" or not set(needed) <= set(SIMULATED)):
             raise ValueError(f"criterion {criterion.info.id}: no levels can be simulated for it")
         names = [name for name in recording.names if not simulate_to or name in SIMULATED]
         self.frame = HostFrame(criterion, recording.width, recording.height, names, **settings)
         self.levels = _Levels(recording, [b.rect for b in self.frame.blocks], names)
         size = self.frame.view.height, self.frame.view.width
-        self.shown = {name: np.zeros((*size, channels(name)), np.float64 if name in SIMULATED else np.float32) for name in names}
+        self.shown = {name: np.zeros((*size, channels(name))) for name in names}
         if any(recording.has(k, spp, "dropped") for k in range(len(recording.blocks)) for spp in recording.levels(k)):
-            self.shown.update(dropped=np.zeros((*size, 1), np.float32), dropped_half=np.zeros((*size, 1), np.float32))
+            self.shown.update(dropped=np.zeros((*size, 1)), dropped_half=np.zeros((*size, 1)))
         self.answers: list[Answer] = []
         self.stops = [0] * len(self.frame.blocks)
         self._made = [False] * len(self.frame.blocks)  # what is shown of it was simulated
@@ -174,7 +177,7 @@ class Replay:
     def _simulate(self, b: Block, spp: int) -> None:
         v, r = self.frame.view, b.rect
         at = slice(r.y0 - v.y0, r.y1 - v.y0), slice(r.x0 - v.x0, r.x1 - v.x0)
-        planes = {name: np.ascontiguousarray(self.shown[name][at], np.float64) for name in SIMULATED if name in self.shown}
+        planes = {name: np.ascontiguousarray(self.shown[name][at]) for name in SIMULATED if name in self.shown}
         call("host_simulate", C.byref(abi.sized(
             abi.HostSimulation, pixels=r.pixels, spp=b.spp, half_spp=b.half_spp, to_spp=spp,
             rgb_to_xyz=tuple(self.recording.frame["rgb_to_xyz"]), **{name: a.ctypes.data for name, a in planes.items()})))
@@ -184,14 +187,14 @@ class Replay:
         b.spp, b.half_spp = spp, spp // 2 if "half" in planes else 0
 
     def _view(self) -> dict[str, Plane]:
-        return {name: Plane(a[..., 0].astype(np.uint32) if name.startswith("dropped") else a) for name, a in self.shown.items()}
+        return {name: Plane(a.astype(np.uint32) if name.startswith("dropped") else a) for name, a in self.shown.items()}
 
     def _ask(self, due: Sequence[int], final: Sequence[bool], after_stop: bool = False) -> None:
         decisions = self.frame.ask(due, final, self._view())
         for i, d in zip(due, decisions):
             b = self.frame.blocks[i]
-            self.answers.append(Answer(i, b.spp, d.action, d.error, d.p_noisy, d.next_spp, d.predicted_spp, d.flags, after_stop,
-                                       self._made[i]))
+            self.answers.append(Answer(i, b.spp, d.action, d.error, d.p_noisy, d.next_spp, d.predicted_spp, d.flags,
+                                       after_stop, self._made[i]))
         self.frame.apply(due, decisions)
         for i in due:
             b = self.frame.blocks[i]
@@ -207,7 +210,7 @@ class Replay:
                 b = self.frame.blocks[i]
                 abi.HostBlock.reason.__set__(b, abi.REASON_NONE)
                 following = self.levels.at_least(i, b.spp + 1) if not self._made[i] else 0
-                if self._advance(i, following or math.ceil(STEP * b.spp)) and self.answers_at(i) != b.spp:
+                if self._advance(i, following or math.ceil(STEP * b.spp)) and b.asked_spp != b.spp:
                     moved.append(i)
             if moved:
                 self._ask(moved, [False] * len(moved), True)
@@ -215,17 +218,17 @@ class Replay:
             if progress:
                 progress(1 - 0.5 * len(moved) / len(self.stops))
 
-    def answers_at(self, i: int) -> int:
-        """Samples at the last answer about a block."""
-        return int(self.frame.blocks[i].asked_spp) if self.frame.blocks[i].asked else 0
+
+Pictures = Mapping[str, np.ndarray]
 
 
-def denoise(recording: Recording, layer: str, by: Optional[Callable[[Mapping[str, np.ndarray]], Mapping[str, np.ndarray]]] = None,
+def denoise(recording: Recording, layer: str, by: Optional[Callable[[Pictures], Pictures]] = None,
             progress: Optional[Callable[[float], None]] = None) -> None:
-    """Adds denoised planes to a recording, look by look; those that are there are not made again. layer: what they are,
-    such as the denoiser with its version. by: gets the whole picture as it was at the look, planes by name [height, width, channels], and gives
-    "denoised", perhaps "denoised_half" and "denoised_rest", [height, width, 3]; by default what lull.denoise gives, alone and with albedo
-    and normal if they were recorded. Where blocks are not in step each has its own samples, as in the render."""
+    """Adds denoised planes to a recording, look by look; those that are there are not made again. layer: what they are, such
+    as the denoiser with its version. by: gets the whole picture as it was at the look, planes by name [height, width,
+    channels], and gives "denoised", perhaps "denoised_half" and "denoised_rest", [height, width, 3]; by default what
+    lull.denoise gives, alone and with albedo and normal if they were recorded. Where blocks are not in step each has its own
+    samples, as in the render."""
     names = [*recording.names, *(["rest"] if "half" in recording.names else [])]
     whole = Rect(0, 0, recording.width, recording.height)
     shown = {name: np.zeros((whole.height, whole.width, channels(name)), np.float64) for name in names}
@@ -240,7 +243,7 @@ def denoise(recording: Recording, layer: str, by: Optional[Callable[[Mapping[str
         if not recording.has_added(layer, number):
             made = by(shown) if by else {"denoised": _denoised(recording, shown, spps)}
             recording.add(layer, number, [
-                Record(1, spp, recording.half_spp(k, spp), k, r, {n: a[r.y0:r.y1, r.x0:r.x1] for n, a in made.items()})
+                Record(LOOK, spp, recording.half_spp(k, spp), k, r, {n: a[r.y0:r.y1, r.x0:r.x1] for n, a in made.items()})
                 for k, spp in sorted(set(look)) for r in [recording.blocks[k]]])
         if progress:
             progress(number / len(recording.looks))
@@ -302,20 +305,25 @@ def _pair(text: str) -> tuple[str, str]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python3 -m lull replay", description="Asks a criterion about a recorded frame (lull-render --sequence DIR --planes LIST), as a "
-        "render asks it: each block at its own level, its neighbours at theirs; looks fall on recorded levels, rounded up. Prints where blocks "
-        "stopped.", epilog="Exit status: 0 done, 2 bad input or an output could not be written.")
-    parser.add_argument("recording", metavar="DIR", help="a recorded frame")
-    parser.add_argument("-c", "--criterion", metavar="NAME|PATH[:ID]", help="whom to ask (default: who was asked while recording, with its parameters)")
-    parser.add_argument("-p", "--param", metavar="KEY=VALUE", type=_pair, action="append", default=[], help="parameter of the criterion; may be repeated")
-    parser.add_argument("-o", "--output", metavar="FILE.json", default="", help="every answer: block, samples, action, error, p, next")
-    parser.add_argument("--block", type=int, metavar="N", help="blocks of so many pixels, of a recording whose blocks are in step")
-    parser.add_argument("--spp-max", type=int, metavar="N", help="samples at which every block ends (default: the recording's)")
-    parser.add_argument("--go-on", action="store_true", help="ask about stopped blocks at all further levels, too")
-    parser.add_argument("--simulate-to", type=int, default=0, metavar="N", help="make levels beyond the recording up to N samples "
-                        "(criteria of color, half and moment2; never denoised); such answers are marked")
-    parser.add_argument("-t", "--threads", type=int, metavar="N", help="worker threads of the criterion (default: all processors)")
-    parser.add_argument("-q", "--quiet", action="store_true", help="no progress, print nothing")
+        prog="python3 -m lull replay", epilog="Exit status: 0 done, 2 bad input or an output could not be written.",
+        description="Asks a criterion about a recorded frame (lull-render --sequence DIR --planes LIST), as a render asks it: "
+        "each block at its own level, its neighbours at theirs; looks fall on recorded levels, rounded up. Prints where blocks "
+        "stopped.")
+    add = parser.add_argument
+    add("recording", metavar="DIR", help="a recorded frame")
+    add("-c", "--criterion", metavar="NAME|PATH[:ID]",
+        help="whom to ask (default: who was asked while recording, with its parameters)")
+    add("-p", "--param", metavar="KEY=VALUE", type=_pair, action="append", default=[],
+        help="parameter of the criterion; may be repeated")
+    add("-o", "--output", metavar="FILE.json", default="", help="every answer: block, samples, action, error, p, next")
+    add("--block", type=int, metavar="N", help="blocks of so many pixels, of a recording whose blocks are in step")
+    add("--spp-max", type=int, metavar="N", help="samples at which every block ends (default: the recording's)")
+    add("--go-on", action="store_true", help="ask about stopped blocks at all further levels, too")
+    add("--simulate-to", type=int, default=0, metavar="N",
+        help="make levels beyond the recording up to N samples (criteria of color, half and moment2; never denoised); such "
+        "answers are marked")
+    add("-t", "--threads", type=int, metavar="N", help="worker threads of the criterion (default: all processors)")
+    add("-q", "--quiet", action="store_true", help="no progress, print nothing")
     return parser
 
 
@@ -329,7 +337,8 @@ def _replay(o: argparse.Namespace) -> None:
     criterion = load(o.criterion or asked["spec"], threads=o.threads, **given)  # type: ignore[index]
     progress = _Progress(criterion.info.id, o.quiet)
     try:
-        found = Replay(recording, criterion, block=o.block, spp_max=o.spp_max, go_on=o.go_on, simulate_to=o.simulate_to).run(progress)
+        found = Replay(recording, criterion, block=o.block, spp_max=o.spp_max, go_on=o.go_on,
+                       simulate_to=o.simulate_to).run(progress)
     finally:
         progress.end()
     if o.output:
