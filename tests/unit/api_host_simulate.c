@@ -7,7 +7,7 @@
 #include <cmocka.h>
 #include <math.h>
 
-#include <lull/host.h>
+#include <lull/host_draft.h>
 
 enum { P = 2 };
 
