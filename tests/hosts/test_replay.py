@@ -18,6 +18,7 @@ from tap import raises
 BUILD = os.path.abspath(os.environ.get("BUILD", "build"))
 SCENE = os.path.abspath("scenes/cornell-box.pbrt")
 TMP = tempfile.TemporaryDirectory()
+os.environ["PYTHONPATH"] = os.pathsep.join(map(os.path.abspath, os.environ["PYTHONPATH"].split(os.pathsep)))
 os.chdir(TMP.name)
 ROUNDING = 1e-6  # of errors: what is left when planes are floats of 32 bits, and the sums of the render doubles
 SIZE, BLOCK = "80x64", "40"
