@@ -309,7 +309,8 @@ setup: ## install the Debian packages that are missing
 	@scripts/setup
 
 tests: $(TESTS) test-tools
-test-tools: $(ABI_PLUGINS) $(OIDN_STUB) $(OUT)/tests/approve $(OUT)/tests/processors/embree_isa.so # what test scripts need
+test-tools: $(ABI_PLUGINS) $(OIDN_STUB) $(OUT)/tests/approve $(OUT)/tests/processors/embree_isa.so \
+    $(OUT)/bench/ggn_golden $(OUT)/bench/ggn_networks # what test scripts need
 replay: $(REPLAY)
 
 # Sub-makes, so that packages installed by setup are seen by pkg-config; by all processors, if no -j says by how many.
@@ -362,7 +363,7 @@ host-model: $(BIN)/lull-render $(CRITERIA) ## 1,000 runs that are interrupted, k
 	@tests/model/host.py $(MODEL_FLAGS)
 
 # Every header compiles alone; the ABI header also as C99 and C++11.
-HEADERS := $(shell find pathtracer ggn plugin-api tests -name '*.h' 2>/dev/null)
+HEADERS := $(shell find pathtracer ggn plugin-api tests -name '*.h' -type f 2>/dev/null)
 LOOK := -fsyntax-only
 C_LOOK = $(CC) -std=c17 -D_POSIX_C_SOURCE=200809L $(WARNC) -Wno-unused-const-variable
 PUBLIC := $(addprefix plugin-api/include/lull/,criterion.h criterion_kit.h host.h host_draft.h)
@@ -406,7 +407,8 @@ INSTALLED = $(call put,$(PREFIX)/bin,755,$(PROGRAMS) scripts/packages/lull-denoi
     $(call put,$(libdir)/lull,755,$(CRITERIA)) $(call put,$(libdir)/lull/modules,755,$(MODULES)) \
     $(call put,$(share)/man/man1,644,$(wildcard docs/man/*.1)) $(call put,$(share)/man/man7,644,$(wildcard docs/man/*.7)) \
     $(call put,$(share)/bash-completion/completions,644,$(wildcard scripts/packages/completions/*)) \
-    $(call put,$(share)/lull,644,$(wildcard ggn/models/*.ggn)) \
+    $(call put,$(share)/lull,644,$(wildcard ggn/models/*.ggn) plugin-api/base/version.h \
+        $(addprefix plugin-api/python/lull/,program.py version.py)) \
     $(foreach p,judge plot,$(call put,$(share)/lull/$(p),644,$(wildcard plugin-api/python/lull/$(p)/*.py))) \
     $(call put,$(share)/lull/study,644,$(wildcard $(STUDY)/*.py)) \
     $(call put,$(share)/lull/study/page,644,$(wildcard $(STUDY)/page/*.*)) \
@@ -417,12 +419,14 @@ OWN_FOLDERS = $(libdir)/lull/modules $(libdir)/lull $(libdir)/cmake/lull $(PREFI
 OWN_LINK = $(filter-out $(libdir)/lull,$(PREFIX)/lib/lull)
 PC_FILES := $(OUT)/lull-criterion.pc $(OUT)/lull-host.pc
 CMAKE_FILES := $(OUT)/lull-config.cmake $(OUT)/lull-config-version.cmake
-VERSION = $(shell sed -n 's/^version = "\(.*\)"/\1/p' plugin-api/python/pyproject.toml)
+# 1.2 of LULL_HOST_MAJOR and LULL_HOST_MINOR
+version = $(shell sed -n 's/^\#define $(1)_M[AI][JN]OR \([0-9]*\).*/\1/p' plugin-api/include/lull/$(2) | paste -sd.)
 .PHONY: $(PC_FILES) $(CMAKE_FILES)
 $(PC_FILES) $(CMAKE_FILES): $(OUT)/%: plugin-api/%.in
 	@mkdir -p $(@D)
 	@sed -e 's|@PREFIX@|$(PREFIX)|g' -e 's|@LIBDIR@|$(patsubst $(PREFIX)/%,$${prefix}/%,$(libdir))|g' \
-	    -e 's|@VERSION@|$(VERSION)|g' \
+	    -e 's|@CRITERION_VERSION@|$(call version,LULL_API,criterion.h)|g' \
+	    -e 's|@HOST_VERSION@|$(call version,LULL_HOST,host.h)|g' \
 	    -e "s|@UP@|$$(realpath -ms --relative-to=$(libdir)/cmake/lull $(PREFIX))|g" $< >$@
 
 install: all $(PC_FILES) $(CMAKE_FILES) ## install programs, libraries, headers, models, pages under $(DESTDIR)$(PREFIX)

@@ -20,8 +20,6 @@
 
 /* X(name, one-line help), in the order `ggn --help` lists them. */
 #define GGN_COMMANDS(X) \
-    X(bench, "measure inference and training speed") \
-    X(golden, "print the golden values of the published networks as JSON") \
     X(inspect, "print what a model file holds") \
     X(convert, "store a model's weights in another type") \
     X(flip, "visible difference of two images (LDR-FLIP)") \

@@ -1,11 +1,12 @@
-/* `ggn flip REFERENCE TEST`: LDR-FLIP of two images. */
+/* `ggn flip REFERENCE TEST`: how far two images are apart, by LDR-FLIP, SSIM and relMSE. */
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "base/options.h"
 #include "cli/commands.h"
-#include "observer/flip.h"
 #include "picture/png.h"
+#include "sight/flip.h"
+#include "sight/quality.h"
 
 struct options {
     const char *paths[2];
@@ -17,7 +18,7 @@ struct options {
 static const char *const pictures[] = {"png", NULL}; /* endings */
 #define TO(member) BASE_TO(struct options, member)
 static const struct base_option list[] = {
-    {"json", 'j', NULL, TO(json), .help = "print {\"mean\": …, \"max\": …}"},
+    {"json", 'j', NULL, TO(json), .help = "print {\"mean\": …, \"max\": …, \"ssim\": …, \"relmse\": …}"},
     {"output", 'o', "MAP.png", TO(map_path), .output = BASE_FILE, .words = pictures,
      .help = "write the error map as a picture (magma, black 0 … white 1)"},
     {"ppd", 'p', "N", TO(ppd), 1, 1000, .help = "pixels per degree of the viewer (67.02)"},
@@ -33,11 +34,13 @@ int ggn_cmd_flip(int argc, char **argv, struct base_err *err)
         .args_are = BASE_ARGS_FILES,
         .args = offsetof(struct options, paths),
         .doc =
-            "Visible difference of two display images: LDR-FLIP (Andersson et al. 2020), mean and maximum over the pixels."};
+            "Visible difference of two display images: LDR-FLIP (Andersson et al. 2020), mean and maximum over the pixels; "
+            "beside it their SSIM (Wang et al. 2004) and the relative mean square error of their light."};
     struct options o = {.ppd = GGN_FLIP_PPD};
     struct pic_image images[2] = {{0}, {0}};
     struct ggn_flip_stats stats;
     float *map = NULL;
+    double ssim = 0.0;
 
     int rc = base_options_parse(&options, argc, argv, &o, err);
     if (!rc)
@@ -53,7 +56,11 @@ int ggn_cmd_flip(int argc, char **argv, struct base_err *err)
         free(rgb);
     }
     if (!rc)
-        printf(o.json ? "{\"mean\": %.6f, \"max\": %.6f}\n" : "mean %.6f\nmax  %.6f\n", stats.mean, stats.max);
+        rc = ggn_quality_ssim(&images[0], &images[1], &ssim, err);
+    if (!rc)
+        printf(o.json ? "{\"mean\": %.6f, \"max\": %.6f, \"ssim\": %.6f, \"relmse\": %.6g}\n"
+                      : "mean   %.6f\nmax    %.6f\nssim   %.6f\nrelmse %.6g\n",
+               stats.mean, stats.max, ssim, ggn_quality_relmse(&images[0], &images[1]));
     free(map);
     pic_release(&images[0]);
     pic_release(&images[1]);

@@ -53,23 +53,24 @@ static int import_one(const struct options *o, const char *dir, struct base_err 
 
 static int is_visible(const struct dirent *e) { return e->d_name[0] != '.'; }
 
-/* Every view folder in the root, in order of name. */
+/* Every view folder in the root, in order of name: a look at all, then the work. */
 static int import_all(const struct options *o, struct base_err *err)
 {
     struct dirent **entries;
     int rc = 0, found = 0, n = scandir(o->dir, &entries, is_visible, alphasort);
     if (n < 0)
         return base_fail(err, BASE_EIO, "%s: %s", o->dir, strerror(errno));
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < 2 * n && !rc && !base_interrupted; i++) {
         char path[4096];
         struct stat st;
-        const int too_long = base_file_join(path, o->dir, entries[i]->d_name, NULL);
-        free(entries[i]);
-        if (rc || base_interrupted || too_long || stat(path, &st) != 0 || !S_ISDIR(st.st_mode) || !ggn_import_is_view(path))
+        if (base_file_join(path, o->dir, entries[i % n]->d_name, NULL) != 0 || stat(path, &st) != 0 ||
+            !S_ISDIR(st.st_mode) || ggn_import_pictures(path) == 0)
             continue;
         found++;
-        rc = import_one(o, path, err);
+        rc = i < n ? ggn_import_check(path, &o->how, err) : import_one(o, path, err);
     }
+    while (n > 0)
+        free(entries[--n]);
     free(entries);
     if (!rc && !found)
         rc = base_fail(err, BASE_EINVAL, "%s: no NAME_00020.png (.jpg, .exr, .rawls) … in it or in its folders", o->dir);
@@ -95,14 +96,14 @@ int ggn_cmd_import(int argc, char **argv, struct base_err *err)
         return rc;
     base_interrupt_catch();
     if (o.thresholds) {
-        rc = ggn_thresholds_read(o.thresholds, o.how.block, &thresholds, err);
+        rc = ggn_thresholds_read(o.thresholds, (int[2]){o.how.block, o.how.block}, &thresholds, err);
         o.how.thresholds = &thresholds;
     }
     int made = 0;
     if (!rc)
         rc = base_make_folder(o.out, &made, err);
     if (!rc)
-        rc = ggn_import_is_view(o.dir) ? import_one(&o, o.dir, err) : import_all(&o, err);
+        rc = ggn_import_pictures(o.dir) > 1 ? import_one(&o, o.dir, err) : import_all(&o, err);
     ggn_thresholds_release(&thresholds);
     if (rc && made)
         rmdir(o.out); /* goes only if nothing was imported */

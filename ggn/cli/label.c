@@ -11,10 +11,10 @@
 #include "cli/commands.h"
 #include "data/dataset.h"
 #include "data/thresholds.h"
-#include "figures/stats.h"
+#include "sight/stats.h"
 #include "job/farm.h"
-#include "observer/calibrate.h"
-#include "observer/views.h"
+#include "train/calibrate.h"
+#include "train/views.h"
 
 enum { MAX_INPUTS = 256 };
 
@@ -55,12 +55,16 @@ static const struct base_option list[] = {
     {"threads", 't', "N", TO(threads), 1, 1024, .help = "worker threads (all processors)"},
     {0}};
 
+static const int study_block[2] = {200, 200};
+
 /* The row of human thresholds of a view. */
 static int find_row(const char *csv, const char *name, const struct ggn_thresholds *t, const struct ggn_view **row,
                     struct base_err *err)
 {
     *row = ggn_thresholds_of(t, name);
-    return *row ? 0 : base_fail(err, BASE_EINVAL, "%s: no thresholds for '%s'", csv, name);
+    if (!*row)
+        return base_fail(err, BASE_EINVAL, "%s: no thresholds for '%s'", csv, name);
+    return (*row)->of_study ? 0 : base_fail(err, BASE_EINVAL, "%s: these are no thresholds of people's study", csv);
 }
 
 /* From thresholds of the study to samples at which no noise is seen at all. */
@@ -76,11 +80,17 @@ static void convert_from_study(struct ggn_labels *l)
     snprintf(l->detail + used, sizeof l->detail - used, ", as samples at which no noise is seen at all");
 }
 
+/* The last level, as of imported pictures. */
+static int has_own_reference(const struct ggn_dataset_view *v)
+{
+    return !v->manifest.reference_independent && v->manifest.reference_spp > 0;
+}
+
 /* Of imported pictures the thresholds that the import would attach; of a recording they are those of the study. */
 static int human_labels(const struct options *o, const struct ggn_thresholds *t, const struct ggn_dataset_view *v,
                         struct ggn_labels *out, struct base_err *err)
 {
-    const int own_pictures = !v->manifest.reference_independent && v->manifest.reference_spp > 0;
+    const int own_pictures = has_own_reference(v);
     const struct ggn_view *row;
     struct base_err why = {0};
     int rc = find_row(o->human, o->view ? o->view : v->name, t, &row, err);
@@ -163,8 +173,9 @@ static int label_view(const struct labelling *l, const struct ggn_dataset_view *
     if (!rc && o->human)
         printf("%s: %u blocks labelled with human thresholds\n", v->dir, labels.n);
     else if (!rc)
-        printf("%s: %u blocks labelled by the model observer, %u censored at %.0f spp\n", v->dir, labels.n, censored,
-               labels.cap);
+        printf("%s: %u blocks labelled by the model observer, %u censored at %.0f spp%s\n", v->dir, labels.n, censored,
+               labels.cap,
+               o->source == GGN_FROM_LEVELS && has_own_reference(v) ? "; the reference is the last level itself" : "");
     ggn_labels_release(&labels);
     return rc;
 }
@@ -222,7 +233,7 @@ static int label(const struct options *o, struct base_threads *threads, struct b
     if (o->spread > 0)
         observer.spread = o->spread;
     if (!rc && o->human)
-        rc = ggn_thresholds_read(o->human, 200, &human, err);
+        rc = ggn_thresholds_read(o->human, study_block, &human, err);
     if (!rc && !o->check)
         rc = job_handshake(ggn_cmd_job, "version=" BASE_VERSION "\n", base_threads_count(threads), err);
     for (int i = 0; i < 2 * o->n_inputs && !rc && !base_interrupted; i++) { /* a look at all, then the work */
@@ -269,7 +280,7 @@ static int calibrate(const struct options *o, struct base_threads *threads, stru
     struct ggn_thresholds t = {0};
     struct ggn_calibration c = {0};
     size_t room = 1;
-    int n = 0, rc = ggn_thresholds_read(o->calibrate, 200, &t, err);
+    int n = 0, rc = ggn_thresholds_read(o->calibrate, study_block, &t, err);
     for (int s = 0; s < o->n_inputs && !rc; s++) {
         rc = ggn_dataset_open(o->inputs[s], &sets[s], err);
         room += rc ? 0 : (size_t)sets[s].n;

@@ -39,7 +39,7 @@ int ggn_cmd_read_pair(const char *command, const char *const paths[2], struct pi
 {
     int rc = 0, at[2][2];
     for (int i = 0; i < 2 && !rc; i++)
-        rc = pic_read_display(paths[i], &images[i], err);
+        rc = pic_read_light(paths[i], &images[i], err);
     for (int i = 0; i < 2 && !rc; i++)
         if (images[i].clipped > 0)
             fprintf(stderr, "%s: %s: %zu pixels are NaN, infinite or negative; they are compared as black or white\n",

@@ -10,7 +10,7 @@
 #include "data/labels.h"
 #include "sequence/manifest.h"
 #include "data/thresholds.h"
-#include "observer/flip.h"
+#include "sight/flip.h"
 #include "picture/png.h"
 
 struct options {
@@ -172,8 +172,8 @@ int ggn_cmd_reconstruct(int argc, char **argv, struct base_err *err)
     if (!rc && !o.stops)
         rc = ggn_labels_read(o.dir, &labels, err);
     if (!rc && o.stops) {
-        rc = ggn_thresholds_read(o.stops, (int)m.block, &stops, err);
-        view = rc ? NULL : o.view ? ggn_thresholds_find(&stops, o.view) : stops.n == 1 ? &stops.views[0] : NULL;
+        rc = ggn_thresholds_read(o.stops, (int[2]){(int)m.block, (int)m.block}, &stops, err);
+        view = rc ? NULL : o.view ? ggn_thresholds_of(&stops, o.view) : stops.n == 1 ? &stops.views[0] : NULL;
         if (!rc && !view)
             rc = base_fail(err, BASE_EINVAL, "%s: %s", o.stops,
                            o.view ? "no such view" : "several views: --view NAME chooses one");

@@ -11,7 +11,7 @@
 #include "base/options.h"
 #include "baselines/learned.h"
 #include "cli/commands.h"
-#include "observer/observer.h"
+#include "sight/observer.h"
 
 enum { MAX_FILES = 16, MAX_ADJUSTED = 8, USUAL_WINDOW = 6 };
 

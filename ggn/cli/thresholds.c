@@ -5,17 +5,25 @@
 #include "base/options.h"
 #include "cli/commands.h"
 #include "data/thresholds.h"
+#include "picture/image.h"
 
 enum { MAX_FILES = 64 };
 
 struct options {
     const char *paths[MAX_FILES];
-    int block;
+    int block[2];
 };
 
-#define TO(member) BASE_TO(struct options, member)
+static int set_block(void *into, const char *value, struct base_err *err)
+{
+    struct options *o = into;
+    return base_parse_block(value, PIC_MAX_SIDE, o->block)
+               ? 0
+               : base_fail(err, BASE_EINVAL, "expected N or WxH, each from 1 to %d", PIC_MAX_SIDE);
+}
+
 static const struct base_option list[] = {
-    {"block", 'b', "PIXELS", TO(block), 1, 32768, .help = "side of a block in an EXR stop map (200)"}, {0}};
+    {"block", 'b', "N|WxH", .set = set_block, .help = "blocks of an EXR that does not say theirs, in pixels (200)"}, {0}};
 
 static void put_file(const struct ggn_thresholds *t, cJSON *to, int *failed)
 {
@@ -24,6 +32,7 @@ static void put_file(const struct ggn_thresholds *t, cJSON *to, int *failed)
         cJSON *view = base_json_object(to, NULL, failed);
         base_json_text(view, "name", v->name, failed);
         base_json_bool(view, "unnamed", v->unnamed, failed);
+        base_json_bool(view, "of_study", v->of_study, failed);
         base_json_number(view, "columns", v->columns, failed);
         base_json_numbers(view, "spp", v->spp, v->n, failed);
     }
@@ -40,7 +49,7 @@ int ggn_cmd_thresholds(int argc, char **argv, struct base_err *err)
         .args = offsetof(struct options, paths),
         .doc = "Prints the thresholds or stops of blocks as JSON: for each FILE a list of views. A file may be CSV "
                "(name;t0;...), a render's report JSON, labels.json, or an EXR with the channel lull.spp.V."};
-    struct options o = {.block = 200};
+    struct options o = {.block = {200, 200}};
     cJSON *root = cJSON_CreateArray();
     int failed = !root, rc = base_options_parse(&options, argc, argv, &o, err);
     for (int i = 0; i < MAX_FILES && o.paths[i] && !rc; i++) {

@@ -4,7 +4,7 @@
 
 #include "base/options.h"
 #include "cli/commands.h"
-#include "observer/remaining.h"
+#include "sight/remaining.h"
 #include "picture/png.h"
 
 struct options {

@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -28,6 +29,7 @@ struct view {
     char dir[4096], prefix[GGN_VIEW_NAME];
     const char *ending;   /* of all files, static */
     int n, has_halves;    /* has_halves: in files of their own, or as a layer of each level's */
+    int pictures;         /* halves included */
     struct level *levels; /* owns; rising */
 };
 
@@ -40,7 +42,7 @@ static size_t split_name(const char *name, uint32_t *spp, int *is_half, const ch
 {
     const char *dot = strrchr(name, '.'), *digits = dot;
     int i = 0;
-    while (endings[i] && (!dot || strcmp(dot, endings[i]) != 0))
+    while (endings[i] && (!dot || strcasecmp(dot, endings[i]) != 0))
         i++;
     if (!endings[i])
         return 0;
@@ -76,49 +78,107 @@ static struct level *find_level(struct view *v, uint32_t spp)
     return &levels[v->n++];
 }
 
+/* Names of one sequence among those of a folder. */
+struct series {
+    char prefix[GGN_VIEW_NAME];
+    int pictures;
+};
+
+/* The series of each name of a level; *largest among equals is that which came first. Returns how many there are, or
+ * BASE_ENOMEM. */
+static int list_series(struct dirent **entries, int n, struct series **out, int *largest)
+{
+    struct series *list = malloc((size_t)(n + 1) * sizeof *list);
+    int count = 0, is_half;
+    const char *ending;
+    uint32_t spp;
+    if (!list)
+        return BASE_ENOMEM;
+    for (int i = 0; i < n; i++) {
+        const char *name = entries[i]->d_name;
+        const size_t length = split_name(name, &spp, &is_half, &ending);
+        int k = 0;
+        if (length == 0 || length >= GGN_VIEW_NAME)
+            continue;
+        while (k < count && !(strncmp(list[k].prefix, name, length) == 0 && list[k].prefix[length] == '\0'))
+            k++;
+        if (k == count) {
+            list[count] = (struct series){0};
+            memcpy(list[count++].prefix, name, length);
+        }
+        list[k].pictures++;
+    }
+    *largest = 0;
+    for (int k = 1; k < count; k++)
+        *largest = list[k].pictures > list[*largest].pictures ? k : *largest;
+    *out = list;
+    return count;
+}
+
+static int is_visible(const struct dirent *e) { return e->d_name[0] != '.'; }
+
 static int add_file(struct view *v, const char *name, struct base_err *err)
 {
     uint32_t spp;
     int is_half;
     const char *ending;
-    size_t length = split_name(name, &spp, &is_half, &ending);
-    if (length == 0)
+    const size_t length = split_name(name, &spp, &is_half, &ending);
+    if (length == 0 || strncmp(v->prefix, name, length) != 0 || v->prefix[length] != '\0')
         return 0;
-    if (length >= sizeof v->prefix || strlen(name) >= sizeof v->levels->file)
+    if (strlen(name) >= sizeof v->levels->file)
         return base_fail(err, BASE_EINVAL, "%s/%s: the name is too long", v->dir, name);
-    if (v->n == 0) {
-        memcpy(v->prefix, name, length);
-        v->ending = ending;
-    } else if (strncmp(v->prefix, name, length) != 0 || v->prefix[length] != '\0' || v->ending != ending) {
-        return base_fail(err, BASE_EINVAL, "%s: '%s' does not belong to the sequence '%s'", v->dir, name, v->prefix);
-    }
+    if (v->ending && v->ending != ending)
+        return base_fail(err, BASE_EINVAL, "%s/%s: the sequence '%s' has %s files, too", v->dir, name, v->prefix, v->ending);
+    v->ending = ending;
     struct level *level = find_level(v, spp);
     if (!level)
         return base_fail_nomem(err, v->dir);
     char *file = is_half ? level->half : level->file;
     if (file[0])
-        return base_fail(err, BASE_EINVAL, "%s: two images for %u spp", v->dir, spp);
+        return base_fail(err, BASE_EINVAL, "%s: two images for %u spp, '%s' and '%s'", v->dir, spp, file, name);
     strcpy(file, name);
     return 0;
 }
 
-/* In order of name, so that the first file that is wrong is the same on every file system. */
+/* The folder's one sequence. Single pictures of other names are none; a second sequence might be what was meant. In order
+ * of name, so that the first file that is wrong is the same on every file system. */
 static int scan(const char *dir, struct view *v, struct base_err *err)
 {
     struct dirent **entries;
-    int rc = 0, n = scandir(dir, &entries, NULL, alphasort);
+    struct series *series = NULL;
+    int rc = 0, largest, n = scandir(dir, &entries, is_visible, alphasort);
     snprintf(v->dir, sizeof v->dir, "%s", dir);
     if (n < 0)
         return base_fail(err, BASE_EIO, "%s: %s", dir, strerror(errno));
+    const int count = list_series(entries, n, &series, &largest);
+    if (count < 0)
+        rc = base_fail_nomem(err, dir);
+    else if (count > 0) {
+        v->pictures = series[largest].pictures;
+        snprintf(v->prefix, sizeof v->prefix, "%s", series[largest].prefix);
+    }
+    for (int k = 0; k < count && !rc; k++)
+        if (k != largest && (series[k].pictures > 1 || v->pictures == 1))
+            rc = base_fail(err, BASE_EINVAL, "%s: pictures of '%s' and of '%s' (expected those of one view)", dir, v->prefix,
+                           series[k].prefix);
     for (int i = 0; i < n; i++) {
         if (!rc)
             rc = add_file(v, entries[i]->d_name, err);
         free(entries[i]);
     }
     free(entries);
+    free(series);
     if (v->n > 0)
         qsort(v->levels, (size_t)v->n, sizeof *v->levels, compare_levels);
     return rc;
+}
+
+int ggn_import_pictures(const char *dir)
+{
+    struct view v = {0};
+    scan(dir, &v, NULL);
+    free(v.levels);
+    return v.pictures;
 }
 
 /* Samples of the first level that an evenly spaced sequence lacks: most steps are the smallest one, and the others are
@@ -160,12 +220,14 @@ static int check_levels(const struct view *v, int allow_gaps, struct base_err *e
                    : 0;
 }
 
-int ggn_import_is_view(const char *dir)
+int ggn_import_check(const char *dir, const struct ggn_import_options *o, struct base_err *err)
 {
     struct view v = {0};
-    int ok = scan(dir, &v, NULL) == 0 && v.n > 0;
+    int rc = scan(dir, &v, err);
+    if (!rc)
+        rc = check_levels(&v, o->allow_gaps, err);
     free(v.levels);
-    return ok;
+    return rc;
 }
 
 void ggn_import_scene(const char *view, char *scene, size_t room)
@@ -279,13 +341,26 @@ static int read_pair(const struct view *v, const struct level *level, struct pai
     return rc;
 }
 
-static int has_halves(const struct view *v)
+static int has_half_layer(const struct view *v, const struct level *level)
 {
     struct pic_image half = {0};
-    const struct level *first = &v->levels[0];
-    int has = first->half[0] || (!strcmp(v->ending, ".exr") && !read_picture(v, first->file, HALF, &half, NULL));
+    char path[4400];
+    snprintf(path, sizeof path, "%s/%s", v->dir, level->file);
+    int has = !pic_read_layer(path, HALF, &half, NULL);
     pic_release(&half);
     return has;
+}
+
+/* In files of their own, or in those of all levels: where the first has one, reading the others will tell. */
+static int find_halves(struct view *v, struct base_err *err)
+{
+    const int is_exr = !strcmp(v->ending, ".exr");
+    v->has_halves = v->levels[0].half[0] || (is_exr && has_half_layer(v, &v->levels[0]));
+    for (int i = 1; i < v->n && is_exr && !v->has_halves; i++)
+        if (has_half_layer(v, &v->levels[i]))
+            return base_fail(err, BASE_EINVAL, "%s: '%s' has a half, '%s' has none; all or none are needed", v->dir,
+                             v->levels[i].file, v->levels[0].file);
+    return 0;
 }
 
 /* Work on one row of blocks: all its builders fill level by level, so that each image is read once per row. */
@@ -476,12 +551,9 @@ static int take_over(const char *out, struct seq_manifest *m, struct base_err *e
 static int attach_thresholds(const struct view *v, const char *out, const struct seq_manifest *m,
                              const struct ggn_thresholds *t, int *labelled, struct base_err *err)
 {
-    char with_part[GGN_VIEW_NAME + 8];
-    snprintf(with_part, sizeof with_part, "%s_part6", v->prefix);
-    const char *const names[] = {with_part, v->prefix, base_file_name(v->dir)};
-    const struct ggn_view *row = NULL;
-    for (int i = 0; i < 3 && t && !row; i++)
-        row = ggn_thresholds_find(t, names[i]);
+    const struct ggn_view *row = t ? ggn_thresholds_of(t, v->prefix) : NULL;
+    if (t && !row)
+        row = ggn_thresholds_of(t, base_file_name(v->dir));
     *labelled = row != NULL;
     if (!row)
         return 0;
@@ -505,10 +577,10 @@ int ggn_import_view(const char *dir, const char *out, const struct ggn_import_op
                  : base_fail(err, BASE_EINVAL, "%.64s...: the path is too long", dir);
     if (!rc)
         rc = check_levels(&v, o->allow_gaps, err);
-    if (!rc) {
-        v.has_halves = has_halves(&v);
+    if (!rc)
+        rc = find_halves(&v, err);
+    if (!rc)
         rc = init_manifest(&v, o, &m, err);
-    }
     int made = 0;
     if (!rc)
         rc = base_make_folder(out, &made, err);

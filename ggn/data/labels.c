@@ -1,5 +1,6 @@
 #include "data/labels.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -120,12 +121,15 @@ int ggn_labels_read(const char *dir, struct ggn_labels *labels, struct base_err 
     return rc;
 }
 
+/* The same as cJSON keeps it: of numbers that agree to DBL_EPSILON it may write one for the other. */
+static int is_stored_as(double a, double b) { return fabs(a - b) <= DBL_EPSILON * fmax(a, b); }
+
 static int is_same(const struct ggn_labels *a, const struct ggn_labels *b)
 {
     int same = strcmp(a->source, b->source) == 0 && a->n == b->n;
     for (uint32_t i = 0; i < a->n && same; i++) {
         const struct ggn_label *l = ggn_labels_find(b, a->labels[i].id);
-        same = l && l->threshold == a->labels[i].threshold && l->censored == a->labels[i].censored;
+        same = l && is_stored_as(a->labels[i].threshold, l->threshold) && l->censored == a->labels[i].censored;
     }
     return same;
 }

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <zlib.h>
 
-#include "figures/stats.h"
+#include "sight/stats.h"
 #include "sequence/simulate.h"
 
 enum { MAX_CHAINS = 1 << 16 };

@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 #include "data/dataset.h"
-#include "model/measure.h"
+#include "sight/measure.h"
 #include "model/policy.h"
 
 struct ggn_level_series {
@@ -29,7 +29,7 @@ struct ggn_level_series {
      * below it share */
     uint8_t *reference;
     int has_reference;
-    /* with set->noise_maps: the noise maps (of the visible noise, model/measure.h),
+    /* with set->noise_maps: the noise maps (of the visible noise, sight/measure.h),
      * [n_levels][H][W], and whether a level has one */
     uint8_t *noise_map, *has_noise_map;
     struct ggn_measure *measure; /* [n_levels], with set->meter; visible is NaN where there are no halves */
@@ -57,7 +57,7 @@ struct ggn_series_set_options {
     struct ggn_split_options split;
     double ratio;      /* thin the levels to at least this ratio; 0: keep all */
     int noise_maps;    /* with measures: also keep the noise maps */
-    int measures;      /* also measure every level (model/measure.h) */
+    int measures;      /* also measure every level (sight/measure.h) */
     int keep_recorded; /* ggn_series_set_extend makes what it simulates further series */
     int with_test;     /* read the pixels of the test scenes and of the people's views too; else some must be for training */
 };

@@ -2,7 +2,7 @@
 
 #include <stdlib.h>
 
-#include "model/preprocess.h"
+#include "sight/preprocess.h"
 #include "sequence/simulate.h"
 
 enum { MAX_SIMULATED = 64 };

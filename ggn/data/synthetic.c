@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/preprocess.h"
+#include "sight/preprocess.h"
 #include "nn/hash.h"
 #include "data/series.h"
 #include "sequence/simulate.h"
@@ -81,7 +81,7 @@ static int make_levels(const struct ggn_series_set *set, struct ggn_level_series
         return rc;
     c->n_levels = kept + n;
     memcpy(c->spp + kept, spp, (size_t)n * sizeof *spp);
-    /* The texture of all levels to be measured is that of the recorded halves, as in the labels (observer/curve.h): `base`
+    /* The texture of all levels to be measured is that of the recorded halves, as in the labels (sight/curve.h): `base`
      * has noise of its own that the levels share. */
     if (set->meter.memory && n)
         ggn_series_measure(set, c, kept, s->base, s->d, 1, 0);

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "figures/stats.h"
+#include "sight/stats.h"
 #include "model/stopper.h"
 
 void ggn_method_release(struct ggn_method *m)

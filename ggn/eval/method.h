@@ -11,7 +11,7 @@
 #include "eval/set.h"
 #include "model/inference.h"
 #include "model/policy.h"
-#include "observer/observer.h"
+#include "sight/observer.h"
 
 enum { GGN_METHOD_NAME = 48 };
 

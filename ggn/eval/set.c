@@ -5,8 +5,8 @@
 
 #include "data/each.h"
 #include "nn/ssim.h"
-#include "observer/curve.h"
-#include "observer/flip.h"
+#include "sight/curve.h"
+#include "sight/flip.h"
 #include "sequence/simulate.h"
 #include "sequence/tail.h"
 

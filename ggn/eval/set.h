@@ -27,7 +27,7 @@ struct ggn_eval_set {
     double *spp, *seconds;         /* own; [n]; seconds: thread time spent on the block so far, NaN if unknown */
     signed char *noisy;            /* owns; [n]: 1, 0, or -1 unknown */
     double *dammertz, *half_unsettled, *rse, *rse_unsettled; /* own; [n]; NaN where not recorded */
-    double *visible;       /* owns; [n]: noise that the model observer sees (model/visibility.h); NaN without halves */
+    double *visible;       /* owns; [n]: noise that the model observer sees (sight/visibility.h); NaN without halves */
     double *visible_means; /* owns; [n]: the same in a host without half buffers; NaN without levels to tell it */
     const double *law;     /* visible or visible_means: what residual models begin with */
     double *flip, *ssim;   /* own; [n]: against the reference, else the mean of the full level; NaN unless asked for */

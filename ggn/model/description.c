@@ -5,7 +5,7 @@
 
 #include "base/json.h"
 #include "base/options.h"
-#include "model/measure.h"
+#include "sight/measure.h"
 #include "model/model.h"
 
 /* Hyper-parameters and calibration as tables, so that reading and writing cannot disagree. spacing: 1 where levels are not

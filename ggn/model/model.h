@@ -7,7 +7,7 @@
  *    "calibration": {"scale", "shift", "threshold", "consecutive", "spacing"}, "provenance": {...}}
  *
  * and "picture": 1 in a model that takes the noise map. A residual model has "residual", the octaves of noise by which its
- * network may correct the law of visible noise, and "scalars", how many numbers the network is given (model/measure.h).
+ * network may correct the law of visible noise, and "scalars", how many numbers the network is given (sight/measure.h).
  *
  * Read-only after loading: any number of threads and criteria may share one model.
  */

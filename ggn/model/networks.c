@@ -1,6 +1,6 @@
 #include "model/networks.h"
 
-#include "model/measure.h"
+#include "sight/measure.h"
 
 const char *const ggn_preset_names[] = {"paper", "lull", NULL};
 

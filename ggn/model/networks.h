@@ -26,7 +26,7 @@ struct ggn_hyper {
     int window;        /* images per window, S; 1..16 */
     int k_r, k_m, k_d; /* widths; 1..128, of D 1..64 */
     int noise_map;     /* 1: D also gets the noise map of the newest image; not in the published form */
-    /* > 0: D's answer corrects the law of visible noise by up to so many octaves of noise (model/measure.h); its last layer
+    /* > 0: D's answer corrects the law of visible noise by up to so many octaves of noise (sight/measure.h); its last layer
      * starts at zero, where it is the law. 0: the answer is D's alone, as published */
     double reach;
     int scalars; /* 0, or GGN_SCALARS: numbers that D's linear layers also read; with reach */

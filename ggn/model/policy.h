@@ -9,7 +9,7 @@
 #include <stddef.h>
 
 #include "base/err.h"
-#include "model/preprocess.h"
+#include "sight/preprocess.h"
 
 struct cJSON;
 

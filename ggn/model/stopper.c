@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "model/measure.h"
+#include "sight/measure.h"
 
 static uint64_t to_spp(double spp) { return spp >= 1e18 ? UINT64_C(1000000000000000000) : (uint64_t)spp; }
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/measure.h"
+#include "sight/measure.h"
 #include "nn/hash.h"
 #include "nn/loss.h"
 #include "nn/ssim.h"

@@ -33,7 +33,7 @@ struct ggn_value {
     size_t size;       /* elements of all planes */
     size_t offset;     /* where the value starts among the activations of one image */
     int uses;          /* layers that read it */
-    const char *stage; /* name under which `ggn golden` reports its rms, or NULL; static */
+    const char *stage; /* name under which the golden values (tests/support/ggn_golden.h) have its rms, or NULL; static */
 };
 
 /* The layers: OP(enumerator, name of its passes in nn/layers.h, name for people).
@@ -114,7 +114,7 @@ int ggn_graph_up(struct ggn_graph *g, int in, int pad_y, int pad_x);
 int ggn_graph_flatten(struct ggn_graph *g, int in);
 int ggn_graph_linear(struct ggn_graph *g, int in, int in2, int c_out);
 int ggn_graph_dropout(struct ggn_graph *g, int in, double p); /* of a vector */
-/* Names the value for `ggn golden`. */
+/* Names the value for the golden values. */
 void ggn_graph_mark(struct ggn_graph *g, int value, const char *stage);
 /* Plans the backward pass; the last value is the output. BASE_EINVAL with the first failure. */
 int ggn_graph_end(struct ggn_graph *g, struct base_err *err);

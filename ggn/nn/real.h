@@ -56,9 +56,6 @@ typedef double real;
 #define ggn_inference_denoise GGN_TYPED(ggn_inference_denoise)
 #define ggn_inference_logit GGN_TYPED(ggn_inference_logit)
 
-#define ggn_golden_pixel GGN_TYPED(ggn_golden_pixel)
-#define ggn_golden_run GGN_TYPED(ggn_golden_run)
-
 #endif
 
 /* The larger one; a NaN where there is one. */

@@ -7,8 +7,8 @@
  * the network only corrects it. `error` is then the visible noise over what is just visible.
  */
 #include "model/inference.h"
-#include "model/measure.h"
-#include "observer/observer.h"
+#include "sight/measure.h"
+#include "sight/observer.h"
 #include "plugin/pair.h"
 #include "plugin/translate.h"
 #include "plugin/windowed.h"

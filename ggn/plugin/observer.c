@@ -1,6 +1,6 @@
 /*
- * The criterion "observer": the model observer (observer/observer.h) in the renderer. Two witnesses tell how visible a
- * block's noise is, and their weighted root mean square decides (model/visibility.h):
+ * The criterion "observer": the model observer (sight/observer.h) in the renderer. Two witnesses tell how visible a
+ * block's noise is, and their weighted root mean square decides (sight/visibility.h):
  *
  * - A pair of pictures, as a display shows them: their difference is noise, their common part the texture that hides noise.
  *   With the plane HALF they are the means of the two halves of the samples. Without it they are the mean plus and minus the
@@ -17,8 +17,8 @@
  * block stops when that is at most `visible`, or `error` at most the parameter of that name. With `fps` the noise is that of
  * one frame of many, with `ppd` that of a display with so many pixels per degree. No model.
  */
-#include "model/measure.h"
-#include "model/visibility.h"
+#include "sight/measure.h"
+#include "sight/visibility.h"
 #include "plugin/criteria.h"
 #include "plugin/means.h"
 #include "plugin/pair.h"
@@ -34,7 +34,7 @@ enum {
     PLANES = COLOR | LULL_PLANE_BIT(LULL_PLANE_HALF) | LULL_PLANE_BIT(LULL_PLANE_MOMENT2) | LULL_PLANE_BIT(LULL_PLANE_SPP)
 };
 enum { WINDOW = 200 };            /* pixels, the side of a block that is evidence enough by itself */
-enum { BORDER = 2 };              /* pixels, the reach of the eye's blur (model/visibility.h) */
+enum { BORDER = 2 };              /* pixels, the reach of the eye's blur (sight/visibility.h) */
 static const double AROUND = 3.0; /* a smaller one stops only where its surroundings show at most so many times the limit */
 
 static const struct lull_param params[P_COUNT] = {

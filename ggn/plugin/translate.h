@@ -7,7 +7,7 @@
 #include <lull/criterion_kit.h>
 
 #include "base/err.h"
-#include "model/preprocess.h"
+#include "sight/preprocess.h"
 
 /* Fills *err (may be NULL) from an error of ggn's own functions, `what` before its text; returns the LULL_E_ code: that of
  * no memory, of a cancelled call, or `otherwise`. */

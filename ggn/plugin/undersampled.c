@@ -1,13 +1,13 @@
 #include "plugin/undersampled.h"
 
 #include "base/colour.h"
-#include "model/visibility.h"
+#include "sight/visibility.h"
 #include "plugin/translate.h"
 
 enum { COLOR = LULL_PLANE_BIT(LULL_PLANE_COLOR), MOMENT2 = LULL_PLANE_BIT(LULL_PLANE_MOMENT2) };
 enum { ENOUGH = 100 * 100 }; /* pixels: larger blocks were held although they were right */
 static const double SAMPLES = 2.4, STEP = 1.0 / 6, FLOAT_STEP = 0x1p-22;
-static const double LONE = 4; /* L*: a pixel that differs so much is just seen in 60x60 black ones (model/visibility.h) */
+static const double LONE = 4; /* L*: a pixel that differs so much is just seen in 60x60 black ones (sight/visibility.h) */
 
 struct sums {
     double shown, largest; /* of luminance, 1 is white; of squared deviations of a pixel's samples */

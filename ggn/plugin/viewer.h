@@ -1,6 +1,6 @@
 /*
  * For whom a criterion of the model observer works: the parameters that say when nobody is disturbed any more, and how the
- * frame is looked at (observer/viewing.h). Shares of viewers end where nearly everybody sees noise, at less than twice what
+ * frame is looked at (sight/viewing.h). Shares of viewers end where nearly everybody sees noise, at less than twice what
  * is just seen; errors go on.
  */
 #ifndef GGN_PLUGIN_VIEWER_H
@@ -9,8 +9,8 @@
 #include <math.h>
 #include <lull/criterion_kit.h>
 
-#include "observer/observer.h"
-#include "observer/viewing.h"
+#include "sight/observer.h"
+#include "sight/viewing.h"
 
 #define GP_PARAM_ERROR \
     LULL_KIT_FLOAT("error", NULL, 0.1, 100, \

@@ -15,8 +15,8 @@
 #include <stdatomic.h>
 
 #include "base/err.h"
-#include "model/measure.h"
-#include "model/preprocess.h"
+#include "sight/measure.h"
+#include "sight/preprocess.h"
 
 /* One block at one check. */
 struct gp_block_view {

@@ -5,7 +5,7 @@
 
 #include "base/json.h"
 #include "model/policy.h"
-#include "observer/observer.h"
+#include "sight/observer.h"
 #include "train/fit_policy.h"
 #include "train/phase.h"
 #include "train/start.h"

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "figures/stats.h"
+#include "sight/stats.h"
 #include "nn/loss.h"
 
 void ggn_calibrate_platt(const double *logit, const double *label, int n, struct ggn_policy *policy)

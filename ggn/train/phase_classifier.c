@@ -2,7 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "figures/stats.h"
+#include "sight/stats.h"
 #include "model/window.h"
 #include "nn/hash.h"
 #include "nn/loss.h"

@@ -5,7 +5,7 @@
 
 #include "base/pi.h"
 #include "nn/hash.h"
-#include "observer/observer.h"
+#include "sight/observer.h"
 
 double ggn_session_lr(const struct ggn_session *s, double lr, uint64_t step, uint64_t steps)
 {

@@ -23,7 +23,7 @@ static int open_quote(const struct pt_open *o, struct pt_quote **out, struct bas
     int rc = o->criterion && o->picture != PT_PICTURE_NOISY
                  ? pt_criterion_find(PT_OPEN_NOISY_CRITERION, NULL, o->log, &noisy, err)
                  : 0;
-    return rc ? rc : pt_quote_create(o->render, o->params.list, o->params.count, noisy, o->log, out, err);
+    return rc ? rc : pt_quote_create(o->render, noisy, out, err);
 }
 
 /* When the pilot is over the checkpoint is the render's, whoever goes on with it. */

@@ -34,9 +34,7 @@ static int set_block(void *into, const char *value, struct base_err *err)
 {
     struct pt_cli *cli = into;
     int v[2];
-    if (get_list(value, "x", 1, 1, 4096, v))
-        v[1] = v[0];
-    else if (!get_list(value, "x", 2, 1, 4096, v))
+    if (!base_parse_block(value, 4096, v))
         return expected(err, "N or WxH, each from 1 to 4096");
     cli->render.block_width = v[0];
     cli->render.block_height = v[1];
@@ -328,7 +326,7 @@ const struct base_option pt_cli_options[] = {
              "image"},
     {"look-at", 0, "\"EX EY EZ AX AY AZ UX UY UZ\"", .set = set_look_at, .role = BASE_DECIDES, .identify = identify_look_at,
      .help = "Look from E at A with U up, in the scene's world, instead of through the scene's camera"},
-    {"fov", 0, "DEGREES", TO(load.view.fov_deg), 1e-3, 179.9, .role = BASE_DECIDES,
+    {"fov", 0, "DEGREES", TO(load.view.fov_deg), 1e-12, 179.9, .role = BASE_DECIDES,
      .help = "Field of view over the image's short side, instead of the scene's"},
     {"light-selection", 0, NULL, TO(load.light_selection), .words = pt_light_selection_words, .role = BASE_DECIDES,
      .identify = identify_light_selection,

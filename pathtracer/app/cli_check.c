@@ -143,7 +143,7 @@ int pt_cli_check(struct pt_cli *cli, struct base_err *err)
         return base_fail(err, BASE_EINVAL, "a scene file is needed (--help says more)");
     if (check_shot(cli, err) != 0 || check_samples(cli, err) != 0 || check_actions(cli, err) != 0)
         return BASE_EINVAL;
-    if (cli->params.count > 0 && cli->spp > 0 && !cli->criterion)
+    if (cli->params.count > 0 && (cli->spp > 0 || cli->sequence.directory) && !cli->criterion)
         return base_fail(err, BASE_EINVAL, "-p %s=%s: no criterion is used", cli->params.list[0].key,
                          cli->params.list[0].value);
     fill_in(cli);

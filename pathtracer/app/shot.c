@@ -57,29 +57,29 @@ static int parse_view(char *line, int *frame, struct pt_view *view, struct base_
         return base_fail(err, BASE_EINVAL, "expected a frame from 0 to %d", PT_SHOT_LAST_FRAME);
     *frame = (int)n;
     field[4] += strspn(field[4], " ");
-    if (*field[4] != '\0' && !base_parse_real(field[4], 1e-3, 179.9, &view->fov_deg))
-        return base_fail(err, BASE_EINVAL, "expected a field of view from 0.001 to 179.9 degrees, or nothing");
+    if (*field[4] != '\0' && !base_parse_real(field[4], 1e-12, 179.9, &view->fov_deg))
+        return base_fail(err, BASE_EINVAL, "expected a field of view from 1e-12 to 179.9 degrees, or nothing");
     return pt_cli_look_at(field[1], view, err);
 }
 
-static int parse_line(const char *name, const char *begin, size_t length, size_t at, struct pt_shot *s, struct base_err *err)
+static int parse_line(const struct base_lines *lines, const char *begin, size_t length, struct pt_shot *s,
+                      struct base_err *err)
 {
     char line[LINE_ROOM];
     struct base_err why = {0};
     struct pt_view view = {0};
     int frame = 0;
-    if (length >= sizeof line || memchr(begin, '\0', length))
-        return base_fail(err, BASE_EINVAL, "%s:%zu: expected a line of text below %d bytes", name, at, LINE_ROOM);
+    if (length >= sizeof line)
+        return base_fail(err, BASE_EINVAL, "%s:%zu: expected a line below %d bytes", lines->name, lines->number, LINE_ROOM);
     memcpy(line, begin, length);
     line[length] = '\0';
-    line[strcspn(line, "\r")] = '\0';
-    if (at == 1)
-        return strcmp(line, PATH_HEAD) == 0 ? 0 : base_fail(err, BASE_EINVAL, "%s:1: expected %s", name, PATH_HEAD);
+    if (lines->number == 1)
+        return strcmp(line, PATH_HEAD) == 0 ? 0 : base_fail(err, BASE_EINVAL, "%s:1: expected %s", lines->name, PATH_HEAD);
     int rc = parse_view(line, &frame, &view, &why);
     if (!rc && s->count > 0 && frame <= s->frames[s->count - 1])
         rc = base_fail(&why, BASE_EINVAL, "expected rising frames");
     if (rc)
-        return base_fail(err, rc, "%s:%zu: %s", name, at, why.text);
+        return base_fail(err, rc, "%s:%zu: %s", lines->name, lines->number, why.text);
     s->frames[s->count] = frame;
     s->views[s->count++] = view;
     return 0;
@@ -87,22 +87,22 @@ static int parse_line(const char *name, const char *begin, size_t length, size_t
 
 int pt_shot_parse_path(const char *name, const char *text, size_t size, struct pt_shot *s, struct base_err *err)
 {
-    const char *end = text + size, *at = text + base_utf8_mark(text, size);
-    size_t lines = 1;
-    for (const char *p = text; p < end; p++)
-        lines += *p == '\n';
-    s->frames = calloc(lines, sizeof *s->frames);
-    s->views = calloc(lines, sizeof *s->views);
+    struct base_lines lines;
+    const char *line;
+    size_t length;
+    int rc;
+    base_lines_init(&lines, name, text, size);
+    const size_t room = base_lines_left(&lines) + 1;
+    s->frames = calloc(room, sizeof *s->frames);
+    s->views = calloc(room, sizeof *s->views);
     if (!s->frames || !s->views)
         return base_fail_nomem(err, "camera path");
-    for (size_t line = 1; at < end; line++) {
-        const char *newline = memchr(at, '\n', (size_t)(end - at)), *stop = newline ? newline : end;
-        int rc = parse_line(name, at, (size_t)(stop - at), line, s, err);
-        if (rc)
-            return rc;
-        at = newline ? newline + 1 : end;
-    }
-    return s->count > 0 ? 0 : base_fail(err, BASE_EINVAL, "%s: expected %s and a line for each frame", name, PATH_HEAD);
+    while (!(rc = base_lines_next(&lines, &line, &length, err)) && line)
+        if ((rc = parse_line(&lines, line, length, s, err)) != 0)
+            break;
+    return rc             ? rc
+           : s->count > 0 ? 0
+                          : base_fail(err, BASE_EINVAL, "%s: expected %s and a line for each frame", name, PATH_HEAD);
 }
 
 /* Of the path, the frames that --frames lists. */

@@ -14,6 +14,7 @@ struct plan {
     struct pt_shot_table table;
     struct pilot *pilots;
     size_t pilot_count;
+    size_t untold_count; /* of the pilots, those that have met too little */
     uint32_t columns;
     int threads;
 };
@@ -38,6 +39,7 @@ static int keep_answer(struct plan *p, const struct pt_open *o, const struct pt_
     if (!pilot->blocks)
         return base_fail_nomem(err, "pilots");
     memcpy(pilot->blocks, row->blocks, n * sizeof *pilot->blocks);
+    p->untold_count += row->told == 0;
     return 0;
 }
 
@@ -114,6 +116,10 @@ static void print_price(const struct plan *p)
     printf("%s of thread time, %s on %d threads that are free; %.1f x for the most expensive block's samples everywhere\n",
            pt_quote_duration(thread_s, thread), pt_quote_duration(thread_s / p->threads, wall), p->threads,
            most * all / samples);
+    if (p->untold_count > 0)
+        printf("%zu of %zu pilots have met too little: what their frames need is not known (a longer --quote-pilot says "
+               "more)\n",
+               p->untold_count, p->pilot_count);
 }
 
 int pt_shot_plan(const struct pt_shot *s, struct pt_open *o, int *status, struct base_err *err)

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/files.h"
+#include "base/text.h"
 
 static const char FIRST_LINE[] = "lull-shot-table 1";
 enum { MAX_BYTES = 1 << 28 };
@@ -14,14 +15,7 @@ static int bad(const char *name, size_t line, const char *what, struct base_err 
     return base_fail(err, BASE_EINVAL, "%s:%zu: expected %s", name, line, what);
 }
 
-/* Bytes of the line end at p: 0 where there is none. Programs of Windows write two. */
-static size_t line_end(const char *p, const char *end)
-{
-    size_t n = p < end && *p == '\r';
-    return p + n < end && p[n] == '\n' ? n + 1 : 0;
-}
-
-/* An integer in [low, high] and the character behind it, which is passed; '\n' for any line end. */
+/* An integer in [low, high] and the character behind it, which is passed; '\0' at the end. */
 static int take(const char **at, const char *end, int64_t low, int64_t high, char *behind, int64_t *out)
 {
     int64_t value = 0;
@@ -29,12 +23,11 @@ static int take(const char **at, const char *end, int64_t low, int64_t high, cha
     for (; p < end && *p >= '0' && *p <= '9'; p++)
         if ((value = 10 * value + (*p - '0')) > high)
             return 0;
-    if (p == *at || p == end || value < low)
+    if (p == *at || value < low)
         return 0;
-    size_t line = line_end(p, end);
     *out = value;
-    *behind = line ? '\n' : *p;
-    *at = p + (line ? line : 1);
+    *behind = p < end ? *p : '\0';
+    *at = p + (p < end);
     return 1;
 }
 
@@ -46,52 +39,72 @@ static size_t count_in(const char *p, const char *end, char c)
     return n;
 }
 
-/* One line, FRAME;SPP;…;SPP. */
-static int parse_frame(const char **at, const char *end, const char *name, size_t line, struct pt_shot_table *t,
+/* FRAME;SPP;…;SPP. */
+static int parse_frame(const struct base_lines *lines, const char *at, size_t length, struct pt_shot_table *t,
                        struct base_err *err)
 {
     const size_t f = t->frame_count;
+    const char *end = at + length;
     int64_t value;
     char behind;
-    if (!take(at, end, 0, PT_SHOT_LAST_FRAME, &behind, &value) || behind != ';' || (f > 0 && value <= t->frames[f - 1]))
-        return bad(name, line, "FRAME;SPP;SPP;... with rising frames", err);
+    if (!take(&at, end, 0, PT_SHOT_LAST_FRAME, &behind, &value) || behind != ';' || (f > 0 && value <= t->frames[f - 1]))
+        return bad(lines->name, lines->number, "FRAME;SPP;SPP;... with rising frames", err);
     t->frames[f] = (int)value;
     for (size_t i = 0; i < t->block_count; i++) {
-        if (!take(at, end, 1, INT32_MAX, &behind, &value) || behind != (i + 1 < t->block_count ? ';' : '\n'))
-            return bad(name, line, "as many samples per pixel as in the first frame, each from 1 to 2147483647", err);
+        if (!take(&at, end, 1, INT32_MAX, &behind, &value) || behind != (i + 1 < t->block_count ? ';' : '\0'))
+            return bad(lines->name, lines->number,
+                       "as many samples per pixel as in the first frame, each from 1 to 2147483647", err);
         t->spp[f * t->block_count + i] = (uint32_t)value;
     }
     t->frame_count++;
     return 0;
 }
 
+/* The first two lines: what it is, and the grid of its frames. */
+static int parse_head(struct base_lines *lines, struct pt_shot_table *t, struct base_err *err)
+{
+    const char *line;
+    size_t length;
+    int rc = base_lines_next(lines, &line, &length, err);
+    if (!rc && !(line && length == sizeof FIRST_LINE - 1 && memcmp(line, FIRST_LINE, length) == 0))
+        rc = bad(lines->name, 1, "lull-shot-table 1 (made by --plan-shot)", err);
+    if (!rc)
+        rc = base_lines_next(lines, &line, &length, err);
+    if (!rc && !(line && length < PT_SHOT_GRID))
+        rc = bad(lines->name, 2, "size, crop and block of the frames", err);
+    if (!rc)
+        memcpy(t->grid, line, length);
+    return rc;
+}
+
 int pt_shot_table_parse(const char *name, const char *text, size_t size, struct pt_shot_table *t, struct base_err *err)
 {
-    const size_t first = sizeof FIRST_LINE - 1;
-    const char *end = text + size, *at = text + first;
+    struct base_lines lines;
+    const char *line;
+    size_t length;
     *t = (struct pt_shot_table){0};
-    if (size < first || memcmp(text, FIRST_LINE, first) != 0 || line_end(at, end) == 0)
-        return bad(name, 1, "lull-shot-table 1 (made by --plan-shot)", err);
-    at += line_end(at, end);
-    const char *newline = memchr(at, '\n', (size_t)(end - at));
-    if (!newline || newline - at >= PT_SHOT_GRID || memchr(at, '\0', (size_t)(newline - at)))
-        return bad(name, 2, "size, crop and block of the frames", err);
-    memcpy(t->grid, at, (size_t)(newline - at) - (newline > at && newline[-1] == '\r'));
-    at = newline + 1;
-    size_t lines = count_in(at, end, '\n'), longest = count_in(at, end, ';');
-    newline = lines ? memchr(at, '\n', (size_t)(end - at)) : at;
-    t->block_count = count_in(at, newline, ';');
-    if (lines == 0 || t->block_count == 0)
+    base_lines_init(&lines, name, text, size);
+    int rc = parse_head(&lines, t, err);
+    const size_t frames = base_lines_left(&lines), all = count_in(lines.at, lines.end, ';');
+    if (!rc)
+        rc = base_lines_next(&lines, &line, &length, err);
+    if (rc)
+        return rc;
+    t->block_count = line ? count_in(line, line + length, ';') : 0;
+    if (t->block_count == 0)
         return bad(name, 3, "FRAME;SPP;SPP;... with rising frames", err);
-    if (longest != lines * t->block_count) /* else memory would be asked for that the text does not fill */
+    if (all != frames * t->block_count) /* else memory would be asked for that the text does not fill */
         return base_fail(err, BASE_EINVAL, "%s: expected as many samples in every frame, ending with a line", name);
-    t->frames = calloc(lines, sizeof *t->frames);
-    t->spp = calloc(longest, sizeof *t->spp);
-    int rc = t->frames && t->spp ? 0 : base_fail_nomem(err, "shot table");
-    while (!rc && t->frame_count < lines)
-        rc = parse_frame(&at, end, name, t->frame_count + 3, t, err);
-    if (!rc && at != end)
-        rc = bad(name, lines + 3, "a line break at the end", err);
+    t->frames = calloc(frames, sizeof *t->frames);
+    t->spp = calloc(all, sizeof *t->spp);
+    rc = t->frames && t->spp ? 0 : base_fail_nomem(err, "shot table");
+    while (!rc && line) {
+        rc = parse_frame(&lines, line, length, t, err);
+        if (!rc && !lines.is_ended)
+            rc = bad(name, lines.number, "a line break at the end", err);
+        if (!rc)
+            rc = base_lines_next(&lines, &line, &length, err);
+    }
     return rc;
 }
 

@@ -24,14 +24,11 @@ static int speaks_utf8(void)
 
 static void format_quality(const struct pt_open *o, char *text, size_t room)
 {
-    static const char *const names[] = {"error", "visible", "threshold"};
-    const char *value = NULL;
-    double number;
-    for (size_t i = 0; i < sizeof names / sizeof names[0] && !value && o->criterion; i++) {
-        value = lull_host_parameter(lull_host_table(o->criterion), names[i], o->params.list, o->params.count, NULL);
-        if (value && base_parse_real(value, -1e300, 1e300, &number))
-            snprintf(text, room, "criterion %s, %s %g", lull_host_table(o->criterion)->id, names[i], number);
-    }
+    const struct lull_criterion *t = lull_host_table(o->criterion);
+    double value;
+    const struct lull_param *p = t ? lull_host_quality(t, o->params.list, o->params.count, &value) : NULL;
+    if (p)
+        snprintf(text, room, "criterion %s, %s %g", t->id, p->name, value);
 }
 
 static const char *path_of(const struct pt_watch *w, enum pt_path which) { return w->open->frame->paths[which]; }

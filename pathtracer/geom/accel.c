@@ -307,7 +307,8 @@ static int build(struct pt_scene *scene, struct pt_accel *accel)
     accel->packet = native_packet(accel->device);
     accel->flags = RTC_SCENE_FLAG_ROBUST;
     for (int32_t i = 0; i < scene->shape_count; i++) /* rays can go on behind some */
-        if (scene->shapes[i].has_alpha || scene->materials[scene->shapes[i].material].kind == PT_MATERIAL_INTERFACE)
+        if (scene->shapes[i].has_alpha || scene->shapes[i].touches ||
+            scene->materials[scene->shapes[i].material].kind == PT_MATERIAL_INTERFACE)
             accel->flags = RTC_SCENE_FLAG_ROBUST | PT_EMBREE_FLAG_FILTER;
     rtcSetDeviceMemoryMonitorFunction(accel->device, count_bytes, accel);
     for (int32_t i = 0; i < scene->object_count; i++) {
@@ -534,6 +535,31 @@ int pt_accel_intersect_behind(const struct pt_scene *scene, const struct pt_ray 
     pt_embree_intersect1_filtered(scene->accel->world, p.lanes, leave_out, &list);
     take_hit(scene, &p, 1, 0, hit);
     return hit->shape >= 0;
+}
+
+struct near {
+    const struct pt_scene *scene;
+    pt_accel_visit *visit;
+    void *user;
+};
+
+static bool visit_near(struct RTCPointQueryFunctionArguments *args)
+{
+    const struct near *near = args->userPtr;
+    struct pt_hit hit = {.instance = -1};
+    name_shape(near->scene, args->geomID, args->context->instStackSize ? args->context->instID[0] : RTC_INVALID_GEOMETRY_ID,
+               &hit);
+    near->visit(near->user, hit.shape, (int32_t)args->primID, hit.instance);
+    return false;
+}
+
+void pt_accel_near(const struct pt_scene *scene, pt_vec3 centre, float radius, float time, pt_accel_visit *visit, void *user)
+{
+    struct near near = {scene, visit, user};
+    struct RTCPointQuery query = {centre.x, centre.y, centre.z, time, radius};
+    struct RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    rtcPointQuery(scene->accel->world, &query, &context, visit_near, &near);
 }
 
 void pt_accel_instance_transform(const struct pt_scene *scene, int32_t id, float time, struct pt_mat34 *to_render)

@@ -49,7 +49,7 @@ void pt_ray_pass(struct pt_ray *ray, struct pt_passed *passed, const struct pt_h
 
 /* Nearest hit; returns 1 and fills *hit, or 0 and hit->shape is -1. Alpha is not looked at. */
 int pt_accel_intersect(const struct pt_scene *scene, const struct pt_ray *ray, struct pt_hit *hit);
-/* The same without what was passed. The scene has shapes with alpha or of the material `interface`. */
+/* The same without what was passed. The scene has shapes with alpha, of the material `interface`, or that touch. */
 int pt_accel_intersect_behind(const struct pt_scene *scene, const struct pt_ray *ray, const struct pt_passed *passed,
                               struct pt_hit *hit);
 
@@ -69,6 +69,11 @@ struct pt_ray_lanes {
 void pt_accel_intersect_lanes(const struct pt_scene *scene, const struct pt_ray_lanes *rays, int count, int coherent,
                               struct pt_hit *const *hits);
 void pt_accel_occluded_lanes(const struct pt_scene *scene, const struct pt_ray_lanes *rays, int count, uint8_t *occluded);
+
+/* Calls `visit` for the primitives whose bounds come within `radius` of `centre` at `time`, perhaps for a few more. */
+typedef void pt_accel_visit(void *user, int32_t shape, int32_t primitive, int32_t instance);
+void pt_accel_near(const struct pt_scene *scene, pt_vec3 centre, float radius, float time, pt_accel_visit *visit,
+                   void *user);
 
 /* Object → render transform of instance `id` at `time`, the one its hits were found with. */
 void pt_accel_instance_transform(const struct pt_scene *scene, int32_t id, float time, struct pt_mat34 *to_render);

@@ -1,7 +1,8 @@
 /*
  * Where a ray leaves a surface so that it cannot meet the same surface again: the point moves along the geometric normal
  * beyond a bound on its rounding error (after Pharr, Jakob & Humphreys 2016, §3.9; the idea of an offset that scales with
- * the coordinates, Wächter & Binder 2019). No absolute epsilon, so the scale of the scene does not matter.
+ * the coordinates, Wächter & Binder 2019). No absolute epsilon, so the scale of the scene does not matter. What lies within
+ * the bound is passed, too: surfaces at one place are for integ/contact.h.
  */
 #ifndef PT_GEOM_OFFSET_H
 #define PT_GEOM_OFFSET_H

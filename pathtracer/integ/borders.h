@@ -1,7 +1,7 @@
 /*
  * Surfaces that let a ray through and bound media. Where several lie at one place (a box of fog on a floor, two boxes side
- * by side) rounding decides which of them a ray meets first: they are taken together, and the media tell the order.
- * Inline, pure.
+ * by side) rounding decides which of them a ray meets first: they are taken together, and the media tell the order. Glass
+ * among them: integ/contact.h. Inline, pure.
  */
 #ifndef PT_INTEG_BORDERS_H
 #define PT_INTEG_BORDERS_H

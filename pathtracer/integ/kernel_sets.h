@@ -12,6 +12,8 @@
      PT_FX_ENVIRONMENT | PT_FX_DELTA_LIGHT | PT_FX_QUADRIC | PT_FX_DEFOCUS)
 /* The same with glass that absorbs, or in fog. */
 #define PT_FX_SET_MEDIA (PT_FX_SET_SURFACES | PT_FX_ABSORPTION | PT_FX_SCATTERING)
+/* The same with glass that stands on something. */
+#define PT_FX_SET_CONTACT (PT_FX_SET_MEDIA | PT_FX_CONTACT)
 /* Plain (untextured) mirrors and glass among diffuse surfaces. */
 #define PT_FX_SET_SPECULAR (PT_FX_MANY_LIGHTS | PT_FX_SPECULAR | PT_FX_GLOSSY | PT_FX_TRANSMISSION | PT_FX_QUADRIC)
 /* Everything but media. */
@@ -23,6 +25,7 @@
     X(specular, "specular", PT_FX_SET_SPECULAR) \
     X(surfaces, "surfaces", PT_FX_SET_SURFACES) \
     X(media, "media", PT_FX_SET_MEDIA) \
+    X(contact, "contact", PT_FX_SET_CONTACT) \
     X(no_media, "no-media", PT_FX_SET_NO_MEDIA) \
     X(all, "all", PT_FX_ALL)
 

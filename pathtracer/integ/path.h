@@ -12,6 +12,7 @@
 #define PT_INTEG_PATH_H
 
 #include "integ/borders.h"
+#include "integ/contact.h"
 #include "integ/integrator.h"
 #include "integ/lanes.h"
 #include "integ/surface.h"
@@ -31,6 +32,8 @@
 
 /* Rays may go on behind what they meet. */
 #define PT_FX_THROUGH (PT_FX_ALPHA | PT_FX_INTERFACE)
+/* What comes next may be known without a ray. */
+#define PT_FX_LOOKED (PT_FX_THROUGH | PT_FX_CONTACT)
 
 /* A path between perfect mirrors loses nothing and would never end when the depth is unlimited: beyond this many bounces
  * roulette takes some of them whatever they carry. */
@@ -64,6 +67,7 @@ struct pt_path {
     uint32_t rays;
     struct pt_hit hit;          /* what the ray has met first */
     struct pt_passed *passed;   /* borrows; what it has passed through, with PT_FX_THROUGH only */
+    struct pt_contact *contact; /* borrows; the surfaces where it is, with PT_FX_CONTACT only */
     float t_medium;             /* the ray is in its medium from here on */
     int32_t looked;             /* `hit` is already known */
     struct pt_light_plan plan;  /* of the last vertex */
@@ -120,25 +124,90 @@ PT_KERNEL_INLINE enum pt_passage pt_passage_at(pt_effects fx, const struct pt_sc
 /* What a path's ray has met. */
 enum pt_found { PT_FOUND_NOTHING, PT_FOUND_SURFACE, PT_FOUND_BORDER /* a surface that lets it into another medium */ };
 
-/* The path's ray goes on behind its hit. */
-PT_KERNEL_INLINE void pt_path_pass(struct pt_path *path)
+/* The path's next ray. */
+PT_KERNEL_INLINE void pt_path_turn(pt_effects fx, struct pt_path *path, pt_vec3 origin, pt_vec3 direction)
 {
+    path->ray = (struct pt_ray){origin, direction, 0.0f, INFINITY, path->ray.time};
+    path->t_medium = 0.0f;
+    path->looked = 0;
+    if (fx & PT_FX_LOOKED)
+        path->passed->count = 0;
+    if (fx & PT_FX_CONTACT)
+        path->contact->count = 0;
+}
+
+/* The path's ray goes on towards w from the surface of its list that it is at, whose place is `at`: its hit is the next one
+ * of the list. 0: there is none, and the ray has left the list. */
+PT_KERNEL_INLINE int pt_path_turn_in_contact(pt_effects fx, struct pt_path *path, pt_vec3 p, pt_vec3 w)
+{
+    struct pt_contact *contact = path->contact;
+    int32_t count = contact->count, next = contact->at + contact->step;
+    if (next < 0 || next >= count) {
+        pt_path_turn(fx, path, pt_contact_origin(path->scene, contact, p, contact->step, w), w);
+        return 0;
+    }
+    struct pt_place there;
+    pt_contact_place(path->scene, contact, next, &there);
+    pt_path_turn(fx, path, there.p, w);
+    contact->count = count;
+    contact->at = next;
+    contact->turned = 1;
+    path->hit = contact->hits[next];
+    path->hit.t = 0.0f;
+    path->looked = 1;
+    return 1;
+}
+
+/* The path's ray goes on behind its hit, a surface of its list. */
+PT_KERNEL_INLINE void pt_path_pass_in_contact(pt_effects fx, struct pt_path *path)
+{
+    struct pt_contact *contact = path->contact;
+    if (contact->turned) {
+        if (!pt_path_turn_in_contact(fx, path, path->ray.origin, path->ray.direction)) {
+            path->rays++;
+            pt_accel_intersect(path->scene, &path->ray, &path->hit);
+        }
+    } else if (++contact->at < contact->count) {
+        path->hit = contact->hits[contact->at];
+    } else {
+        path->hit = contact->beyond;
+        contact->count = 0;
+    }
+}
+
+/* The path's ray goes on behind its hit. */
+PT_KERNEL_INLINE void pt_path_pass(pt_effects fx, struct pt_path *path)
+{
+    if ((fx & PT_FX_CONTACT) && path->contact->count) {
+        pt_path_pass_in_contact(fx, path);
+        return;
+    }
     pt_ray_pass(&path->ray, path->passed, &path->hit);
     path->rays++;
     pt_accel_intersect_behind(path->scene, &path->ray, path->passed, &path->hit);
 }
 
+/* What else is at the place of the path's hit. */
+PT_KERNEL_INLINE void pt_path_gather(pt_effects fx, struct pt_path *path)
+{
+    if ((fx & PT_FX_CONTACT) && !path->contact->count && pt_contact_at(path->scene, &path->ray, &path->hit))
+        path->rays += pt_contact_gather(path->scene, path->medium, &path->ray, path->passed, &path->hit, path->contact);
+}
+
 /* What the path met that counts: goes on behind what it passes through. */
 PT_KERNEL_INLINE enum pt_found pt_path_found(pt_effects fx, struct pt_path *path, struct pt_rng *rng)
 {
-    path->rays += !((fx & PT_FX_THROUGH) && path->looked);
+    path->rays += !((fx & PT_FX_LOOKED) && path->looked);
+    if (!(fx & PT_FX_THROUGH) && path->hit.shape >= 0)
+        pt_path_gather(fx, path);
     while ((fx & PT_FX_THROUGH) && path->hit.shape >= 0) {
+        pt_path_gather(fx, path);
         enum pt_passage passage = pt_passage_at(fx, path->scene, &path->ray, &path->hit, rng);
         if (passage == PT_PASSAGE_BORDER)
             return PT_FOUND_BORDER;
         if (passage == PT_PASSAGE_NONE)
             break;
-        pt_path_pass(path);
+        pt_path_pass(fx, path);
     }
     return path->hit.shape >= 0 ? PT_FOUND_SURFACE : PT_FOUND_NOTHING;
 }
@@ -150,9 +219,16 @@ PT_KERNEL_INLINE enum pt_found pt_path_cross_border(pt_effects fx, struct pt_pat
     struct pt_borders borders = {.count = 0};
     struct pt_place at;
     pt_place_at_hit(fx, path->scene, &path->ray, &path->hit, &at);
+    if ((fx & PT_FX_CONTACT) && path->contact->count) {
+        path->medium = pt_medium_towards(&at, path->ray.direction, path->medium);
+        path->t_medium = path->hit.t;
+        pt_path_pass(fx, path);
+        path->looked = 1;
+        return PT_FOUND_BORDER;
+    }
     pt_borders_add(&borders, &at, path->ray.direction, path->hit.t);
     for (;;) {
-        pt_path_pass(path);
+        pt_path_pass(fx, path);
         if (path->hit.shape < 0)
             break;
         pt_place_at_hit(fx, path->scene, &path->ray, &path->hit, &at);
@@ -168,16 +244,6 @@ PT_KERNEL_INLINE enum pt_found pt_path_cross_border(pt_effects fx, struct pt_pat
     path->t_medium = borders.t;
     path->looked = 1;
     return PT_FOUND_BORDER;
-}
-
-/* The path's next ray. */
-PT_KERNEL_INLINE void pt_path_turn(pt_effects fx, struct pt_path *path, pt_vec3 origin, pt_vec3 direction)
-{
-    path->ray = (struct pt_ray){origin, direction, 0.0f, INFINITY, path->ray.time};
-    path->t_medium = 0.0f;
-    path->looked = 0;
-    if (fx & PT_FX_THROUGH)
-        path->passed->count = 0;
 }
 
 /* Of a medium that fills the whole shadow ray; direction unnormalised, its length in `length`. */
@@ -276,11 +342,50 @@ PT_KERNEL_INLINE struct pt_ray pt_path_shadow_ray(const struct pt_path *path)
     return ray;
 }
 
+/* What the place of the lamp leaves of its light, which has met nothing on its way there: surfaces that touch the lamp may
+ * lie before it. */
+PT_KERNEL_INLINE int pt_path_lamp_covered(pt_effects fx, const struct pt_path *path, struct pt_rng *rng)
+{
+    const struct pt_scene *scene = path->scene;
+    const struct pt_light *lamp = &scene->lights[path->plan.light.emitter->light];
+    if (lamp->kind != PT_LIGHT_AREA || !pt_contact_near(&scene->shapes[lamp->shape], path->plan.light.target))
+        return 0;
+    struct pt_ray ray = {path->plan.origin, v3_sub(path->plan.light.target, path->plan.origin), 0.5f, INFINITY,
+                         path->ray.time};
+    struct pt_passed passed = {.count = 0};
+    struct pt_hit hit;
+    for (int found = pt_accel_intersect(scene, &ray, &hit); found;
+         found = pt_accel_intersect_behind(scene, &ray, &passed, &hit)) {
+        struct pt_contact contact = {.count = 0};
+        if (pt_contact_at(scene, &ray, &hit))
+            pt_contact_gather(scene, path->plan.medium, &ray, &passed, &hit, &contact);
+        int32_t own = 0;
+        while (own < contact.count && contact.hits[own].shape != lamp->shape)
+            own++;
+        if (own < contact.count) {
+            for (int32_t i = 0; i < own; i++)
+                if (pt_passage_at(fx, scene, &ray, &contact.hits[i], rng) == PT_PASSAGE_NONE)
+                    return 1;
+            return 0;
+        }
+        if (hit.shape == lamp->shape || hit.t > 1.01f)
+            return 0;
+        if (!contact.count)
+            pt_ray_pass(&ray, &passed, &hit);
+    }
+    return 0;
+}
+
 /* Adds the planned light, of which nothing opaque was in the way of `ray`. */
 PT_KERNEL_INLINE void pt_path_add_light(pt_effects fx, struct pt_path *path, struct pt_ray *ray)
 {
     const struct pt_light_plan *plan = &path->plan;
     pt_vec3 add = plan->add;
+    if ((fx & PT_FX_CONTACT) && plan->light.finite) {
+        struct pt_rng rng = pt_sampler_stream(&path->sampler, PT_DIM_CONTACT_LAMP);
+        if (pt_path_lamp_covered(fx, path, &rng))
+            return;
+    }
     if (fx & PT_FX_THROUGH)
         add = v3_mul(add, pt_path_transmittance(fx, path, ray, v3_len(ray->direction), plan->medium));
     else if ((fx & PT_FX_MEDIA) && plan->medium >= 0)
@@ -394,7 +499,7 @@ PT_KERNEL_INLINE void pt_path_aux(pt_effects fx, const struct pt_path *path, con
 {
     struct pt_path_result *out = path->out;
     if (path->depth == 0) /* on the camera's ray, not where a medium sent it */
-        out->depth = path->hit.t;
+        out->depth = path->hit.t + path->scene->camera.before;
     if (!pt_bsdf_has_smooth(fx, bsdf) || !v3_is_black(out->albedo))
         return;
     out->albedo = pt_clamp_unit(pt_bsdf_albedo(fx, bsdf, wo));
@@ -433,7 +538,12 @@ PT_KERNEL_INLINE int pt_path_scatter(pt_effects fx, struct pt_path *path, const 
     }
     if (fx & PT_FX_MEDIA)
         path->medium = pt_medium_towards(at, wi, path->medium);
-    pt_path_turn(fx, path, pt_offset_point(at->p, at->s.n_geometric, at->error, wi), wi);
+    if ((fx & PT_FX_CONTACT) && path->contact->count) {
+        path->contact->step = pt_contact_step(path->contact, at->s.n_geometric, wi);
+        pt_path_turn_in_contact(fx, path, at->p, wi);
+    } else {
+        pt_path_turn(fx, path, pt_offset_point(at->p, at->s.n_geometric, at->error, wi), wi);
+    }
     path->depth++;
     return pt_path_survives(path);
 }
@@ -445,6 +555,32 @@ PT_KERNEL_INLINE struct pt_receiver pt_path_receiver(pt_effects fx, pt_vec3 p, c
     int transmits = pt_bsdf_transmits(fx, bsdf);
     return (struct pt_receiver){p, wo.z < 0.0f ? v3_neg(frame->n) : frame->n,
                                 transmits ? PT_RECEIVER_BOTH_SIDES : PT_RECEIVER_SURFACE};
+}
+
+/* Where a shadow ray towards wi begins, and in which medium. 0: another surface at the same place is in its way. */
+PT_KERNEL_INLINE int pt_path_leave(pt_effects fx, const struct pt_path *path, const struct pt_place *at, pt_vec3 wi,
+                                   pt_vec3 *origin, int32_t *medium)
+{
+    const struct pt_contact *contact = path->contact;
+    *medium = fx & PT_FX_MEDIA ? pt_medium_towards(at, wi, path->medium) : -1;
+    if (!(fx & PT_FX_CONTACT) || !contact->count) {
+        *origin = pt_offset_point(at->p, at->s.n_geometric, at->error, wi);
+        return 1;
+    }
+    struct pt_rng rng = pt_sampler_stream(&path->sampler, PT_DIM_CONTACT);
+    const int32_t step = pt_contact_step(contact, at->s.n_geometric, wi);
+    for (int32_t i = contact->at + step; 0 <= i && i < contact->count; i += step) {
+        enum pt_passage passage = pt_passage_at(fx, path->scene, &contact->ray, &contact->hits[i], &rng);
+        if (passage == PT_PASSAGE_NONE)
+            return 0;
+        if (passage == PT_PASSAGE_BORDER) {
+            struct pt_place border;
+            pt_contact_place(path->scene, contact, i, &border);
+            *medium = pt_medium_towards(&border, wi, *medium);
+        }
+    }
+    *origin = pt_contact_origin(path->scene, contact, at->p, step, wi);
+    return 1;
 }
 
 /* Light and the next direction at a surface. 0: the path ends. */
@@ -477,8 +613,10 @@ PT_KERNEL_INLINE int pt_path_bounce(pt_effects fx, struct pt_path *path, const s
             f = v3_splat(0.0f);
         else if (fx & PT_FX_TRANSMISSION)
             f = v3_scale(f, pt_bsdf_side_factor(fx, &bsdf, wo, wi_local, crosses));
-        pt_path_plan_light(fx, path, f, pdf, pt_offset_point(at->p, at->s.n_geometric, at->error, wi),
-                           fx & PT_FX_MEDIA ? pt_medium_towards(at, wi, path->medium) : -1);
+        pt_vec3 origin;
+        int32_t medium;
+        if (pt_path_leave(fx, path, at, wi, &origin, &medium))
+            pt_path_plan_light(fx, path, f, pdf, origin, medium);
     }
     return pt_path_scatter(fx, path, at, &frame, &bsdf, wo, u_bsdf);
 }
@@ -495,8 +633,10 @@ PT_KERNEL_INLINE void pt_path_start(pt_effects fx, struct pt_path *path, float x
     path->rays = 0;
     path->t_medium = 0.0f;
     path->looked = 0;
-    if (fx & PT_FX_THROUGH)
+    if (fx & PT_FX_LOOKED)
         path->passed->count = 0;
+    if (fx & PT_FX_CONTACT)
+        path->contact->count = 0;
     *path->out = (struct pt_path_result){.depth = INFINITY};
     struct pt_sample2 lens = {0.5f, 0.5f};
     float time = 0.0f;

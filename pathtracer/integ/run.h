@@ -21,7 +21,7 @@ PT_KERNEL_INLINE void pt_run_intersect(pt_effects fx, struct pt_path *const *liv
     struct pt_hit *hits[PT_RUN];
     int n = 0;
     for (int i = 0; i < count; i++) {
-        if ((fx & PT_FX_THROUGH) && live[i]->looked)
+        if ((fx & PT_FX_LOOKED) && live[i]->looked)
             continue;
         rays[n] = &live[i]->ray;
         hits[n++] = &live[i]->hit;
@@ -104,6 +104,7 @@ PT_KERNEL_INLINE void pt_run_sample(pt_effects fx, const struct pt_scene *scene,
 {
     struct pt_path paths[PT_RUN], *live[PT_RUN]; /* no initialiser: it would clear them all for each run */
     struct pt_passed passed[PT_RUN];
+    struct pt_contact contacts[PT_RUN];
     struct pt_lane_keys keys;
     _Alignas(64) float u[PT_DIMS_PER_VERTEX][PT_RUN];
     for (int i = 0; i < count; i++) {
@@ -112,6 +113,7 @@ PT_KERNEL_INLINE void pt_run_sample(pt_effects fx, const struct pt_scene *scene,
         paths[i].settings = settings;
         paths[i].trace = trace;
         paths[i].passed = &passed[i];
+        paths[i].contact = &contacts[i];
         paths[i].out = &out[i];
     }
     pt_run_start(fx, scene, settings, x, y, sample, paths, count, &keys, u);

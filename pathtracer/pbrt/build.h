@@ -98,7 +98,10 @@ struct pt_builder {
     struct pt_xform camera_ctm[2];
     int32_t camera_medium;
     double transform_times[2], shutter[2];
-    double origin[3]; /* of render space, in the world */
+    double origin[3];        /* of render space, in the world */
+    double camera_start;     /* depth in front of the camera where its rays begin, and the origin is */
+    double window_middle[2]; /* of what the camera sees, in its space; where rays begin at a depth, the screen is about it */
+    struct pt_xform world_to_camera[2];
 
     struct pt_list images, textures, materials, material_infos, meshes, quadrics, world_shapes, object_shapes, objects,
         instances, lights, media, medium_infos;
@@ -139,6 +142,10 @@ struct pt_xform pt_builder_to_render(const struct pt_builder *b, struct pt_xform
 /* build_image.c: film, filter, sampler, integrator, camera; at WorldBegin. */
 int pt_build_header(struct pt_builder *b);
 
+/* far_view.c: where the rays of a camera that looks from afar should begin, from the scene with its acceleration structure;
+ * camera_start when it is well where it is. Warns of a view that floats do not hold. */
+double pt_build_far_view(struct pt_builder *b);
+
 /* build_colour.c */
 enum pt_colour_use { PT_USE_REFLECTANCE, PT_USE_UNBOUNDED, PT_USE_LIGHT };
 /* Colour parameter: 1 when given, 0 and *out untouched when not. LIGHT follows pbrt-v4 (spectra other than rgb have
@@ -158,8 +165,8 @@ struct pt_input pt_build_colour_input(struct pt_builder *b, struct pt_params *p,
                                       pt_vec3 fallback);
 struct pt_input pt_input_grey(double value);
 /* Image map by file name; encoding: NULL = by file kind, "sRGB", "linear", "gamma X". -1 on failure. Colours of an EXR are
- * made Rec. 709's, by its chromaticities; numbers stay as they are. */
-enum pt_image_use { PT_IMAGE_COLOUR, PT_IMAGE_DATA };
+ * made Rec. 709's, by its chromaticities; numbers stay as they are. Of light, what is infinite, NaN or negative is said. */
+enum pt_image_use { PT_IMAGE_COLOUR, PT_IMAGE_DATA, PT_IMAGE_LIGHT };
 int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding,
                            enum pt_image_use use);
 /* An image of numbers as texture (normal maps): its number, or 0 after a failure. */
@@ -212,6 +219,19 @@ struct pt_soup {
     const double *indices_d;
     const uint32_t *indices;
 };
+/* refine.c: a soup whose triangles that are huge against their distance from the origin of render space are cut up. */
+struct pt_cut {
+    struct pt_soup soup; /* the given one, or of these: */
+    double *p, *n, *uv;  /* owns */
+    uint32_t *indices;   /* owns; [corners] */
+    size_t corners;
+    int is_lost; /* so huge that it is not known where it is seen */
+};
+/* to_render: of the soup's positions. 0: out of memory. To be released in any case. */
+int pt_build_cut(const struct pt_soup *soup, const struct pt_xform *to_render, struct pt_cut *out);
+void pt_cut_release(struct pt_cut *cut_up);
+/* At the end: the same of the meshes of objects, about the places that their instances give the origin. */
+int pt_build_cut_instances(struct pt_builder *b);
 int pt_build_mesh(struct pt_builder *b, struct pt_params *p, const struct pt_soup *soup);
 /* Fails unless v, of the parameter "indices", is one of so many vertices. */
 int pt_build_check_index(const struct pt_params *p, double v, size_t vertex_count);

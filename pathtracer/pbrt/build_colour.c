@@ -31,39 +31,36 @@ static int read_pairs(struct pt_builder *b, const struct pt_param *param, const 
     return 0;
 }
 
-/* Pairs of a .spd file: numbers separated by blanks, # to the end of the line is a comment. The text may begin with a mark
- * (U+FEFF), and its lines end in LF, CR LF or CR, as those of scenes. */
+/* Pairs of a .spd file: numbers separated by blanks, # to the end of the line is a comment. */
 static int read_spd_file(struct pt_builder *b, const struct pt_param *param, const char *name, int extend,
                          struct pt_spd *out)
 {
     char path[2048];
     char *bytes = NULL;
-    size_t size = 0, room = 0, n = 0;
-    int line = 1;
+    const char *at;
+    size_t size = 0, room = 0, n = 0, length;
     double *numbers = NULL;
+    struct base_lines lines;
     struct base_err err = {0};
     pt_builder_path(b, name, path, sizeof path);
     if (b->source->read(b->source->data, path, &bytes, &size, &err) != 0)
         return pt_diag_fail(&b->diag, param->loc, "spectrum \"%s\" is neither a known name nor a readable file", name);
-    const char *end = bytes + size;
-    for (const char *at = bytes + base_utf8_mark(bytes, size); at < end && !b->diag.rc;) {
-        if (*at == '#') {
-            while (at < end && *at != '\n' && *at != '\r')
-                at++;
-        } else if (strchr(" \t\r\n,", *at)) {
-            line += *at == '\n' || (*at == '\r' && at[1] != '\n');
-            at++;
-        } else {
+    base_lines_init(&lines, path, bytes, size);
+    while (!b->diag.rc && !base_lines_next(&lines, &at, &length, &err) && at)
+        for (const char *end = at + length; at < end && *at != '#' && !b->diag.rc;) {
             const char *start = at;
-            while (at < end && *at != '#' && !strchr(" \t\r\n,", *at))
+            while (at < end && !strchr("# \t,", *at))
                 at++;
-            if (!pt_grow((void **)&numbers, &room, n, sizeof *numbers))
+            if (at == start)
+                at++;
+            else if (!pt_grow((void **)&numbers, &room, n, sizeof *numbers))
                 pt_diag_nomem(&b->diag, "spectrum");
             else if (!pt_number_parse(start, (size_t)(at - start), &numbers[n++]))
-                pt_diag_fail(&b->diag, param->loc, "%s:%d: \"%.*s\" (expected a number)", path, line,
+                pt_diag_fail(&b->diag, param->loc, "%s:%zu: \"%.*s\" (expected a number)", path, lines.number,
                              at - start < 30 ? (int)(at - start) : 30, start);
         }
-    }
+    if (!b->diag.rc && err.code)
+        pt_diag_fail(&b->diag, param->loc, "%s", err.text);
     if (!b->diag.rc && (n < 2 || n % 2 != 0))
         pt_diag_fail(&b->diag, param->loc, "%s: %zu numbers (expected pairs of wavelength and value)", path, n);
     if (!b->diag.rc)

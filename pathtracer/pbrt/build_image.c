@@ -182,7 +182,7 @@ static void build_integrator(struct pt_builder *b, struct pt_params *p)
                         "cossample maxdistance nsamples strategy illuminant");
 }
 
-static void set_screen(struct pt_params *p, struct pt_camera *c)
+static void set_screen(struct pt_builder *b, struct pt_params *p, struct pt_camera *c)
 {
     double aspect = pt_params_float_in(p, "frameaspectratio", (double)c->width / c->height, 1e-4, 1e4);
     double x = aspect > 1 ? aspect : 1, y = aspect > 1 ? 1 : 1 / aspect;
@@ -193,8 +193,13 @@ static void set_screen(struct pt_params *p, struct pt_camera *c)
         pt_params_fail(p, "screenwindow", "screenwindow needs x0 x1 y0 y1 that span an area");
         given = NULL;
     }
-    for (int i = 0; i < 4; i++)
-        c->screen[i] = (float)(given ? given[i] : window[i]);
+    given = given ? given : window;
+    const double scale = c->kind == PT_CAMERA_PERSPECTIVE ? tan(0.5 * (double)c->fov_deg * (BASE_PI / 180)) : 1;
+    for (int i = 0; i < 4; i++) {
+        const double middle = 0.5 * (given[i & 2] + given[i | 1]);
+        c->screen[i] = (float)(given[i] - (b->camera_start > 0 ? middle : 0));
+        b->window_middle[i / 2] = scale * middle;
+    }
 }
 
 /* The options' camera instead of the file's; mirrored where that is, so that lettering stays legible. */
@@ -209,9 +214,15 @@ static void override_camera(struct pt_builder *b, struct pt_xform world_to_camer
     world_to_camera[0] = world_to_camera[1] = t;
 }
 
+/* Its space has its lens at the origin, or the middle of the window where its rays begin at a depth. */
 static void place_camera(struct pt_builder *b, struct pt_params *p, struct pt_camera *c)
 {
-    struct pt_xform world_to_camera[2], to_world;
+    struct pt_xform *world_to_camera = b->world_to_camera, to_world;
+    const int perspective = c->kind == PT_CAMERA_PERSPECTIVE;
+    const double start = b->camera_start, by = perspective ? start : 1;
+    const double x = by * b->window_middle[0], y = by * b->window_middle[1];
+    const double way[3] = {perspective ? x : 0, perspective ? y : 0, start};
+    double world[3];
     pt_builder_at_shutter(b, b->camera_ctm, world_to_camera);
     override_camera(b, world_to_camera);
     c->animated = !pt_xform_equal(&world_to_camera[0], &world_to_camera[1]);
@@ -220,9 +231,12 @@ static void place_camera(struct pt_builder *b, struct pt_params *p, struct pt_ca
             pt_params_fail(p, NULL, "the camera's transform is singular");
             return;
         }
-        if (i == 0)
-            for (int k = 0; k < 3; k++)
-                b->origin[k] = to_world.m[k][3];
+        if (start > 0)
+            to_world = pt_xform_mul(to_world, pt_xform_translate(x, y, start));
+        for (int k = 0; k < 3 && i == 0; k++)
+            b->origin[k] = to_world.m[k][3];
+        pt_xform_vector(&to_world, way, world);
+        c->before = (float)sqrt(world[0] * world[0] + world[1] * world[1] + world[2] * world[2]);
         c->to_render[i] = pt_xform_to_mat34(pt_builder_to_render(b, to_world));
     }
 }
@@ -230,11 +244,11 @@ static void place_camera(struct pt_builder *b, struct pt_params *p, struct pt_ca
 /* v3 knows half of it, too, for exporters that write that (cameras/perspective.cpp). */
 static double read_fov(struct pt_builder *b, struct pt_params *p)
 {
-    double fov = pt_params_float_in(p, "fov", 90, 1e-3, 179.9);
+    double fov = pt_params_float_in(p, "fov", 90, 1e-12, 179.9);
     double half = b->is_v3 ? pt_params_float(p, "halffov", 0) : 0;
     if (half > 179.9 / 2)
         pt_params_fail(p, "halffov", "parameter \"halffov\" is %g (expected at most %g)", half, 179.9 / 2);
-    return half > 0 ? fmax(2 * half, 1e-3) : fov;
+    return half > 0 ? fmax(2 * half, 1e-12) : fov;
 }
 
 /* What the options replace is read all the same: it is checked, and counts as used. */
@@ -257,10 +271,15 @@ static void build_camera(struct pt_builder *b, struct pt_params *p)
             pt_params_fail(p, NULL, "the camera is orthographic, which --fov cannot change");
         c->fov_deg = (float)b->options->view.fov_deg;
     }
-    set_screen(p, c);
+    set_screen(b, p, c);
     c->lens_radius = (float)pt_params_float_in(p, "lensradius", 0, 0, 1e9);
-    c->focal_distance = (float)pt_params_float_in(p, "focaldistance", 1e6, 1e-9, 1e30);
+    const double focal_distance = pt_params_float_in(p, "focaldistance", 1e6, 1e-9, 1e30);
+    c->focal_distance = (float)focal_distance;
+    c->focus_beyond = (float)(focal_distance - b->camera_start);
     place_camera(b, p, c);
+    c->start = (float)b->camera_start;
+    c->middle_x = (float)b->window_middle[0];
+    c->middle_y = (float)b->window_middle[1];
     c->medium = b->camera_medium;
     if (c->lens_radius > 0)
         pt_builder_effect(b, PT_FX_DEFOCUS, p->loc);

@@ -192,7 +192,7 @@ static void make_infinite(struct context *c)
         return;
     }
     struct pt_loc loc = pt_params_find(p, key)->loc;
-    int32_t id = pt_build_image_map(c->b, loc, file, NULL, PT_IMAGE_COLOUR);
+    int32_t id = pt_build_image_map(c->b, loc, file, NULL, PT_IMAGE_LIGHT);
     if (id < 0 || (id = float_rgb(c->b, id)) < 0)
         return;
     const struct pt_image_map *map = &((struct pt_image_map *)c->b->images.items)[id];
@@ -273,7 +273,7 @@ static void even_out(struct pt_builder *b, struct pt_params *p, struct pt_area_l
 {
     struct pt_loc loc = pt_params_loc(p, "filename");
     pt_diag_warn(&b->diag, loc, "the image of an area light is replaced by even light");
-    int32_t id = pt_build_image_map(b, loc, pt_params_string(p, "filename", ""), NULL, PT_IMAGE_COLOUR);
+    int32_t id = pt_build_image_map(b, loc, pt_params_string(p, "filename", ""), NULL, PT_IMAGE_LIGHT);
     if (id < 0)
         return;
     pt_vec3 mean = mean_of((struct pt_image_map *)b->images.items + id);

@@ -6,6 +6,7 @@
 #include "base/options.h"
 #include "pbrt/build.h"
 #include "shade/bsdf.h"
+#include "shade/phase_function.h"
 
 /* A material while its parameters are read. */
 struct making {
@@ -121,6 +122,11 @@ static void read_model(struct making *c, const struct pt_bsdf_model *model)
         switch (r->kind) {
         case PT_READ_COLOUR: *in = read_reflectance(c, r->name, (float)r->fallback); break;
         case PT_READ_NUMBER: *in = pt_build_float_input(c->b, c->p, r->name, r->fallback); break;
+        case PT_READ_ASYMMETRY:
+            *in = pt_build_float_input(c->b, c->p, r->name, r->fallback);
+            if (!in->texture)
+                pt_params_expect_in(c->p, r->name, (double)in->value.x, -PT_PHASE_G_MAX, PT_PHASE_G_MAX);
+            break;
         case PT_READ_ROUGHNESS: read_surface_roughness(c, r->name, r->fallback, 0); break;
         case PT_READ_BASE_ROUGHNESS:
             read_roughness(c, r->name, r->fallback, &c->m->base_roughness_u, &c->m->base_roughness_v);

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "pbrt/build.h"
+#include "shade/phase_function.h"
 
 int32_t pt_build_medium_ref(struct pt_builder *b, const char *name, struct pt_loc loc)
 {
@@ -133,7 +134,7 @@ static void read_coefficients(struct pt_builder *b, struct pt_params *p, int is_
         pt_params_warn(p, "preset", "unknown medium preset \"%s\": whole milk is used", name);
     pt_build_colour(b, p, "sigma_a", PT_USE_UNBOUNDED, &m->sigma_a);
     pt_build_colour(b, p, "sigma_s", PT_USE_UNBOUNDED, &m->sigma_s);
-    m->g = (float)pt_params_float_in(p, "g", 0, -0.9999, 0.9999);
+    m->g = (float)pt_params_float_in(p, "g", 0, -PT_PHASE_G_MAX, PT_PHASE_G_MAX);
     pt_vec3 emission = v3_splat(0);
     int emits = pt_build_colour(b, p, "Le", PT_USE_LIGHT, &emission);
     if (emits && !(is_grid && has_many(p, "Lescale"))) /* else by read_glow */

@@ -269,6 +269,19 @@ static int store_mesh(struct pt_builder *b, struct pt_params *p, const struct pt
     return 0;
 }
 
+static int store_cut(struct pt_builder *b, struct pt_params *p, const struct pt_soup *soup, const struct placement *pl,
+                     struct pt_mesh *m)
+{
+    const struct pt_xform to_render = pt_builder_to_render(b, pl->at[0]);
+    struct pt_cut cut_up;
+    int rc = pt_build_cut(soup, &to_render, &cut_up) ? store_mesh(b, p, &cut_up.soup, &pl->xform, m)
+                                                     : pt_diag_nomem(&b->diag, "a mesh");
+    if (!rc && cut_up.is_lost)
+        pt_params_warn(p, NULL, "a triangle is more than 3e13 times as large as its distance: its place is not known there");
+    pt_cut_release(&cut_up);
+    return rc ? rc : b->diag.rc;
+}
+
 int pt_build_mesh(struct pt_builder *b, struct pt_params *p, const struct pt_soup *soup)
 {
     struct pt_mesh mesh;
@@ -288,7 +301,7 @@ int pt_build_mesh(struct pt_builder *b, struct pt_params *p, const struct pt_sou
     }
     struct placement pl = place(b, p, &box);
     struct pt_shape shape = common(b, p);
-    if (b->diag.rc || store_mesh(b, p, soup, &pl.xform, &mesh) != 0)
+    if (b->diag.rc || store_cut(b, p, soup, &pl, &mesh) != 0)
         return b->diag.rc;
     shape.kind = PT_SHAPE_MESH;
     /* corners that a mirroring transform has moved go round the other way; a quadric's normal it carries along */

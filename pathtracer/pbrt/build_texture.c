@@ -77,6 +77,29 @@ static int convert(struct pt_builder *b, const char *path, const struct pic_imag
     return out->pixels ? 0 : pt_diag_nomem(&b->diag, "a texture");
 }
 
+/* What is no light, in a picture of light, is 0 and said: an infinite pixel would outshine all others. */
+static void check_light(struct pt_builder *b, struct pt_loc loc, const char *path, const struct pic_image *image)
+{
+    size_t n = image->f32 ? (size_t)image->width * (size_t)image->height : 0, c = (size_t)image->channels, bad = 0,
+           first = 0;
+    for (size_t i = 0; i < n; i++) {
+        int is_light = 1;
+        for (float *v = image->f32 + i * c, *end = v + (c < 3 ? 1 : 3); v < end; v++)
+            if (!(isfinite(*v) && *v >= 0)) {
+                is_light = 0;
+                *v = 0;
+            }
+        if (!is_light && bad++ == 0)
+            first = i;
+    }
+    size_t width = (size_t)image->width;
+    if (bad > 0)
+        pt_diag_warn(&b->diag, loc,
+                     "%s: %zu of its %zu pixels are infinite, NaN or negative, the first at x = %zu, y = %zu: "
+                     "that is taken as 0",
+                     path, bad, n, first % width, first / width);
+}
+
 int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *name, const char *encoding,
                            enum pt_image_use use)
 {
@@ -97,9 +120,10 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
     }
     pt_builder_path(b, name, path, sizeof path);
     /* Many textures of a scene name one file: it is read once for each encoding, and one whose colours mean something else
-     * than the same numbers in Rec. 709 once for each use. */
-    snprintf(own_key, sizeof own_key, "%s%g %s", use == PT_IMAGE_COLOUR ? "c" : "d", code, path);
-    if ((id = pt_names_get(&b->image_names, key)) >= 0 || (id = pt_names_get(&b->image_names, own_key)) >= 0)
+     * than the same numbers in Rec. 709, or that are light, once for each use. */
+    snprintf(own_key, sizeof own_key, "%c%g %s", "cdl"[use], code, path);
+    if ((id = pt_names_get(&b->image_names, own_key)) >= 0 ||
+        (use != PT_IMAGE_LIGHT && (id = pt_names_get(&b->image_names, key)) >= 0))
         return id;
     int rc;
     /* A real file is opened by the image library itself, without a copy of its bytes. */
@@ -118,8 +142,10 @@ int32_t pt_build_image_map(struct pt_builder *b, struct pt_loc loc, const char *
     if (!rc && image.is_part)
         pt_diag_warn(&b->diag, loc, "%s: its pixels are not those of its whole picture: others are black, or left out",
                      path);
-    const int is_own = !rc && image.has_primaries; /* as numbers it is another image */
-    if (is_own && use == PT_IMAGE_COLOUR)
+    const int is_own = !rc && (image.has_primaries || use == PT_IMAGE_LIGHT); /* as numbers it is another image */
+    if (!rc && use == PT_IMAGE_LIGHT)
+        check_light(b, loc, path, &image);
+    if (!rc && use != PT_IMAGE_DATA)
         rc = pic_to_rec709(path, &image, &err);
     if (rc)
         pt_diag_fail_code(&b->diag, rc == BASE_ENOMEM ? rc : BASE_EINVAL, loc, "cannot read %s", err.text);

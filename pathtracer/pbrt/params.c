@@ -383,13 +383,18 @@ double pt_params_float(struct pt_params *params, const char *name, double fallba
     return params->numbers[p->first];
 }
 
+int pt_params_expect_in(struct pt_params *params, const char *name, double v, double low, double high)
+{
+    if (v >= low && v <= high)
+        return 1;
+    pt_params_fail(params, name, "parameter \"%s\" is %g (expected %g to %g)", name, v, low, high);
+    return 0;
+}
+
 double pt_params_float_in(struct pt_params *params, const char *name, double fallback, double low, double high)
 {
     double v = pt_params_float(params, name, fallback);
-    if (!pt_params_find(params, name) || (v >= low && v <= high))
-        return v;
-    pt_params_fail(params, name, "parameter \"%s\" is %g (expected %g to %g)", name, v, low, high);
-    return fallback;
+    return !pt_params_find(params, name) || pt_params_expect_in(params, name, v, low, high) ? v : fallback;
 }
 
 int pt_params_int_in(struct pt_params *params, const char *name, int fallback, int low, int high)

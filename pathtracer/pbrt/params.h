@@ -82,6 +82,8 @@ int pt_name_is_in(const char *names, const char *name);
 void pt_params_ignore(struct pt_params *params, const char *names);
 
 double pt_params_float(struct pt_params *params, const char *name, double fallback);
+/* 1 when the value v of a parameter is in [low, high]; else fails. */
+int pt_params_expect_in(struct pt_params *params, const char *name, double v, double low, double high);
 /* Fails outside [low, high]. */
 double pt_params_float_in(struct pt_params *params, const char *name, double fallback, double low, double high);
 int pt_params_int_in(struct pt_params *params, const char *name, int fallback, int low, int high);

@@ -1,8 +1,7 @@
 /*
  * What accuracy costs in this scene, before it is rendered: the quote of lull/host.h, told from a pilot, the first waves of
- * the render itself. Its rows differ in the criterion's quality parameter: how many times what is just seen (`error`), or
- * how many viewers may still see noise (`visible`). Neither the film nor the render's own instance changes. Not
- * thread-safe.
+ * the render itself. Its rows differ in the criterion's quality parameter. Neither the film nor the render's own instance
+ * changes. Not thread-safe.
  */
 #ifndef PT_RENDER_QUOTE_H
 #define PT_RENDER_QUOTE_H
@@ -11,33 +10,16 @@
 
 #include "render/render.h"
 
-enum { PT_QUOTE_ROWS = 6 };
-
-struct pt_quote_setting {
-    const char *parameter; /* static text: "error", "visible"; NULL: the criterion has neither, or no value for it */
-    double value;
-    const char *name; /* static text: "rough", "draft", "good", "default", "strict", "as asked"; "normal": no default */
-};
-
 struct pt_quote {
-    struct lull_host_quote *quote;                   /* owns; for the hooks of the pilot */
-    struct pt_quote_setting settings[PT_QUOTE_ROWS]; /* of the rows */
-    const struct lull_host_quote_row *rows;          /* the answer, of pt_quote_finish; borrows */
+    struct lull_host_quote *quote;          /* owns; for the hooks of the pilot */
+    const struct lull_host_quote_row *rows; /* the answer, of pt_quote_finish; borrows */
     uint32_t row_count;
     int threads;
 };
 
-/* Coarse to fine. Where the criterion has `error`: rows of 8, 4 and 2 times what is just seen; where the render's is set,
- * of 1, 0.5 and that one, too. Else rows of visible 0.5 (where there is no `error`), of the criterion's default (0.25 if it
- * names none) and of 0.05, and of the given one if it is another. One row "as asked" where the criterion has no such
- * parameter or the render has no criterion. pairs: the parameters of the render's criterion.
- *
- * noisy: NULL, or the criterion that judges the noisy picture of a render that keeps the denoised one; then there are rows
- * of 8, 4 and 2 times what is just seen of what is kept, and two as asked, "denoised" and "noisy".
- *
- * Render, its criterion and log are borrowed until destroy. */
-int pt_quote_create(const struct pt_render *render, const struct lull_pair *pairs, uint32_t pair_count,
-                    const struct lull_criterion *noisy, struct base_log *log, struct pt_quote **out, struct base_err *err);
+/* With the rows of lull_host_quote_usual; noisy as there. The render is borrowed until destroy. */
+int pt_quote_create(const struct pt_render *render, const struct lull_criterion *noisy, struct pt_quote **out,
+                    struct base_err *err);
 void pt_quote_destroy(struct pt_quote *quote);
 
 /* After the pilot: asks about every block as it is and works out the answer. */

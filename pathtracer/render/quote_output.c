@@ -52,7 +52,8 @@ static uint32_t find_most_expensive(const struct pt_quote *q, const struct pt_re
             if (at < MOST_EXPENSIVE)
                 out[at] = out[at - 1];
         if (at < MOST_EXPENSIVE)
-            out[at] = (struct expensive_block){.index = i, .share = row->blocks[i].thread_s / row->thread_s};
+            out[at] = (struct expensive_block){.index = i,
+                                               .share = row->thread_s > 0.0 ? row->blocks[i].thread_s / row->thread_s : 0.0};
     }
     for (uint32_t k = 0; k < n; k++)
         take_census(r, &r->blocks->list[out[k].index], &out[k]);
@@ -86,15 +87,21 @@ const char *pt_quote_thousands(double value, int more, char text[32])
     return text;
 }
 
-static void print_row(FILE *out, const struct pt_quote_setting *setting, const struct lull_host_quote_row *row)
+static void print_row(FILE *out, const struct lull_host_quote_row *row)
 {
     char who[32], least[32], mean[32], most[32], samples[112], time[32], low[32], high[32], from_to[80], wall[160];
-    if (!setting->parameter)
-        snprintf(who, sizeof who, "%s", setting->name);
-    else if (strcmp(setting->parameter, "error") == 0)
-        snprintf(who, sizeof who, "%3.3g x  %s", setting->value, setting->name);
+    if (!row->parameter)
+        snprintf(who, sizeof who, "%s", row->name);
+    else if (strcmp(row->parameter, "error") == 0)
+        snprintf(who, sizeof who, "%3.3g x  %s", row->value, row->name);
+    else if (strcmp(row->parameter, "visible") == 0)
+        snprintf(who, sizeof who, "%3.3g %%  %s", 100 * row->value, row->name);
     else
-        snprintf(who, sizeof who, "%3.3g %%  %s", 100 * setting->value, setting->name);
+        snprintf(who, sizeof who, "%.3g  %s", row->value, row->name);
+    if (!row->told) {
+        fprintf(out, "%-26s  not known: the pilot has met too little\n", who);
+        return;
+    }
     snprintf(samples, sizeof samples, "%6s / %6s / %7s", pt_quote_thousands(row->spp_min, 0, least),
              pt_quote_thousands(row->spp_mean, row->unknown > 0 || row->capped > 0, mean),
              pt_quote_thousands(row->spp_max, row->unknown > 0 || row->capped > 0, most));
@@ -115,13 +122,12 @@ static void print_most_expensive(FILE *out, const struct pt_quote *q, const stru
         const struct lull_host_stop_at *stop = &row->blocks[expensive[k].index].stop;
         double paths = (double)b->spp * (double)(b->x1 - b->x0) * (double)(b->y1 - b->y0);
         char spp[32], low[32], high[32];
-        fprintf(out,
-                "  block %u (%d,%d to %d,%d): %.0f %%, %s spp (%s to %s), %.2f us per path of %.1f vertices, %.0f %% "
-                "of them %s\n",
-                b->id, b->x0, b->y0, b->x1, b->y1, 100 * expensive[k].share, pt_quote_thousands(stop->spp, 0, spp),
-                pt_quote_thousands(stop->low, 0, low), pt_quote_thousands(stop->high, 0, high),
-                paths > 0 ? b->thread_s / paths * 1e6 : 0.0, expensive[k].bounces, 100 * expensive[k].mostly_share,
-                expensive[k].mostly);
+        fprintf(out, "  block %u (%d,%d to %d,%d): ", b->id, b->x0, b->y0, b->x1, b->y1);
+        if (row->told)
+            fprintf(out, "%.0f %%, %s spp (%s to %s), ", 100 * expensive[k].share, pt_quote_thousands(stop->spp, 0, spp),
+                    pt_quote_thousands(stop->low, 0, low), pt_quote_thousands(stop->high, 0, high));
+        fprintf(out, "%.2f us per path of %.1f vertices, %.0f %% of them %s\n", paths > 0 ? b->thread_s / paths * 1e6 : 0.0,
+                expensive[k].bounces, 100 * expensive[k].mostly_share, expensive[k].mostly);
     }
 }
 
@@ -145,8 +151,8 @@ void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *
     snprintf(time, sizeof time, "time, %d thread%s", q->threads, q->threads > 1 ? "s" : "");
     fprintf(out, "%-26s  %-26s  %-30s  %s\n", "times just seen, viewers", "spp min / mean / max", time, "against uniform");
     for (uint32_t i = 0; i < q->row_count; i++)
-        print_row(out, &q->settings[i], &q->rows[i]);
-    if (asked->unknown > 0)
+        print_row(out, &q->rows[i]);
+    if (asked->unknown > 0 && asked->told)
         fprintf(out,
                 "criterion %s does not say when it expects to stop %u of %u blocks: those are counted with --spp-max, "
                 "so that all is at most\n",
@@ -159,28 +165,34 @@ void pt_quote_text(FILE *out, const struct pt_quote *q, const struct pt_render *
     fprintf(out, "memory: film %.1f MB, scene %.1f MB\n", (double)r->film.bytes * 1e-6, (double)info->scene_bytes * 1e-6);
 }
 
-static void add_range(cJSON *to, const char *key, double value, double low, double high, int *failed)
+static void add_known(cJSON *to, const char *key, double value, int told, int *failed)
 {
-    cJSON *o = base_json_object(to, key, failed);
-    base_json_number(o, "expected", value, failed);
-    base_json_number(o, "low", low, failed);
-    base_json_number(o, "high", high, failed);
+    base_json_number(to, key, told ? value : (double)NAN, failed);
 }
 
-static void add_row(cJSON *list, const struct pt_quote_setting *setting, const struct lull_host_quote_row *row,
-                    uint32_t count, int *failed)
+static void add_range(cJSON *to, const char *key, double value, double low, double high, int told, int *failed)
 {
+    cJSON *o = base_json_object(to, key, failed);
+    add_known(o, "expected", value, told, failed);
+    add_known(o, "low", low, told, failed);
+    add_known(o, "high", high, told, failed);
+}
+
+static void add_row(cJSON *list, const struct lull_host_quote_row *row, uint32_t count, int *failed)
+{
+    const int told = row->told != 0;
     cJSON *o = base_json_object(list, NULL, failed), *blocks;
-    if (setting->parameter)
-        base_json_number(o, setting->parameter, setting->value, failed);
-    base_json_text(o, "name", setting->name, failed);
+    if (row->parameter)
+        base_json_number(o, row->parameter, row->value, failed);
+    base_json_text(o, "name", row->name, failed);
     base_json_bool(o, "as_asked", row->asked, failed);
-    base_json_number(o, "spp_min", row->spp_min, failed);
-    add_range(o, "spp_mean", row->spp_mean, row->spp_mean_low, row->spp_mean_high, failed);
-    base_json_number(o, "spp_max", row->spp_max, failed);
-    add_range(o, "thread_s", row->thread_s, row->thread_low_s, row->thread_high_s, failed);
-    add_range(o, "wall_s", row->wall_s, row->wall_low_s, row->wall_high_s, failed);
-    base_json_number(o, "against_uniform", row->against_uniform, failed);
+    base_json_bool(o, "told", told, failed);
+    add_known(o, "spp_min", row->spp_min, told, failed);
+    add_range(o, "spp_mean", row->spp_mean, row->spp_mean_low, row->spp_mean_high, told, failed);
+    add_known(o, "spp_max", row->spp_max, told, failed);
+    add_range(o, "thread_s", row->thread_s, row->thread_low_s, row->thread_high_s, told, failed);
+    add_range(o, "wall_s", row->wall_s, row->wall_low_s, row->wall_high_s, told, failed);
+    add_known(o, "against_uniform", row->against_uniform, told, failed);
     base_json_number(o, "unknown_blocks", row->unknown, failed);
     base_json_number(o, "unmet_blocks", row->unmet, failed);
     base_json_number(o, "blocks_at_spp_max", row->capped, failed);
@@ -188,8 +200,8 @@ static void add_row(cJSON *list, const struct pt_quote_setting *setting, const s
     for (uint32_t i = 0; i < count; i++) {
         const struct lull_host_quote_block *b = &row->blocks[i];
         cJSON *block = base_json_object(blocks, NULL, failed);
-        add_range(block, "spp", b->stop.spp, b->stop.low, b->stop.high, failed);
-        add_range(block, "thread_s", b->thread_s, b->thread_low_s, b->thread_high_s, failed);
+        add_range(block, "spp", b->stop.spp, b->stop.low, b->stop.high, 1, failed);
+        add_range(block, "thread_s", b->thread_s, b->thread_low_s, b->thread_high_s, 1, failed);
         base_json_bool(block, "known", b->stop.known != 0, failed);
         base_json_bool(block, "met_light", !row->blocks[i].unmet, failed);
     }
@@ -235,7 +247,7 @@ int pt_quote_json(FILE *out, const struct pt_quote *q, const struct pt_render *r
     base_json_text(root, "criterion", r->criterion ? lull_host_table(r->criterion)->id : NULL, &failed);
     cJSON *rows = base_json_array(root, "rows", &failed);
     for (uint32_t i = 0; i < q->row_count; i++)
-        add_row(rows, &q->settings[i], &q->rows[i], r->blocks->count, &failed);
+        add_row(rows, &q->rows[i], r->blocks->count, &failed);
     cJSON *blocks = base_json_array(root, "blocks", &failed);
     for (uint32_t i = 0; i < r->blocks->count; i++) {
         const struct lull_host_block *b = &r->blocks->list[i];

@@ -31,12 +31,14 @@ enum pt_vertex_dim {
     PT_DIM_LIGHT_PICK = 4, /* which emitter */
     PT_DIM_BSDF_LOBE = 5,
     PT_DIM_ROULETTE = 6,
-    PT_DIM_MEDIUM = 7,    /* distance, or the key of a null-collision stream */
-    PT_DIM_PHASE = 8,     /* pair */
-    PT_DIM_ALPHA = 10,    /* key of the stream for pass-through decisions of the scattered ray */
-    PT_DIM_SHADOW = 11,   /* key: alpha and transmittance of the shadow ray */
-    PT_DIM_MIX = 12,      /* key: choice of mix materials, walks inside coatings */
-    PT_DIM_BSDF_WALK = 13 /* key: streams inside bsdf evaluation */
+    PT_DIM_MEDIUM = 7,       /* distance, or the key of a null-collision stream */
+    PT_DIM_PHASE = 8,        /* pair */
+    PT_DIM_ALPHA = 10,       /* key of the stream for pass-through decisions of the scattered ray */
+    PT_DIM_SHADOW = 11,      /* key: alpha and transmittance of the shadow ray */
+    PT_DIM_MIX = 12,         /* key: choice of mix materials, walks inside coatings */
+    PT_DIM_BSDF_WALK = 13,   /* key: streams inside bsdf evaluation */
+    PT_DIM_CONTACT = 14,     /* key: alpha that the shadow ray meets at the place that it begins at, … */
+    PT_DIM_CONTACT_LAMP = 15 /* … and at that of the lamp */
 };
 
 struct pt_sampler {

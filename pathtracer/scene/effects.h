@@ -36,7 +36,9 @@ typedef uint32_t pt_effects;
     X(DEFOCUS, "defocus", "two random numbers per camera ray")                         /* depth of field */ \
     X(MOTION, "motion", "one random number per path, interpolation in each ray query") /* motion blur */ \
     X(INSTANCES, "instances", "a change of space per ray and hit")                     /* object instances */ \
-    X(INTERFACE, "interface", "shadow rays cross surfaces one by one")                 /* surfaces that only bound media */
+    X(INTERFACE, "interface", "shadow rays cross surfaces one by one")                 /* surfaces that only bound media */ \
+    /* surfaces that let rays through where others are */ \
+    X(CONTACT, "contact", "a ray behind each hit of a surface that touches another one")
 
 /* PT_FX_ID is a bit, PT_FX_INDEX_ID its number. */
 #define PT_FX_INDEX(id, name, cost) PT_FX_INDEX_##id,

@@ -2,8 +2,9 @@
  * The renderable: what a loaded scene is while it is being rendered. Plain data; read-only once built, so any thread may
  * read.
  *
- * Spaces. *Render space* is world space translated so that the camera (at shutter open) sits at the origin; the translation
- * is applied in double before anything becomes float, so that a scene far from the world's origin keeps its precision.
+ * Spaces. *Render space* is world space translated so that the camera (at shutter open), or what it sees from afar, is at
+ * the origin; the translation is applied in double before anything becomes float, so that a scene far from the world's
+ * origin keeps its precision.
  * Everything here is in render space and scene units, but for the shapes of an object (see pt_object), which are in the
  * space of their object. Colours are linear Rec.709 RGB. Ids are indices into the arrays of pt_scene, -1 = none; textures
  * have numbers, id + 1, 0 = none.
@@ -11,7 +12,8 @@
  * Ownership. All arrays live in the scene's arena unless a field says otherwise.
  *
  * How a scene is made: zero the struct, fill camera … media, radiance_scale and effects, then call in this order
- * pt_camera_init (shade/camera.h), pt_accel_build (geom/accel.h), pt_lights_build (shade/light_build.h).
+ * pt_camera_init (shade/camera.h), pt_accel_build (geom/accel.h), pt_contacts_find (integ/contact.h), pt_lights_build
+ * (shade/light_build.h).
  * pt_accel_release, then pt_arena_release give everything back.
  */
 #ifndef PT_SCENE_SCENE_H
@@ -38,7 +40,10 @@ struct pt_camera {
     struct pt_mat34
         to_render[2]; /* camera (x right, y up, z forward; may be left-handed) → render, at shutter open, close */
     int32_t animated; /* to_render[1] counts */
-    int32_t medium;   /* the camera lies in it, -1 = vacuum */
+    /* start > 0: rays begin at that depth, `before` from the lens; to_render is of the middle of the window there. `screen`
+     * is about that middle, which is in the camera's own space, of a perspective one at depth 1. pbrt/far_view.c */
+    float start, before, middle_x, middle_y, focus_beyond; /* the last: focal_distance - start */
+    int32_t medium;                                        /* the camera lies in it, -1 = vacuum */
     /* derived by pt_camera_init */
     float x0, dx, y0, dy; /* z = 1 (perspective) or z = 0 (orthographic) plane: x = x0 + dx·raster_x, likewise y */
 };
@@ -102,6 +107,12 @@ struct pt_quadric {
     struct pt_mat34 to_render, from_render; /* quadric's own space ↔ render (or the object's) space */
 };
 
+/* What a surface is where others are at the same place (integ/contact.h). */
+enum pt_layer {
+    PT_LAYER_OPAQUE,
+    PT_LAYER_SHEET, /* lets rays through, and what is on either side of it is on the outside */
+    PT_LAYER_SOLID  /* lets rays through; the side against its normal is within glass or fog, where nothing else is */
+};
 enum pt_shape_kind { PT_SHAPE_MESH, PT_SHAPE_QUADRIC };
 
 struct pt_shape {
@@ -116,6 +127,10 @@ struct pt_shape {
     int32_t has_alpha;     /* `alpha` is not constant 1 */
     int32_t has_opacity;   /* the material lets rays through, and into the medium behind; `alpha` has its share */
     struct pt_input alpha; /* float: probability that a hit counts */
+    /* derived by pt_contacts_find */
+    int32_t layer;                   /* enum pt_layer: which of two is met first where surfaces touch */
+    int32_t touches;                 /* there may be another surface at the same place … */
+    pt_vec3 touch_least, touch_most; /* … within this box of render space */
 };
 
 /* A group of shapes that instances place; its shapes are consecutive and in the object's own space. */

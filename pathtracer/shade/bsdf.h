@@ -57,6 +57,7 @@ enum pt_bsdf_read_kind {
     PT_READ_END,
     PT_READ_COLOUR,         /* a reflectance, into `field` */
     PT_READ_NUMBER,         /* into `field` */
+    PT_READ_ASYMMETRY,      /* g of a phase function, into `field` */
     PT_READ_ROUGHNESS,      /* NAMEroughness, NAMEuroughness, NAMEvroughness, remaproughness: roughness_u and _v */
     PT_READ_BASE_ROUGHNESS, /* the same: base_roughness_u and _v */
     PT_READ_INDEX,          /* index of refraction, or a glass's name: eta */

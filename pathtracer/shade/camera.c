@@ -96,6 +96,16 @@ void pt_camera_transform_at(const struct pt_camera *camera, float time, struct p
     }
 }
 
+void pt_camera_far_ray(const struct pt_camera *camera, float x, float y, float lens_x, float lens_y, pt_vec3 *o, pt_vec3 *d)
+{
+    const int perspective = camera->kind == PT_CAMERA_PERSPECTIVE;
+    const float by = perspective ? camera->start : 1.0f, f = camera->focal_distance;
+    const float beyond = camera->focus_beyond / f, lx = camera->lens_radius * lens_x, ly = camera->lens_radius * lens_y;
+    *o = v3(by * x + lx * beyond, by * y + ly * beyond, 0.0f);
+    *d =
+        v3((perspective ? camera->middle_x + x : 0.0f) - lx / f, (perspective ? camera->middle_y + y : 0.0f) - ly / f, 1.0f);
+}
+
 void pt_camera_lens_sample(float u0, float u1, float *x, float *y)
 {
     float a = 2.0f * u0 - 1.0f, b = 2.0f * u1 - 1.0f, r = 0.0f, phi = 0.0f;

@@ -22,6 +22,10 @@ void pt_filter_sample(const struct pt_integrator *settings, int count, const flo
 /* Point of the unit disk, concentric map (Shirley & Chiu 1997). */
 void pt_camera_lens_sample(float u0, float u1, float *x, float *y);
 
+/* Of a camera whose rays begin at a depth: origin and direction in the space of to_render, for the point (x, y) of the
+ * window about its middle and the point (lens_x, lens_y) of the lens. */
+void pt_camera_far_ray(const struct pt_camera *camera, float x, float y, float lens_x, float lens_y, pt_vec3 *o, pt_vec3 *d);
+
 /* Ray through raster position (x, y), y down, direction of unit length. lens: (u0, u1) on the lens, used when it has one. */
 static inline void pt_camera_ray(pt_effects fx, const struct pt_camera *camera, float x, float y, float lens_u, float lens_v,
                                  float time, struct pt_ray *ray)
@@ -38,13 +42,15 @@ static inline void pt_camera_ray(pt_effects fx, const struct pt_camera *camera, 
         o = v3(on_screen.x, on_screen.y, 0.0f);
         d = v3(0.0f, 0.0f, 1.0f);
     }
+    float lx = 0.0f, ly = 0.0f;
     if ((fx & PT_FX_DEFOCUS) && camera->lens_radius > 0.0f) {
         pt_vec3 focus = v3_madd(o, camera->focal_distance, d);
-        float lx, ly;
         pt_camera_lens_sample(lens_u, lens_v, &lx, &ly);
         o = v3(o.x + camera->lens_radius * lx, o.y + camera->lens_radius * ly, 0.0f);
         d = v3_sub(focus, o);
     }
+    if (camera->start > 0.0f)
+        pt_camera_far_ray(camera, on_screen.x, on_screen.y, lx, ly, &o, &d);
     ray->origin = pt_mat34_point(to_render, o);
     ray->direction = v3_norm(pt_mat34_vector(to_render, d));
     ray->t_min = PT_RAY_OFF_START;

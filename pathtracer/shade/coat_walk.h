@@ -17,7 +17,7 @@
 
 /* What both coated models read of the layer between interface and base. */
 #define PT_COAT_READS \
-    PT_READ_INTO(thickness, NUMBER, "thickness", 0.01), PT_READ_INTO(g, NUMBER, "g", 0), \
+    PT_READ_INTO(thickness, NUMBER, "thickness", 0.01), PT_READ_INTO(g, ASYMMETRY, "g", 0), \
         PT_READ_INTO(albedo, COLOUR, "albedo", 0), PT_READ_INTO(max_depth, NUMBER, "maxdepth", 0), \
         PT_READ(IGNORED, "nsamples", 0)
 
@@ -27,7 +27,8 @@ static inline void pt_coat_closure(pt_effects fx, const struct pt_scene *scene, 
     pt_material_alpha(fx, scene, m, &m->roughness_u, &m->roughness_v, s, &b->alpha_x, &b->alpha_y);
     b->eta = m->eta;
     b->thickness = fmaxf(0.0f, pt_input_float(fx, scene, &m->thickness, s->u, s->v));
-    b->g = pt_input_float(fx, scene, &m->g, s->u, s->v);
+    const float most = (float)PT_PHASE_G_MAX; /* textures may say anything */
+    b->g = fminf(most, fmaxf(-most, pt_input_float(fx, scene, &m->g, s->u, s->v)));
     b->albedo = pt_material_colour(fx, scene, &m->albedo, s);
     b->coat_table = m->coat_table;
     b->more_events = 0;

@@ -38,7 +38,7 @@ struct pt_light_sample {
     int delta;          /* no other strategy can find it */
     int finite;         /* `target` counts; else the light is at infinity along wi */
     pt_vec3 target;     /* point on the light, already moved off its surface towards the reference side */
-    const struct pt_emitter *emitter; /* only with PT_FX_ALPHA: whose light it is */
+    const struct pt_emitter *emitter; /* only with PT_FX_ALPHA or PT_FX_CONTACT: whose light it is */
 };
 
 /* The emitter that the hierarchy (light_tree.c) selects by u in [0, 1), and its probability; -1 when none of the node that

@@ -27,7 +27,7 @@ static inline int pt_light_sample_emitter(pt_effects fx, const struct pt_scene *
     out->finite = 1;
     if (fx & PT_FX_ENVIRONMENT)
         out->pixel = NULL;
-    if (fx & PT_FX_ALPHA)
+    if (fx & (PT_FX_ALPHA | PT_FX_CONTACT))
         out->emitter = e;
     if ((fx & PT_FX_QUADRIC) && light->kind == PT_LIGHT_AREA && e->primitive < 0)
         return pt_light_quadric_sample(scene, e, p_ref, u0, u1, out);

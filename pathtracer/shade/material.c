@@ -54,7 +54,8 @@ static pt_effects read_effects(const struct pt_material *m, const struct pt_bsdf
 {
     switch (read->kind) {
     case PT_READ_COLOUR:
-    case PT_READ_NUMBER: return input_effects((const struct pt_input *)((const char *)m + read->field));
+    case PT_READ_NUMBER:
+    case PT_READ_ASYMMETRY: return input_effects((const struct pt_input *)((const char *)m + read->field));
     case PT_READ_ROUGHNESS: return roughness_effects(m, &m->roughness_u, &m->roughness_v);
     case PT_READ_BASE_ROUGHNESS: return roughness_effects(m, &m->base_roughness_u, &m->base_roughness_v);
     case PT_READ_METAL:

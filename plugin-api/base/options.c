@@ -39,6 +39,19 @@ int base_parse_real(const char *text, double min, double max, double *out)
     return 1;
 }
 
+int base_parse_block(const char *text, int most, int out[2])
+{
+    char width[24];
+    const size_t n = strcspn(text, "x");
+    int64_t w, h;
+    snprintf(width, sizeof width, "%.*s", n < sizeof width ? (int)n : 0, text);
+    if (!base_parse_integer(width, 1, most, &w) || !base_parse_integer(text[n] ? text + n + 1 : width, 1, most, &h))
+        return 0;
+    out[0] = (int)w;
+    out[1] = (int)h;
+    return 1;
+}
+
 int base_word_index(const char *const *words, const char *text, size_t length)
 {
     for (int i = 0; words[i]; i++)

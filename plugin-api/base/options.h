@@ -97,6 +97,8 @@ void base_options_identify(const struct base_option *list, const void *from, str
 /* The parts, for values that are made of several: the whole text must be one number in [min, max]. 1 if it is. */
 int base_parse_integer(const char *text, int64_t min, int64_t max, int64_t *out);
 int base_parse_real(const char *text, double min, double max, double *out);
+/* Width and height of blocks, WxH or N for both, each from 1 to most. */
+int base_parse_block(const char *text, int most, int out[2]);
 /* Index of the word that is text[0 … length), -1 if there is none. */
 int base_word_index(const char *const *words, const char *text, size_t length);
 

@@ -37,6 +37,44 @@ size_t base_utf8_mark(const char *text, size_t size)
     return size >= 3 && memcmp(text, mark, 3) == 0 ? 3 : 0;
 }
 
+void base_lines_init(struct base_lines *l, const char *name, const char *text, size_t size)
+{
+    *l = (struct base_lines){.name = name, .at = text + base_utf8_mark(text, size), .end = text + size};
+}
+
+/* Where the line at `at` ends, and where the next one begins. */
+static const char *find_end(const char *at, const char *end, const char **next)
+{
+    while (at < end && *at != '\n' && *at != '\r')
+        at++;
+    *next = at + (at < end) + (at + 1 < end && at[0] == '\r' && at[1] == '\n');
+    return at;
+}
+
+int base_lines_next(struct base_lines *l, const char **line, size_t *length, struct base_err *err)
+{
+    const char *begin = l->at, *stop;
+    *line = NULL;
+    if (begin == l->end)
+        return 0;
+    stop = find_end(begin, l->end, &l->at);
+    l->number++;
+    l->is_ended = stop < l->end;
+    *length = (size_t)(stop - begin);
+    if (memchr(begin, '\0', *length))
+        return base_fail(err, BASE_EINVAL, "%s:%zu: has a byte 0 (expected a line of text, in UTF-8)", l->name, l->number);
+    *line = begin;
+    return 0;
+}
+
+size_t base_lines_left(const struct base_lines *l)
+{
+    size_t n = 0;
+    for (const char *at = l->at; at < l->end; n++)
+        find_end(at, l->end, &at);
+    return n;
+}
+
 void base_view_name(const char *path, char *name, size_t room)
 {
     const char *at = base_file_name(path), *dot = strrchr(at, '.');

@@ -1,7 +1,8 @@
-/* The version of the whole project, programs and library of criteria alike. The ABI counts for itself (lull/criterion.h). */
+/* The version of the whole project: programs, packages, Python. The criteria's ABI and the host library count for themselves
+ * (lull/criterion.h, lull/host.h). What says a version takes it from these headers; tests/cli/versions.sh compares. */
 #ifndef BASE_VERSION_H
 #define BASE_VERSION_H
 
-#define BASE_VERSION "1.0"
+#define BASE_VERSION "1.0.0"
 
 #endif

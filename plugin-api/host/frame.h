@@ -114,6 +114,8 @@ struct lull_host_quote_asked {
     int other;                             /* not the frame's criterion: its checks take their own time */
     double asked_s;                        /* wall seconds that it was asked */
     uint64_t count;                        /* blocks that it was asked about */
+    const char *parameter, *name;          /* of lull_host_quote_usual, as in the row */
+    double value;
 };
 
 struct lull_host_quote {

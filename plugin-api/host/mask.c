@@ -52,24 +52,22 @@ int32_t lull_host_scale_quality(const struct lull_criterion *t, const struct lul
                                 uint32_t step, char value[32], struct lull_pair *pair, struct lull_error *err)
 {
     static const char *const names[] = {"error", "visible", "threshold"};
-    const char *known = NULL; /* a parameter that has no value */
-    for (size_t d = 0; d < sizeof names / sizeof names[0]; d++) {
-        const struct lull_param *p;
-        const char *text = lull_host_parameter(t, names[d], pairs, pair_count, &p);
-        double quality;
-        if (p && !text && !known)
-            known = names[d];
-        if (!text || !lull_kit_number(text, &quality) || !(quality >= p->min && quality <= p->max))
-            continue;
+    double quality;
+    const struct lull_param *p = lull_host_quality(t, pairs, pair_count, &quality);
+    if (p) {
         quality *= lull_host_mask_factor(step);
         if (!lull_host_number(fmin(fmax(quality, p->min), p->max), value))
             return lull_host_no_memory(err, "mask");
-        *pair = (struct lull_pair){names[d], value};
+        *pair = (struct lull_pair){p->name, value};
         return LULL_OK;
     }
-    if (known)
-        return lull_error_set(err, LULL_E_VALUE, "criterion %s: a mask scales '%s', which has no value: give one, %s=VALUE",
-                              t->id, known, known);
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        const char *text = lull_host_parameter(t, names[i], pairs, pair_count, &p);
+        if (p && !text && p->max > p->min)
+            return lull_error_set(err, LULL_E_VALUE,
+                                  "criterion %s: a mask scales '%s', which has no value: give one, %s=VALUE", t->id,
+                                  names[i], names[i]);
+    }
     return lull_error_set(err, LULL_E_KEY,
                           "criterion %s has no quality parameter 'visible' or 'threshold' for a mask to scale", t->id);
 }

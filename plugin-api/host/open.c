@@ -66,6 +66,26 @@ static int32_t ask_needs(struct lull_host_criterion *c, struct lull_error *err)
     return code == LULL_OK ? code : lull_host_blame(c, "", code, &e, err);
 }
 
+static int is_set(const struct lull_criterion *t, const char *name, const struct lull_pair *pairs, uint32_t count)
+{
+    const struct lull_param *known;
+    uint32_t i = 0;
+    lull_host_parameter(t, name, NULL, 0, &known);
+    while (i < count && strcmp(pairs[i].key, name) != 0)
+        i++;
+    return known && known->type == LULL_PARAM_FLOAT && i < count;
+}
+
+/* Of two limits only one would count. */
+static int32_t check_limits(const struct lull_criterion *t, const struct lull_pair *pairs, uint32_t count,
+                            struct lull_error *err)
+{
+    if (is_set(t, "error", pairs, count) && is_set(t, "visible", pairs, count))
+        return lull_error_set(err, LULL_E_VALUE,
+                              "criterion %s: error and visible each say when a block stops: leave out one", t->id);
+    return LULL_OK;
+}
+
 int32_t lull_host_create(const struct lull_host_services *services, const struct lull_criterion *table,
                          const struct lull_pair *pairs, uint32_t pair_count, struct lull_host_criterion **out,
                          struct lull_error *err)
@@ -77,6 +97,8 @@ int32_t lull_host_create(const struct lull_host_services *services, const struct
         code = lull_host_check_services(services, err);
     if (code == LULL_OK)
         code = lull_host_check_pairs(pairs, pair_count, err);
+    if (code == LULL_OK)
+        code = check_limits(table, pairs, pair_count, err);
     struct lull_host_criterion *c = code == LULL_OK ? calloc(1, sizeof *c) : NULL;
     if (!c) {
         give_back(services);

@@ -118,8 +118,32 @@ int choose_channel(ImageInput &input, const pic_request &q, pic_choice *out, bas
     return base_fail(err, BASE_EINVAL, "%s: has no channel '%s'", q.name, q.channel);
 }
 
+/* In the first part that has its R, G and B, or its Y, which is repeated. */
+int choose_layer(ImageInput &input, const pic_request &q, pic_choice *out, base_err *err)
+{
+    const std::string layer = *q.channel != '\0' ? std::string(q.channel) + "." : "";
+    for (int part = 0; input.seek_subimage(part, 0); part++) {
+        const std::vector<std::string> &names = input.spec().channelnames;
+        int at[4] = {};
+        for (int c = 0; c < 4; c++)
+            at[c] = static_cast<int>(std::find(names.begin(), names.end(), layer + "RGBY"[c]) - names.begin());
+        const int count = static_cast<int>(names.size());
+        if (at[0] < count && at[1] < count && at[2] < count)
+            *out = {part, 3, {at[0], at[1], at[2]}};
+        else if (at[3] < count)
+            *out = {part, 3, {at[3], at[3], at[3]}};
+        else
+            continue;
+        return 0;
+    }
+    return base_fail(err, BASE_EINVAL, "%s: has no channels '%sR', '%sG' and '%sB'", q.name, layer.c_str(), layer.c_str(),
+                     layer.c_str());
+}
+
 int choose(ImageInput &input, const pic_request &q, pic_choice *out, base_err *err)
 {
+    if (q.wanted == PIC_LAYER)
+        return choose_layer(input, q, out, err);
     if (q.wanted == PIC_CHANNEL)
         return choose_channel(input, q, out, err);
     int rc = choose_picture(input, q.name, out, err);
@@ -264,14 +288,19 @@ int turn(const char *name, int orientation, size_t pixel, int *width, int *heigh
     return 0;
 }
 
-/* What a colour EXR says of its R, G and B (technical introduction to OpenEXR, "chromaticities"), unless it is Rec. 709. */
-void find_primaries(const ImageInput &input, const ImageSpec &spec, const pic_choice &s, pic_image *image)
+/* What a colour EXR says of its R, G and B (technical introduction to OpenEXR, "chromaticities"), unless it is Rec. 709: in
+ * its header, or in that of the first part, since all parts share it. */
+void find_primaries(ImageInput &input, const ImageSpec &spec, const pic_choice &s, pic_image *image)
 {
     static const float rec709[8] = PIC_REC709_PRIMARIES;
     const float same = 1e-3f; /* closer than writers that round to three digits */
     if (s.count < 3 || s.at[1] == s.at[0] || std::strcmp(input.format_name(), "openexr") != 0)
         return;
-    const OIIO::ParamValue *found = spec.find_attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8));
+    const TypeDesc type(TypeDesc::FLOAT, 8);
+    const ImageSpec first = input.spec(0, 0);
+    const OIIO::ParamValue *found = spec.find_attribute("chromaticities", type);
+    if (found == nullptr)
+        found = first.find_attribute("chromaticities", type);
     if (found == nullptr)
         return;
     std::memcpy(image->primaries, found->data(), sizeof image->primaries);

@@ -13,14 +13,14 @@ extern "C" {
 #include "picture/image.h"
 
 /* What the functions of picture/read.h ask for; light of PIC_DISPLAY is not encoded yet. */
-enum pic_wanted { PIC_STORED, PIC_DISPLAY, PIC_CHANNEL };
+enum pic_wanted { PIC_STORED, PIC_DISPLAY, PIC_CHANNEL, PIC_LAYER };
 
 struct pic_request { /* all borrowed */
     enum pic_wanted wanted;
     const char *name; /* of the file; with data only of the format, and in errors */
     const void *data; /* NULL: the file */
     size_t size;
-    const char *channel; /* of PIC_CHANNEL */
+    const char *channel; /* of PIC_CHANNEL; of PIC_LAYER the layer */
 };
 
 /* A program has its address from the shared object; a program linked with its parts has it at once. */

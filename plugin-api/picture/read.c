@@ -51,29 +51,15 @@ int pic_read_channel(const char *path, const char *channel, struct pic_image *ou
 
 int pic_read_layer(const char *path, const char *layer, struct pic_image *out, struct base_err *err)
 {
-    struct pic_image rgb = {.channels = 3, .is_float_file = 1};
-    int rc = 0;
-    for (size_t c = 0; c < 3 && !rc; c++) {
-        struct pic_image one = {0};
-        char channel[64];
-        snprintf(channel, sizeof channel, "%s%s%c", layer, *layer ? "." : "", "RGB"[c]);
-        rc = pic_read_channel(path, channel, &one, err);
-        const size_t n = rc ? 0 : (size_t)one.width * (size_t)one.height;
-        if (!rc && c == 0) {
-            rgb.width = one.width;
-            rgb.height = one.height;
-            rgb.f32 = malloc(3 * n * sizeof *rgb.f32);
-            rc = rgb.f32 ? 0 : base_fail_nomem(err, path);
-        } else if (!rc && (one.width != rgb.width || one.height != rgb.height))
-            rc = base_fail(err, BASE_EINVAL, "%s: its channel %s has another size than the others", path, channel);
-        for (size_t i = 0; i < n && !rc; i++)
-            rgb.f32[3 * i + c] = one.f32[i];
-        pic_release(&one);
-    }
+    struct pic_image image;
+    int rc = answer(&(struct pic_request){.wanted = PIC_LAYER, .name = path, .channel = layer}, &image, err);
     if (rc)
-        pic_release(&rgb);
+        return rc;
+    rc = pic_to_rec709(path, &image, err);
+    if (rc)
+        pic_release(&image);
     else
-        *out = rgb;
+        *out = image;
     return rc;
 }
 

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/json.h"
+#include "base/options.h"
 #include "host/frame.h"
 #include "picture/read.h"
 
@@ -27,17 +28,6 @@ struct source {
     double *noisy_error; /* by block; NULL: it was not denoised */
 };
 
-static int read_block_size(const char *text, uint32_t *width, uint32_t *height)
-{
-    long w, h;
-    char more;
-    if (sscanf(text, "%ldx%ld%c", &w, &h, &more) != 2 || w < 1 || h < 1 || w > INT32_MAX || h > INT32_MAX)
-        return 0;
-    *width = (uint32_t)w;
-    *height = (uint32_t)h;
-    return 1;
-}
-
 static int64_t cells(int32_t from, int32_t to, uint32_t size) { return (to - 1) / (int32_t)size - from / (int32_t)size + 1; }
 
 static int lay_out(struct source *s, struct base_err *err)
@@ -46,9 +36,12 @@ static int lay_out(struct source *s, struct base_err *err)
     struct lull_host_config config = {
         .struct_size = sizeof config, .width = (uint32_t)w->width, .height = (uint32_t)w->height};
     struct lull_error e = {.struct_size = sizeof e};
-    if (!read_block_size(s->attributes[BLOCK].text, &config.block_width, &config.block_height))
+    int block[2];
+    if (!base_parse_block(s->attributes[BLOCK].text, INT32_MAX, block))
         return base_fail(err, BASE_EINVAL, "%s: lull:block is '%s' (expected the size of its blocks, as 200x200)", s->path,
                          s->attributes[BLOCK].text);
+    config.block_width = (uint32_t)block[0];
+    config.block_height = (uint32_t)block[1];
     if (cells(w->x0, w->x1, config.block_width) * cells(w->y0, w->y1, config.block_height) > MOST_BLOCKS)
         return base_fail(err, BASE_EINVAL, "%s: more than %d blocks of %s pixels (lull:block)", s->path, MOST_BLOCKS,
                          s->attributes[BLOCK].text);

@@ -13,8 +13,10 @@ import resource
 import subprocess
 
 from lablib import tables, tool
+from lablib.sources import TRAINING
 from lablib.tool import GGN, Refused, ggn
 
+SOURCES = TRAINING
 HEAD = ("variant", "options", "AUC", "median \\|log2\\|", "early", "samples", "best step", "ms per decision", "ms per training window",
         "minutes trained", "KB as f16")
 
@@ -91,10 +93,6 @@ def table(rows, auc="%.4f", early="%.1f %%", times="%.1f"):
     return tables.table(HEAD, [[r["name"], r["options"], *[tables.figure(shown(r, key), form) for key, form in keys]] for r in rows])
 
 
-def page(results):
-    return "%s; all with\n`%s`.\n\n%s" % (tables.provenance(results["measured"]), results["common"], table(results["rows"], "%.3f", "%.0f %%", "%.0f"))
-
-
 SETS = {"people": "people's four views, made from halves, each left out of the observer's fit", "test": "test scenes of the plan",
         "rare": "rare light, labelled by true references", "foreign": "textures that no training scene has"}
 JUDGED = ("early_stop_rate", "samples_ratio", "median_abs_log2", "median_log2", "spearman")
@@ -108,7 +106,7 @@ def judge(root, models):
             continue
         rows = found[name] = {}
         for model in models:
-            result = json.loads(ggn("evaluate", "-d", os.path.join(root, name), "-O", os.path.join(tool.ROOT, "ggn/observer/observer.json"),
+            result = json.loads(ggn("evaluate", "-d", os.path.join(root, name), "-O", os.path.join(tool.ROOT, "ggn/sight/observer.json"),
                                   *(["--recorded"] if name == "test" else []), "--no-quality", "--json", "-t", 1, "-m", model))
             split = next(s for s in result["splits"].values())
             for method in ("observer", os.path.basename(model)):

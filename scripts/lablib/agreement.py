@@ -12,8 +12,10 @@ import shutil
 
 from lablib import tables, tool
 from lablib.recordings import link_views, manifest_of, people_views
+from lablib.sources import JUDGE, NETWORK, OBSERVER, PICTURES
 from lablib.tool import ggn
 
+SOURCES = PICTURES + OBSERVER + NETWORK + JUDGE
 BASELINES = ["attributes", "noise-mask"]  # those that are shipped
 SHARES = (0.25, 0.3, 0.35, 0.4, 0.45, 0.5)
 HEAD = ("AUC", "early (below 0.8)", "samples", "median \\|log2\\|", "bias", "within an octave", "ρ")
@@ -31,7 +33,7 @@ def options(parser):
             ("--human", os.path.join(tool.SHARED, "human"), "human-thresholds.csv and views/ that people judged (../shared/human)"),
             ("--rendered", os.path.join(tool.ROOT, "../data-people/people"),
              "blocks of those that were rendered past their thresholds, as scripts/people.plan says (../data-people/people); may be absent"),
-            ("--observer", os.path.join(tool.ROOT, "ggn/observer/observer.json"), "its parameters, with those of each view left out"),
+            ("--observer", os.path.join(tool.ROOT, "ggn/sight/observer.json"), "its parameters, with those of each view left out"),
             ("--out", os.path.join(tool.BUILD, "agreement"), "labelled copies and agreement.json (build/agreement)")):
         parser.add_argument(name, type=tool.path, default=default, metavar="PATH", help=text)
     parser.add_argument("--threads", type=int, default=tool.THREADS)
@@ -119,7 +121,7 @@ def page_table(results, name):
     kept = results[name]
     m = kept["measured"]
     source = "%s, %s" % (m["date"], m["commit"])
-    if m["level"] != tool.observer_law():
+    if m["level"] != tool.observer()["level"]:
         source += ", an earlier observer (`--visible %g`)" % m["visible"]
     return table(kept["rows"], ("measured", lambda *_: source))
 

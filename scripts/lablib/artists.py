@@ -10,7 +10,9 @@ import os
 import statistics
 
 from lablib import peers, tables, tool
+from lablib.sources import DENOISED, OBSERVER
 
+SOURCES = OBSERVER + DENOISED + ("plugin-api/python/lull/blender/*.py",)
 SCENES = "cornell-box soft-shadow chess plaza fruit-bowl glossy".split()
 SAMPLES, ERRORS, MOST, THRESHOLD = (64, 128, 256), (1, 2, 3), 4096, 0.01
 TIMED = "%d samples" % SAMPLES[1]  # whose seconds the ways with a limit of time get

@@ -17,10 +17,13 @@ import tempfile
 import time
 
 from lablib import reading, tables, tool
+from lablib.sources import PICTURES
 from lablib.tool import BUILD, GGN, RENDER, ROOT, THREADS
 
+SOURCES = PICTURES + ("ggn/nn/*.[ch]", "pathtracer/render/*.[ch]")
 RAYS = os.path.join(BUILD, "bench", "pt_rays")
 NOISE = os.path.join(BUILD, "bench", "pt_noise")
+NETWORKS = os.path.join(BUILD, "bench", "ggn_networks")
 BOX = os.path.join(ROOT, "scenes", "cornell-box.pbrt")
 SHARED = os.path.join(tool.SHARED, "scenes")
 
@@ -381,7 +384,7 @@ def bench_reading(docs):
 
 
 def bench_limits():
-    """Limits of time that a user gives, and the figures of `ggn bench` against each other."""
+    """Limits of time that a user gives, and the figures of build/bench/ggn_networks against each other."""
     with tempfile.TemporaryDirectory() as scratch:
         report = os.path.join(scratch, "report.json")
         common = [RENDER, BOX, "-q", "-c", "null", "--spp-max", "100000000"]
@@ -390,22 +393,22 @@ def bench_limits():
             row("--time-budget 1: rendering, wall", json.load(f)["totals"]["render_s"], 4.0, " s", most=True)
     pilot = json.loads(answer([RENDER, BOX, "-q", "--quote", "--json", "--quote-pilot", "100000:0.3"]))["pilot"]
     row("--quote-pilot 100000:0.3: the pilot, wall", pilot["elapsed_s"], 5.0, " s", most=True)
-    text = answer([GGN, "bench", "--rounds=3", "--batch=2", "--threads=1"])
+    text = answer([NETWORKS, "--rounds=3", "--batch=2", "--threads=1"])
     ms = {name: float(value) for name, value in re.findall(r"^(\w+)_ms +([0-9.]+)$", text, re.M)}
-    row("ggn bench: sgemm", float(re.search(r"^sgemm_gflops +([0-9.]+)$", text, re.M)[1]), 0.5, " GFLOP/s")
+    row("networks: sgemm", float(re.search(r"^sgemm_gflops +([0-9.]+)$", text, re.M)[1]), 0.5, " GFLOP/s")
     for name, parts in (("decision", {"denoiser_forward": 1, "generator_forward": 2, "discriminator_forward": 1}),
                         ("blocks_16", {"decision": 16}), ("blocks_16_alone", {"decision": 16}),
                         ("denoiser_train", {"denoiser_forward": 3}), ("generator_train", {"generator_forward": 3}),
                         ("train_sample", {"denoiser_train": 6, "generator_train": 2})):
         ratio = ms[name] / sum(n * ms[part] for part, n in parts.items())
-        row("ggn bench: %s against %s" % (name, " + ".join("%d %s" % (n, part) for part, n in parts.items())),
+        row("networks: %s against %s" % (name, " + ".join("%d %s" % (n, part) for part, n in parts.items())),
             max(ratio, 1 / ratio), 3.0, " x", most=True)
 
 
 # What a part runs, below BUILD.
 NEEDS = {"peers": ["bin/lull-render"], "host": ["bin/lull-render"], "rays": ["bench/pt_rays"], "embree": ["bench/pt_rays"], "noise": ["bench/pt_noise"],
-         "start": ["bin/lull-render"], "networks": ["bin/ggn"], "avx2": ["bin/ggn", "bin/lull-render", "bench/pt_rays"], "study": ["bin/lull-study"],
-         "reading": ["bench/pt_readings", "bench/ggn_readings"], "limits": ["bin/lull-render", "bin/ggn"]}
+         "start": ["bin/lull-render"], "networks": ["bench/ggn_networks"], "avx2": ["bench/ggn_networks", "bin/lull-render", "bench/pt_rays"], "study": ["bin/lull-study"],
+         "reading": ["bench/pt_readings", "bench/ggn_readings"], "limits": ["bin/lull-render", "bench/ggn_networks"]}
 
 
 def build(parts):

@@ -11,7 +11,7 @@ import re
 import resource
 import statistics
 
-from lablib import plots, tool
+from lablib import cost_page, plots, sources, tool
 from lablib.cost_figures import bare
 from lablib.recordings import link_views, manifest_of, people_views
 from lablib.tool import BUILD, GGN, RENDER, ROOT, Refused, ggn, run
@@ -229,7 +229,7 @@ def people(o, out):
         return
     people_views(o.people, views, os.path.join(WORK, "people/people"))
     published = [x for k in ("SVD-Entropy", "26-attributes") for x in ("--thresholds", os.path.join(o.people, k + "-thresholds.csv"))]
-    options = ("--split", "people", "--no-quality", "-O", "ggn/observer/observer.json")
+    options = ("--split", "people", "--no-quality", "-O", "ggn/sight/observer.json")
     measured_anew(out, "people", "people", *options, "--threads", o.threads, *shipped(o), *baselines(o), *published)
     judged(o, out, "people", *options, "--no-pictures", *shipped(o), folder="people")
 
@@ -352,7 +352,7 @@ def grow(o, out):
 
 
 def golden(isa, *options):
-    return json.loads(ggn("golden", "--threads", "1", *options, env={"LULL_ISA": isa}))["p"]
+    return json.loads(tool.bench("ggn_golden", "--threads", "1", *options, env={"LULL_ISA": isa}))["p"]
 
 
 def pictures_of(program, *options):
@@ -478,8 +478,9 @@ def main(o):
         if step in steps:
             function(o, out)
             print("cost: %s done" % step, flush=True)
-            out.setdefault("measured", {})[step] = tool.measured(level=tool.observer_law(), visible=out["defaults"]["observer"][1])
+            out.setdefault("measured", {})[step] = tool.measured(level=tool.observer()["level"], visible=out["defaults"]["observer"][1])
             tool.save(rounded(out), o.out, "results", "cost.json", separators=(",", ":"))
+            sources.keep(o.out, "cost", out, cost_page.SOURCES)
     if "draw" in steps:
         plots.charts()  # which says what is missing
         from lablib import cost_pictures

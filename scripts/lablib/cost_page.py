@@ -4,8 +4,10 @@ import math
 from lablib import tool
 from lablib.cost_figures import (BLOCK, find, is_default, limits_by_side, mean, median, on_frontier, over_scenes,
                                  points_in, points_of, saving)
+from lablib.sources import EXAMPLES, JUDGE, NETWORK, OBSERVER, PICTURES
 from lablib.tables import figure, percent, table
 
+SOURCES = PICTURES + OBSERVER + NETWORK + EXAMPLES + JUDGE
 NAMED = {0.5, 0.1, 0.02, 0.113, 0.0075, 0.0015, 64, 256, 1024, 4096}
 BASELINES = ("svd-entropy", "attributes", "noise-mask")
 # Columns of a setting over scenes: which figure, how it is summed up, and its form.
@@ -47,7 +49,7 @@ def measured(out):
     """When, at which commit; of steps that were measured apart each by itself; says so if the observer has changed since."""
     sources = {}
     for step, m in out["measured"].items():
-        law = "" if math.isclose(m["level"], tool.observer_law(), rel_tol=1e-3) else ", an earlier observer whose default was `--visible %g`" % m["visible"]
+        law = "" if math.isclose(m["level"], tool.observer()["level"], rel_tol=1e-3) else ", an earlier observer whose default was `--visible %g`" % m["visible"]
         sources.setdefault("%s at commit %s on %s%s" % (m["date"], m["commit"], m["processor"], law), []).append(step)
     return ";\n".join(text if len(sources) == 1 else "%s: %s" % (", ".join(steps), text) for text, steps in sources.items())
 

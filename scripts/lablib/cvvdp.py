@@ -20,7 +20,7 @@ import subprocess
 import sys
 import tempfile
 
-PPD = 67.02064327657925  # 0.7 m from a screen 0.7 m wide with 3840 pixels, as in ggn/observer/flip.h
+PPD = 67.02064327657925  # 0.7 m from a screen 0.7 m wide with 3840 pixels, as in ggn/sight/flip.h
 PEAK, CONTRAST, AMBIENT = 200, 1000, 250  # cd/m2, of it to black, lux: its display standard_4k
 
 
@@ -119,7 +119,7 @@ def serve(ppd, peak):
 
 
 def sensitivities():
-    """The tables of ggn/observer/viewing.c, for a middle grey of 37 cd/m2: log2 of the sustained channel's, and of transient over it."""
+    """The tables of ggn/sight/viewing.c, for a middle grey of 37 cd/m2: log2 of the sustained channel's, and of transient over it."""
     import numpy
     import pycvvdp
     name = os.path.join(os.path.dirname(pycvvdp.__file__), "vvdp_data", "csf_lut_weber_fixed_size.json")

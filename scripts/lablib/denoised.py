@@ -13,7 +13,9 @@ import sys
 import textwrap
 
 from lablib import cvvdp, denoised_judges, tables, tool
+from lablib.sources import DENOISED, PICTURES
 
+SOURCES = PICTURES + DENOISED
 SCENES = ["scenes/%s.pbrt" % name for name in "demo rock-garden kitchen cornell-box garage defocus harbour bathroom office".split()] + [
     os.path.join("..", "shared", "scenes", name) for name in ("coffee-v3/scene.pbrt", "veach-mis-v4/veach-mis.pbrt",
                                                               "cornell-bunny-v4/cornell_bunny_conductor.pbrt")]
@@ -81,7 +83,7 @@ def measure(o, scene):
 
 def low_enough():
     """The error at which the default of --visible stops."""
-    observer = tool.load(tool.ROOT, "ggn", "observer", "observer.json")
+    observer = tool.observer()
     return 2 ** (observer["spread"] * statistics.NormalDist().inv_cdf(tool.default("denoised", "visible")) / 2)
 
 

@@ -10,7 +10,9 @@ import statistics
 
 from lablib import tables, tool
 from lablib.denoised import REFERENCES, VISIBLE, name_of
+from lablib.sources import DENOISED, PICTURES
 
+SOURCES = PICTURES + DENOISED
 SCENES = ["scenes/%s.pbrt" % name for name in "cornell-box demo chess rock-garden glossy soft-shadow".split()] + [
     os.path.join("..", "shared", "scenes", name) for name in ("coffee-v3/scene.pbrt", "veach-mis-v4/veach-mis.pbrt")]
 WAYS = {"raw": ["-c", "observer"], "denoised": ["--denoise"]}

@@ -9,7 +9,9 @@ import statistics
 import textwrap
 
 from lablib import tables, tool
+from lablib.sources import DENOISED, PICTURES
 
+SOURCES = PICTURES + DENOISED
 SCENES = "chess glossy soft-shadow cornell-box office museum crockery defocus garage kitchen fasteners gems".split()
 SPP, REFERENCES = (8, 16, 32, 64, 128, 256), (101, 102)
 BETTER = 1.02  # times the better of noisy and denoised: more counts as worse than both

@@ -1,4 +1,4 @@
-"""The model observer in numpy (ggn/model/visibility.h, ggn/observer/remaining.h), for rules that are tried before they are built."""
+"""The model observer in numpy (ggn/sight/visibility.h, ggn/sight/remaining.h), for rules that are tried before they are built."""
 import numpy as np
 
 LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750], np.float32)

@@ -42,7 +42,7 @@ def check(networks):
         want = dict(flatten(networks.golden(*seeds)))
         for flag, tolerance in ((None, 1e-6), ("--float", None)):
             words = [f"--base-{n}={s}" for n, s in zip("rmd", seeds)] + ([flag] if flag else [])
-            got = dict(flatten(json.loads(ggn("golden", "--train-step", *words))))
+            got = dict(flatten(json.loads(tool.bench("ggn_golden", "--train-step", *words))))
             for key, v in want.items():
                 error = abs(got[key] - v) / max(abs(v), 1e-3)
                 kind = flag or "double"
@@ -63,7 +63,7 @@ def bench(networks, o):
     ours, theirs = [], []
     for _ in range(o.rounds):
         theirs.append(networks.times(o.threads, widths))
-        ours.append(json.loads(ggn("bench", "--json", f"--threads={o.threads}", "--rounds=3", *(["--model=" + o.model] if o.model else []))))
+        ours.append(json.loads(tool.bench("ggn_networks", "--json", f"--threads={o.threads}", "--rounds=3", *(["--model=" + o.model] if o.model else []))))
     isa = [ours[0]["isa"], re.search(r"CPU capability usage: (\S+)", networks.torch.__config__.show())[1].lower()]
     if o.json:
         times = [[key, *(statistics.median(t[key] for t in ts) for ts in (ours, theirs))] for key in theirs[0]]

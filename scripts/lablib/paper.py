@@ -13,8 +13,10 @@ import statistics
 
 from lablib import tables, tool
 from lablib.recordings import people_views
+from lablib.sources import JUDGE, NETWORK, OBSERVER, PICTURES
 from lablib.tool import ggn
 
+SOURCES = PICTURES + OBSERVER + NETWORK + JUDGE
 CUTS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.98)
 PUBLISHED = ("SVD-Entropy", "26-attributes")
 NAMES = {"lull-3": "lull-3, as shipped", "law": "the observer's law",
@@ -105,7 +107,7 @@ def judged(replay, published, names=("lull-3",)):
     """{name: figures of its windows} and their number; names: of the replay's methods, in their order."""
     views = replay["views"]
     models = list(zip(names, replay["methods"], strict=True))
-    spread = tool.load(tool.ROOT, "ggn", "observer", "observer.json")["spread"]
+    spread = tool.observer()["spread"]
     windows = {name: Windows() for name in dict.fromkeys(["lull-3", *names, *NAMES])}
     for i, block in enumerate(replay["blocks"]):
         view = views[block["view"]]["name"]
@@ -158,7 +160,7 @@ def main(o):
         raise tool.Refused("%s: no thresholds of people there (see --human)" % human)
     views = people_views(o.human, os.path.join(o.human, "views"), os.path.join(o.work, "people"))
     names = [name for name, _ in o.baseline] + ["lull-3"] + [name for name, _ in o.network]  # in the order of ggn replay
-    asked = ["-d", o.work, "-O", os.path.join(tool.ROOT, "ggn/observer/observer.json"), "-m", os.path.join(tool.ROOT, "ggn/models/lull-3.ggn"),
+    asked = ["-d", o.work, "-O", os.path.join(tool.ROOT, "ggn/sight/observer.json"), "-m", os.path.join(tool.ROOT, "ggn/models/lull-3.ggn"),
              *[word for _, file in o.network for word in ("-m", file)], *[word for _, file in o.baseline for word in ("--baseline", file)],
              "-t", tool.THREADS]
     replay = json.loads(ggn("replay", *asked, "--no-quality"))

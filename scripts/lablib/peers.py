@@ -14,7 +14,9 @@ import subprocess
 import sys
 
 from lablib import tables, tool
+from lablib.sources import DENOISED, OBSERVER, PICTURES
 
+SOURCES = PICTURES + OBSERVER + DENOISED
 SCENES = "cornell-box soft-shadow glossy corridor bathroom chess indirect-hall glossy-row".split()
 LADDER = (0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.0025)
 DENOISED_LADDER = (0.1, 0.03, 0.01)

@@ -10,6 +10,9 @@ import subprocess
 import tempfile
 
 from lablib import bench, tables, tool
+from lablib.sources import PICTURES
+
+SOURCES = PICTURES
 
 # The first name that fits a source file; arithmetic on vectors belongs to who asks for it.
 PARTS = (("sampler", "sample/"), ("hit to place", "integ/surface geom/offset geom/quadric"), ("rays in and out of packets", "geom/accel"),

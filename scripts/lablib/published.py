@@ -12,8 +12,10 @@ import shutil
 import subprocess
 
 from lablib import ablation, plots, recordings, tables, tool
+from lablib.sources import TRAINING
 from lablib.tool import GGN, Refused, ggn
 
+SOURCES = TRAINING
 SHIPPED = os.path.join(tool.ROOT, "ggn", "models", "lull-3.ggn")
 PASSES, WINDOWS = 30, 17524  # as published; of the 648 blocks of scripts/dataset.plan
 TRIVIAL = {"observer": "the observer's law", "-spp": "number of samples alone"}
@@ -79,7 +81,7 @@ def judge(o, scenes, models):
 
 def step_ms():
     """Milliseconds of a processor, of the networks at the published widths."""
-    return {k: v for k, v in json.loads(ggn("bench", "--threads", 1, "--rounds", 9, "--batch", 8, "--json")).items() if k.endswith("_ms")}
+    return {k: v for k, v in json.loads(tool.bench("ggn_networks", "--threads", 1, "--rounds", 9, "--batch", 8, "--json")).items() if k.endswith("_ms")}
 
 
 def row(name, options, r, run=None):
@@ -107,7 +109,7 @@ def page(r):
 
 
 def parts(r):
-    """What a step's milliseconds go into, from ggn bench."""
+    """What a step's milliseconds go into, from build/bench/ggn_networks."""
     f = r["step_ms"]
     six, generator = 6 * f["denoiser_train_ms"], 2 * f["generator_train_ms"]
     return ("One window is %.0f ms of the denoiser (six images, forward and back) and %.0f ms of the generator (two windows);\na denoiser that only "

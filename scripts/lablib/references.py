@@ -7,8 +7,10 @@ import statistics
 import tempfile
 
 from lablib import tables, tool
+from lablib.sources import PICTURES
 from lablib.tool import RENDER, run
 
+SOURCES = PICTURES
 TILE = 20
 # Scenes whose Tungsten image is of the same view; the side to render, short.
 TUNGSTEN = {"staircase2-v4/staircase2.pbrt": "staircase2-v4", "living-room-v4/living-room.pbrt": "living-room-v4",

@@ -13,6 +13,8 @@ import tempfile
 from lablib import plots, tables, tool
 from lablib.tool import Refused
 
+SOURCES = ("plugin-api/job/*.[ch]", "plugin-api/mpi/*.c", "pathtracer/render/farm.[ch]")
+
 # As in pathtracer/render/render.c, plugin-api/job/message.h and farm.c.
 SLICE_S, SLICE_PER_WORKER_S, LONGEST_SLICE_S, ROWS_PER_THREAD = 0.25, 0.004, 5.0, 128
 TASKS, MOST_ROWS, SHARES = 2, 32, 4

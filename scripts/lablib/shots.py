@@ -9,7 +9,9 @@ import resource
 import statistics
 
 from lablib import cvvdp, tables, tool
+from lablib.sources import OBSERVER, PICTURES
 
+SOURCES = PICTURES + OBSERVER + ("plugin-api/host/mask.c",)
 FRAMES, EVERY, SIZE, BLOCK, FPS = 24, 8, 64, 16, 24
 REFERENCE_SPP = 256
 UNIFORM = 1.5, 3  # of the mean samples of decisions frame by frame: between the two, quality is interpolated

@@ -58,6 +58,11 @@ def ggn(*words, **how):
     return run(GGN, *words, **how)
 
 
+def bench(name, *words, **how):
+    """What a measuring program of tests/bench/ prints; `make build/bench/NAME` builds it."""
+    return run(os.path.join(BUILD, "bench", name), *words, **how)
+
+
 def load(*names):
     try:
         with open(os.path.join(*names), encoding="utf-8") as file:
@@ -90,8 +95,9 @@ def default(criterion, parameter):
     return float(found[1])
 
 
-def observer_law():
-    return load(ROOT, "ggn", "observer", "observer.json")["level"]
+def observer():
+    """The parameters of the model observer that ships: its level and spread."""
+    return load(ROOT, "ggn", "sight", "observer.json")
 
 
 def measured(**more):
@@ -109,7 +115,8 @@ def results(docs, job):
 
 def store(docs, job, data, **layout):
     """Keeps the figures of a job and fills the pages that show them."""
-    from lablib import pages
+    from lablib import pages, sources
     os.makedirs(os.path.join(docs, "results"), exist_ok=True)
     save(data, docs, "results", job + ".json", **layout)
+    sources.keep(docs, job, data, pages.FIGURES[job].SOURCES)
     pages.fill(docs)

@@ -10,7 +10,9 @@ import os
 import sys
 
 from lablib import tool
+from lablib.sources import EXAMPLES, NETWORK, OBSERVER, PICTURES
 
+SOURCES = PICTURES + OBSERVER + NETWORK + EXAMPLES
 SCENES = ("chess glossy soft-shadow cornell-box office museum judge/rare-lamps brick-yard gallery candles kitchen judge/rare-beads "
           "garage bathroom gems night-street judge/rare-foil panes corridor glass-shelf").split()
 RARE = ("rare-", "candles", "gems", "night-street", "glass-shelf")  # scenes whose noise is made by few bright paths
@@ -74,7 +76,7 @@ class Reference:
     def error(self, lightness, rect):
         """True error of a block, in units of what is just seen."""
         cut = tuple(p[rect.y0:rect.y1, rect.x0:rect.x1] for p in (lightness, *self.pictures))
-        return self.law.true(*cut, self.law.texture(*cut[1:])) / tool.observer_law()
+        return self.law.true(*cut, self.law.texture(*cut[1:])) / tool.observer()["level"]
 
 
 def replay(lull, name, recording, block, errors):

@@ -136,7 +136,9 @@ LAYOUT(lull_host_quote_row, F(lull_host_quote_row, blocks), F(lull_host_quote_ro
        F(lull_host_quote_row, spp_mean_high), F(lull_host_quote_row, thread_s), F(lull_host_quote_row, thread_low_s),
        F(lull_host_quote_row, thread_high_s), F(lull_host_quote_row, wall_s), F(lull_host_quote_row, wall_low_s),
        F(lull_host_quote_row, wall_high_s), F(lull_host_quote_row, against_uniform), F(lull_host_quote_row, unknown),
-       F(lull_host_quote_row, unmet), F(lull_host_quote_row, capped), F(lull_host_quote_row, asked));
+       F(lull_host_quote_row, unmet), F(lull_host_quote_row, capped), F(lull_host_quote_row, asked),
+       F(lull_host_quote_row, parameter), F(lull_host_quote_row, value), F(lull_host_quote_row, name),
+       F(lull_host_quote_row, told));
 
 /* The criterion's, then the host library's. */
 static const struct layout layouts[] = {
@@ -285,7 +287,7 @@ int main(int argc, char **argv)
 {
     const int host = argc > 1 && strcmp(argv[1], "--print-host") == 0;
     if (host || (argc > 1 && strcmp(argv[1], "--print") == 0)) {
-        printf("# lull/%s 1.0 where pointers have 8 bytes: each struct and its size, each field's offset and size.\n"
+        printf("# lull/%s where pointers have 8 bytes: each struct and its size, each field's offset and size.\n"
                "# Frozen: lines may be added (a minor version appends fields), never changed. Made by tests/abi/api_layout "
                "%s.\n",
                host ? "host.h" : "criterion.h", argv[1]);

@@ -76,6 +76,12 @@ finds "two files of one name" "pathtracer/shade/a.c:1: pathtracer/render/a.c has
 rm "$tmp/t/pathtracer/shade/a.c"
 echo 'int o;' | plant pathtracer/odd/o.c
 finds "a folder on no floor" "pathtracer/odd/o.c:1: the folder odd is on no floor of pathtracer/README.md"
+rm -r "$tmp/t/pathtracer/odd"
+echo '#!/bin/sh' | plant tests/cli/a.sh
+finds "a script that cannot be run" "tests/cli/a.sh:1: a script without its run bit: chmod +x"
+chmod +x "$tmp/t/tests/cli/a.sh"
+run "$tmp/t"
+check "but not one that can" $?
 run --nonsense
 [ $? = 2 ]
 check "wrong usage is exit 2" $?

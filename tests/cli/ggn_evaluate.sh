@@ -20,6 +20,19 @@ fails "import: nothing there" 'no NAME_' $ggn import "$tmp/data" -o "$tmp/x"
 fails "import: missing folder" '/none: ' $ggn import "$tmp/none" -o "$tmp/x"
 fails "import: thresholds that do not fit" '2 blocks, but 1' sh -c "printf 'p3d_toy-view0_part6;90;\n' >$tmp/one.csv; $ggn import $tmp/sin3d -o $tmp/y --block 32 -t $tmp/one.csv"
 
+cp -r "$tmp/sin3d" "$tmp/views" && cp -r "$view" "$tmp/views/a_second" && cp -r "$view" "$tmp/views/none"
+: >"$view/preview-256.png" && rm "$tmp"/views/none/*
+$ggn import "$tmp/sin3d" -o "$tmp/littered" --block 32 >"$tmp/out" 2>"$tmp/err" && diff -r "$d" "$tmp/littered/p3d_toy-view0_part6" -x labels.json >>"$tmp/err"
+check "import: what is called otherwise is left where it is" $?
+cp "$tmp/views/a_second/p3d_toy-view0_00020.png" "$tmp/views/a_second/p3d_toy-view0_20.png"
+fails "import: of several views one with two pictures of a level" "a_second: two images for 20 spp, 'p3d_toy-view0_00020.png' and 'p3d_toy-view0_20.png'" \
+    $ggn import "$tmp/views" -o "$tmp/z" --block 32
+[ ! -e "$tmp/z" ]
+check "  …nothing is imported" $?
+mv "$tmp/views/a_second/p3d_toy-view0_20.png" "$tmp/views/none/p3d_toy-view0_20.png"
+fails "import: of several views one of one level" "none: 1 levels" $ggn import "$tmp/views" -o "$tmp/z" --block 32
+rm "$view/preview-256.png"
+
 $ggn evaluate -d "$tmp/data" --json >"$tmp/out" 2>"$tmp/err" && grep -q '"labels":.*"human"' "$tmp/out" && grep -q '"-spp"' "$tmp/out" &&
     ! grep -q halfbuf "$tmp/out"
 check "evaluate without recorded statistics" $?
@@ -36,6 +49,10 @@ cp "$d/labels.json" "$tmp/people.json"
 fails "label: people's thresholds stay" "labels.json: thresholds of people would be lost; ggn label --replace-human" $ggn label --source levels "$tmp/data"
 $ggn label "$tmp/data" --human "$tmp/human.csv" >"$tmp/out" 2>"$tmp/err" && cmp -s "$d/labels.json" "$tmp/people.json"
 check "label --human: the thresholds that are there are the same labels" $?
+printf 'p3d_toy-view0_part6;99.999999999999986;33.333333333333336\n' >"$tmp/digits.csv"
+$ggn label "$tmp/data" --human "$tmp/digits.csv" --replace-human >"$tmp/out" 2>"$tmp/err" && $ggn label "$tmp/data" --human "$tmp/digits.csv" >>"$tmp/out" 2>"$tmp/err" &&
+    $ggn label "$tmp/data" --human "$tmp/human.csv" --replace-human >>"$tmp/out" 2>"$tmp/err"
+check "  …with digits that a file does not keep" $?
 printf 'p3d_toy-view0_part6;90;161;\n' >"$tmp/other.csv"
 fails "label --human: other people's too" "thresholds of people would be lost" $ggn label "$tmp/data" --human "$tmp/other.csv"
 fails "import: so does it" "thresholds of people would be lost" $ggn import "$tmp/sin3d" -o "$tmp/data" --block 32 -t "$tmp/other.csv"
@@ -54,7 +71,7 @@ fails "import: a view onto itself" "this is the view itself" $ggn import "$view"
 cmp -s "$d/labels.json" "$tmp/people.json" && [ ! -e "$tmp/none.png" ] && [ ! -e "$tmp/data/figures" ]
 check "  …and nothing has changed" $?
 
-$ggn label --source levels --replace-human "$tmp/data" >"$tmp/out" 2>"$tmp/err" && grep -q 'model observer' "$tmp/out" && grep -q '"source":.*"observer"' "$d/labels.json" &&
+$ggn label --source levels --replace-human "$tmp/data" >"$tmp/out" 2>"$tmp/err" && grep -q 'by the model observer, 2 censored at 267 spp; the reference is the last level itself$' "$tmp/out" && grep -q '"source":.*"observer"' "$d/labels.json" &&
     ! grep -q human "$d/labels.json"
 check "observer labels are not called human" $?
 $ggn label "$tmp/data" --human "$tmp/human.csv" >"$tmp/out" 2>"$tmp/err" && grep -q '"threshold":.*90' "$d/labels.json"

@@ -154,7 +154,7 @@ def test_figures():
 
 def test_replayed():
     """of recordings: the trivial methods, the criteria's own errors, and what the observer stops at is what it was asked for"""
-    r = Replay(GGN, "test", ["-d", "tests/data/recorded", "-w", "4", "--no-quality", "-O", "ggn/observer/observer.json"])
+    r = Replay(GGN, "test", ["-d", "tests/data/recorded", "-w", "4", "--no-quality", "-O", "ggn/sight/observer.json"])
     train = sorted(r.blocks[i].threshold for i in r.of("train"))
     assert set(r.constant().stops) <= {stats.quantile(train, 0.5), *[b.cap for b in r.blocks]}
     oracle = r.scene_mean()

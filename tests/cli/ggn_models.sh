@@ -1,8 +1,11 @@
 #!/bin/sh
-# ggn golden, inspect, convert, bench: what they print and how they fail.
+# ggn inspect and convert, and what measures the networks (tests/bench/ggn_golden.c, ggn_networks.c): what they print and how they fail.
 . "$(dirname "$0")/ggn_setup"
 corpus=tests/fuzz/corpus/ggn_model
-run() { "$ggn" "$@" >"$tmp/out" 2>"$tmp/err"; rc=$?; }
+ask() { "$@" >"$tmp/out" 2>"$tmp/err"; rc=$?; }
+run() { ask "$ggn" "$@"; }
+golden() { ask "$BUILD/bench/ggn_golden" "$@"; }
+bench() { ask "$BUILD/bench/ggn_networks" "$@"; }
 one_line() { [ "$(wc -l <"$tmp/err")" -eq 1 ] && [ ! -s "$tmp/out" ]; }
 
 run inspect "$corpus/f16.ggn"
@@ -44,27 +47,27 @@ check "convert into no folder is one line and exit 2" $?
 run convert --type f64 "$tmp/wide.ggn" "$tmp/none.ggn"
 [ $rc = 2 ] && grep -q f64 "$tmp/err" && [ ! -e "$tmp/none.ggn" ]
 check "convert to no type is exit 2" $?
-run golden --base-r=-1
+golden --base-r=-1
 [ $rc = 2 ]
 check "a bad seed is exit 2" $?
-run golden --float --base-r=1 --base-m=2 --base-d=3
+golden --float --base-r=1 --base-m=2 --base-d=3
 [ $rc = 0 ] && grep -q '"denoised0":	0.36056' "$tmp/out"
 check "golden for other seeds" $?
 mkdir "$tmp/got" && cp "$tmp/out" "$tmp/got/golden.near"
 cp "$tmp/out" "$tmp/first"
-run golden --float --base-r=1 --base-m=2 --base-d=3 --threads=1
+golden --float --base-r=1 --base-m=2 --base-d=3 --threads=1
 [ $rc = 0 ] && cmp -s "$tmp/first" "$tmp/out"
 check "golden does not depend on the number of threads" $?
 # The first loss is that of the denoiser as it begins, from PyTorch in double; then it is trained on the next five images.
 number() { sed -n "s/.*\"$1\":[[:space:]]*\[\{0,1\}\([-0-9.e+]*\).*/\1/p" "$2"; }
-run golden --float --train-step
+golden --float --train-step
 [ $rc = 0 ] && ! grep -q bce_ "$tmp/first" &&
     echo "$(number denoiser_loss "$tmp/out") $(number bce_before "$tmp/out") $(number bce_after "$tmp/out")" |
     awk '{exit !(NF == 3 && $1 > 0.80947 && $1 < 0.80964 && $2 > $3 && $3 > 0)}'
 check "golden --train-step: an iteration more" $?
 sed 's/[-+]\{0,1\}[0-9][0-9.]*\(e[-+][0-9]*\)\{0,1\}\([],]\|$\)/N\2/g' "$tmp/out" >"$tmp/got/golden-train" # sums of a step depend on the processor
 # On one thread the figures are processor time. What depends on the machine is left out of what is compared whole.
-run bench --rounds=1 --batch=2 --threads=1
+bench --rounds=1 --batch=2 --threads=1
 cp "$tmp/out" "$tmp/published"
 awk '
     /GFLOP$/ { name = $1; sub(/:/, "", name); told = $2; next }
@@ -84,10 +87,10 @@ awk '/^instruction/ { $3 = "X"; print; next }
     NF == 2 && /_/ { print $1; next } # a figure
     $NF ~ /^[0-9.]+$/ { sub(/ *[0-9.]+ *[0-9.]+$/, ""); if ($NF > 0) print; next } # a layer that computes
     { print }' "$tmp/published" >"$tmp/got/bench"
-run bench --json --rounds=2 --batch=1 --threads=2 --model "$corpus/f16.ggn"
+bench --json --rounds=2 --batch=1 --threads=2 --model "$corpus/f16.ggn"
 sed 's/: [0-9.]*\([,}]\)/: X\1/g; s/"isa": "[a-z0-9]*"/"isa": X/' "$tmp/out" >"$tmp/got/bench-json"
 # every layer is timed: the rows of each network give its sum
-run bench --rounds=2 --batch=1 --threads=2 --model "$corpus/f16.ggn"
+bench --rounds=2 --batch=1 --threads=2 --model "$corpus/f16.ggn"
 [ $rc = 0 ] && awk '$1 == "all" { n++; inside = 0; bad += !(rows > 9 && $3 > 0 && ms > $3 - 0.001 * rows && ms < $3 + 0.001 * rows) }
     inside { ms += $(NF - 1); rows++ }
     $1 == "stage" { inside = 1; ms = rows = 0 }
@@ -95,7 +98,7 @@ run bench --rounds=2 --batch=1 --threads=2 --model "$corpus/f16.ggn"
 check "bench: the times of the layers are that of the network" $?
 awk '$1 == "all" { if (FILENAME == ARGV[1]) small += $2; else large += $2 } END { exit !(small > 0 && small < large / 5) }' "$tmp/out" "$tmp/published"
 check "bench --model: a small one has less than a fifth of the work" $?
-run bench --json --rounds=1 --batch=1 --model=ggn/models/lull-3.ggn
+bench --json --rounds=1 --batch=1 --model=ggn/models/lull-3.ggn
 [ $rc = 0 ] && grep -q '"train_sample_ms": [0-9]' "$tmp/out"
 check "bench --model: a residual one trains, too" $?
 run frobnicate

@@ -102,6 +102,13 @@ light() { oiiotool "$tmp/map.png" --cut "$1" --printstats | awk '/Stats Avg/ {pr
 oiiotool --info "$tmp/map.png" | grep -q '80 x *40, 3 channel' && echo "$(light 30x30+0+5) $(light 30x30+45+5)" | awk '{exit !($1 < 0.03 && $2 > 0.2)}'
 check "flip --output: black where the images are equal, light where they are not" $?
 
+# 0.5 against 0.6 in linear light: relMSE .01 / .26; an error of the codes of a constant pair leaves SSIM its means: (2ab + C1) / (a^2 + b^2 + C1).
+oiiotool --pattern constant:color=.5,.5,.5 64x64 3 -d float -o "$tmp/r.exr" --pattern constant:color=.6,.6,.6 64x64 3 -d float -o "$tmp/x.exr"
+$ggn flip "$tmp/r.exr" "$tmp/x.exr" --json >"$tmp/out" 2>"$tmp/err"
+sed 's/.*"ssim": \([0-9.]*\), "relmse": \([0-9.]*\).*/\1 \2/' "$tmp/out" |
+    awk '{a = 188 / 255; b = 203 / 255; s = (2 * a * b + 1e-4) / (a * a + b * b + 1e-4); exit !($1 - s < 2e-3 && s - $1 < 2e-3 && $2 - .01 / .26 < 1e-5 && .01 / .26 - $2 < 1e-5)}'
+check "flip: SSIM and relMSE of two even pictures" $?
+
 # --- compare ------------------------------------------------------------------------------------------------------------------
 printf 'a;100;200;400;800;\n' >"$tmp/t.csv"
 printf 'a;100;400;400;900;\n' >"$tmp/m.csv"

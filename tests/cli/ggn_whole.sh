@@ -25,15 +25,12 @@ cp -r $recorded "$tmp/d"
 d=$tmp/d one=$tmp/d/train/one-view0
 
 # --- options: help, and both bounds of every number ----------------------------------------------------------------------------
-says help --help
-for command in bench golden inspect convert flip visible thresholds compare import label train baseline replay evaluate cost reconstruct; do
+for command in inspect convert flip visible thresholds compare import label train baseline replay evaluate cost reconstruct; do
     says help "$command" --help
 done
 while read -r command options; do
     for option in $options; do says bounds "$command" "--$option=x"; done
 done <<'END'
-bench threads rounds batch
-golden base-r base-m base-d threads
 convert type
 flip ppd
 visible block

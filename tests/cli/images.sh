@@ -109,6 +109,42 @@ sed "s#FILE#cut.tif#" colour.pbrt >scene.pbrt
 refused "cannot read cut.tif: not an image that can be read" scene.pbrt -q --spp 1 -o x.exr
 t "  …the whole is read" picture colour whole.tif got.exr
 
+# the picture of a light: what is no light is 0 and said, in a sky of either shape; all else is right
+python3 - <<'E' || exit 2
+import struct
+def pfm(name, width, height, pixels):
+    values = [0.5] * (3 * width * height)
+    for (x, y), v in pixels.items(): values[3 * ((height - 1 - y) * width + x)] = v
+    open(name, "wb").write(b"PF\n%d %d\n-1\n" % (width, height) + struct.pack("<%df" % len(values), *values))
+inf = float("inf")
+pfm("good.pfm", 32, 16, {(20, 2): 65504.0 / 1e9})
+for name, v in ("inf", inf), ("minus-inf", -inf), ("nan", float("nan")), ("negative", -1.0):
+    pfm("long-%s.pfm" % name, 32, 16, {(20, 2): v, (21, 2): v})
+    pfm("square-%s.pfm" % name, 16, 16, {(3, 9): v})
+E
+cat >sky.pbrt <<'S'
+LookAt 0 0 5  0 0 0  0 1 0
+Camera "orthographic" "float screenwindow" [ -.5 .5 -.5 .5 ]
+Film "rgb" "integer xresolution" 8 "integer yresolution" 8
+WorldBegin
+LIGHT
+Material "diffuse" "rgb reflectance" [ 1 1 1 ]
+Shape "trianglemesh" "integer indices" [ 0 1 2 0 2 3 ] "point3 P" [ -1 -1 0  1 -1 0  1 1 0  -1 1 0 ]
+S
+SKY='LightSource "infinite" "string filename"'
+says() { # says LINE LIGHT: it renders with a light near .5, says so, and --strict refuses
+    sed "s#LIGHT#$2#" sky.pbrt >scene.pbrt
+    "$P" scene.pbrt --no-progress --spp 64 --seed 3 -o got.exr 2>err.txt && [ "$(grep -cF "$1" err.txt)" = 1 ] || return 1
+    oiiotool got.exr --ch R,G,B --printstats | awk '/Stats Avg/ {exit !($3 > .44 && $3 < .52 && $4 > .48 && $4 < .52)}' || return 1
+    "$P" scene.pbrt -q --spp 1 --strict -o none.exr 2>err.txt
+    [ $? = 2 ] && [ ! -e none.exr ] && grep -qF "$1" err.txt
+}
+for bad_pixel in inf minus-inf nan negative; do
+    t "a sky with $bad_pixel" says "long-$bad_pixel.pfm: 2 of its 512 pixels are infinite, NaN or negative, the first at x = 20, y = 2" "$SKY \"long-$bad_pixel.pfm\""
+    t "  …that is square" says "square-$bad_pixel.pfm: 1 of its 256 pixels are infinite, NaN or negative, the first at x = 3, y = 9" "$SKY \"square-$bad_pixel.pfm\""
+done
+t "a sky without says nothing" sh -c "sed 's#LIGHT#$SKY \"good.pfm\"#' sky.pbrt >scene.pbrt && '$P' scene.pbrt -q --spp 1 --strict -o got.exr"
+
 # '?' is no query
 cp up.exr one.exr
 for file in grey.png colour.tga order-Y+X.hdr one.exr; do

@@ -66,8 +66,7 @@ CXX
 t "a criterion of the kit in C++ keeps the contract" sh -c "\${CXX:-c++} -std=c++11 -Wall -Wextra -Werror -shared -fPIC -fvisibility=hidden \
     -Wl,--version-script=plugin-api/plugin.map -Iplugin-api/include $tmp/kit.cc -o $tmp/kit.so && ${BUILD:-build}/bin/lull-check -q $tmp/kit.so"
 # pkg-config, installed elsewhere
-t "pkg-config names the include and the criterion directory" sh -c "sed 's|@PREFIX@|/opt/x|g; s|@LIBDIR@|/opt/x/lib64|g' plugin-api/lull-criterion.pc.in >$tmp/lull-criterion.pc &&
+t "pkg-config names the include and the criterion directory" sh -c "make -s OUT=$tmp PREFIX=/opt/x LIBDIR=lib64 $tmp/lull-criterion.pc &&
     PKG_CONFIG_PATH=$tmp pkg-config --cflags lull-criterion | grep -qF -e -I/opt/x/include &&
-    [ \"\$(PKG_CONFIG_PATH=$tmp pkg-config --variable=criteriondir lull-criterion)\" = /opt/x/lib64/lull ] &&
-    [ \"\$(PKG_CONFIG_PATH=$tmp pkg-config --modversion lull-criterion)\" = 1.0 ]"
+    [ \"\$(PKG_CONFIG_PATH=$tmp pkg-config --variable=criteriondir lull-criterion)\" = /opt/x/lib64/lull ]"
 echo "1..$n"

@@ -105,6 +105,17 @@ def test_evaluated():
     assert plot("stops.csv", "-o", "of.png") == (0, "")
 
 
+def test_lines():
+    """tables whose lines end in CR, CR LF or LF are one table; one with a byte 0 is none"""
+    for end in ("\r", "\r\n", "\n"):
+        write("ends.csv", STOPS.replace("\n", end))
+        assert plot("ends.csv", "-o", f"ends{len(end)}.png") == (0, "")
+        with open(f"ends{len(end)}.png", "rb") as one, open("of.png", "rb") as other:
+            assert one.read() == other.read()
+    write("wide.csv", STOPS[:-4] + "\0" + STOPS[-4:])
+    refused(f"wide.csv:{STOPS.count(chr(10))}: has a byte 0", "wide.csv", "-o", "no.png")
+
+
 def test_programs():
     """lull-plot and python3 -m lull plot draw the same bytes, into a file of the mode that the umask says"""
     env = {**os.environ, "PYTHONPATH": PACKAGE}
@@ -113,6 +124,25 @@ def test_programs():
     with open("one.png", "rb") as one, open("two.png", "rb") as two:
         assert one.read() == two.read()
     assert os.stat("one.png").st_mode & 0o777 == 0o644
+
+
+def test_environment():
+    """the same bytes whatever MPLBACKEND and a matplotlibrc say, of the folder or named, good or broken; and nobody else's are changed"""
+    subprocess.run([PROGRAM, "stops.csv", "-o", "plain.png"], check=True)
+    with open("plain.png", "rb") as file:
+        plain = file.read()
+    os.makedirs("settings", exist_ok=True)
+    for text in ("lines.linewidth: 9\nfont.size: 20\nfigure.facecolor: red\nsavefig.dpi: 30\n", "backend: x\n", "\xff\xfe", "no such thing"):
+        with open("settings/matplotlibrc", "w", encoding="latin-1") as file:
+            file.write(text)
+        for env in ({}, {"MPLBACKEND": "x"}, {"MPLBACKEND": "TkAgg"}, {"MATPLOTLIBRC": "/nowhere"}, {"MATPLOTLIBRC": os.path.abspath("settings")}):
+            done = subprocess.run([PROGRAM, "../stops.csv", "-o", "../other.png"], cwd="settings", env={**os.environ, **env}, capture_output=True)
+            with open("other.png", "rb") as file:
+                assert done.returncode == 0 and not done.stderr and file.read() == plain, (text, env, done)
+    code = "import os; before = dict(os.environ), os.getcwd(); import lull.plot.canvas; assert before == (dict(os.environ), os.getcwd())"
+    subprocess.run([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": PACKAGE, "MPLBACKEND": "x", "MATPLOTLIBRC": "y"}, check=True)
+    found = subprocess.run(["grep", "-rlE", "^ *(from|import) matplotlib", "--include=*.py", os.path.join(PACKAGE, "lull")], capture_output=True, text=True)
+    assert [os.path.basename(name) for name in found.stdout.split()] == ["canvas.py"], found.stdout
 
 
 def test_without():

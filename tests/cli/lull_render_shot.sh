@@ -62,6 +62,8 @@ t "  …or the scene's fov" cmp c_1.exr one.exr
 # --- tables ---
 "$P" "$scene" --camera-path path.csv $small --plan-shot T.csv --plan-every 2 --quote-pilot 32 --spp-max 400 >price
 t "--plan-shot says what all frames will cost" grep -q '^3 frames of 6 blocks, by 2 pilots: ' price
+"$P" "$scene" --camera-path path.csv $small --plan-shot E.csv --plan-every 2 --quote-pilot 8 --spp-max 400 >early
+t "  …and which pilots are not to be believed" grep -q '^2 of 2 pilots have met too little: what their frames need is not known' early
 t "  …and writes a line for each" test "$(grep -c '^[125];' T.csv)" -eq 3
 "$P" "$scene" --camera-path path.csv $small --plan-shot D.csv --plan-every 1 --quote-pilot 16 --spp-max 400 >/dev/null
 t "  …that fade from frame to frame, by a quarter of an octave" awk -F';' 'NR > 2 { for (i = 2; i <= NF; i++) { s[NR, i] = $i; if (NR > 3) { least = 2 ^ -0.25 * s[NR - 1, i]; if ($i < least || 2 ^ 0.25 * s[NR - 1, i] < $i - 2) exit 1; if ($i != s[NR - 1, i]) other = 1 } } } END { exit !other }' D.csv

@@ -40,6 +40,23 @@ t "many blocks: the page stays within 2 MB" sh -c "$P $scene -q --size 400x300 -
 export LULL_OIDN="$(dirname "$P")/../tests/oidn-stub"
 t "a denoised picture has its layers" sh -c "$R $scene --denoise --html d.html && [ \$(grep -c '<img alt=\"\" data-layer=' d.html) -eq 3 ]"
 
+# said WORDS ARGUMENTS...: what a page made with them says of quality, its own function run by node
+said() {
+    words=$1; shift
+    $R "$scene" "$@" --html s.html && node -e '
+const page = require("fs").readFileSync("s.html", "utf8"), data = JSON.parse(page.match(/id="data">(.*?)<\/script>/s)[1]);
+const { report } = data, list = (v) => (Array.isArray(v) ? v : []), isNumber = (v) => typeof v === "number" && Number.isFinite(v);
+const say = (v) => String(+v.toPrecision(4)), text = (v) => String(v ?? "–"), rows = (pairs) => pairs.join(" "), make = (n, a, ...c) => c.flat().filter(Boolean).join("");
+console.log(eval(`(${page.match(/^function quality\(\) \{.*?^\}/ms)[0]})`)());' >said.txt && cat said.txt && grep -qF -e "$words" said.txt
+}
+if command -v node >/dev/null; then
+    t "a page says what counts: the share of viewers" said "--visible 0.2. A block stops when at most 20 % of viewers would still see noise" --visible 0.2
+    t "  …with --error that, and nothing of viewers" said "--error 2. A block stops when its error is at most 2 times what is just seen" --error 2
+    t "  …" sh -c "! grep -q 'viewers\|isible' said.txt"
+    t "  …a threshold" said "threshold 0.5. A block stops when its error is at most this" -c halfbuf -p threshold=0.5
+    t "  …a share that is the model's own" said "--visible (the model’s own)" -c ggn
+else echo "ok - what a page says of quality # SKIP node is not installed"; fi
+
 # --- lull-report: the page of a render that is over ---
 cp p.html made.html && cp r.json made.json
 "$P" "$scene" -q --size 48x32 --block 16 --spp-max 64 -o old.exr --report r.json

@@ -59,7 +59,7 @@ check "recording again keeps what is there" $?
     --report "$tmp/a.json" --stop-map "$tmp/a.csv" >"$tmp/out" 2>"$tmp/err"
 check "render with a stop map" $?
 for f in a.exr a.json; do
-    "$bin/ggn" compare "$tmp/a.csv" "$tmp/$f" -b 16 --json >"$tmp/out" 2>"$tmp/err" && grep -q '"blocks": 9,' "$tmp/out" &&
+    "$bin/ggn" compare "$tmp/$f" "$tmp/a.csv" --stops --json >"$tmp/out" 2>"$tmp/err" && grep -q '"blocks": 9,' "$tmp/out" &&
         grep -q '"mae": 0.000000' "$tmp/out"
     check "the stops in $f are those of the CSV" $?
 done

@@ -10,11 +10,11 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-static void try_csv(char *text)
+static void try_csv(char *text, size_t size)
 {
     struct ggn_thresholds t;
     struct base_err err = {0};
-    if (ggn_thresholds_parse_csv("fuzz", text, &t, &err) == 0)
+    if (ggn_thresholds_parse_csv("fuzz", text, size, &t, &err) == 0)
         ggn_thresholds_release(&t);
     else if (err.text[0] == '\0')
         abort();
@@ -56,7 +56,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     else if (size > 0 && text[0] == 'I')
         try_rawls(text, size);
     else
-        try_csv(text);
+        try_csv(text, size);
     free(text);
     return 0;
 }

@@ -5,7 +5,7 @@
 
 #include "baselines/baseline.h"
 #include "model/inference.h"
-#include "model/measure.h"
+#include "sight/measure.h"
 #include "model/stopper.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);

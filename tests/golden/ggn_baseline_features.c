@@ -13,7 +13,7 @@
 
 #include "baselines/blas.h"
 #include "baselines/features.h"
-#include "model/golden.h"
+#include "support/ggn_golden.h"
 #include "nn/hash.h"
 
 enum { W = 200, P = W * W };

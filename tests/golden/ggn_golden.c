@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#include "model/golden.h"
+#include "support/ggn_golden.h"
 
 static const double DOUBLE_TOLERANCE = 1e-6, FLOAT_TOLERANCE = 1e-4;
 

@@ -220,8 +220,13 @@ static int read_head(struct record *r, const char *what, char *rest)
 {
     if (strcmp(what, "made") == 0)
         return snprintf(r->picture.made, sizeof r->picture.made, "%.*s", (int)strcspn(rest, "\n"), rest) > 0;
-    for (int i = 0; i < PT_MET_COUNT; i++)
-        r->picture.met[i] = strtoull(rest, &rest, 10);
+    int n = 0;
+    for (; n < PT_MET_COUNT && *rest != '\n'; n++)
+        r->picture.met[n] = strtoull(rest, &rest, 10);
+    /* the last is the medium's: models newer than the record are met nowhere */
+    const uint64_t medium = n > 0 ? r->picture.met[n - 1] : 0;
+    for (int i = n - 1; i >= 0 && i < PT_MET_COUNT; i++)
+        r->picture.met[i] = i == PT_MET_MEDIUM ? medium : 0;
     return *rest == '\n';
 }
 

@@ -8,7 +8,7 @@
 
 #include "model/inference.h"
 #include "model/policy.h"
-#include "model/preprocess.h"
+#include "sight/preprocess.h"
 #include "model/trainer.h"
 #include "nn/hash.h"
 #include "nn/loss.h"

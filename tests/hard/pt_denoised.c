@@ -18,7 +18,7 @@
 
 enum { W = 100, H = 90, BLOCK = 37, SPP_MAX = 8192 };
 
-static const double LEVEL = 0.26183516668240014; /* ggn/observer/observer.json */
+static const double LEVEL = 0.26183516668240014; /* ggn/sight/observer.json */
 
 /* --- pictures ---------------------------------------------------------------------------------------------------------- */
 
@@ -155,7 +155,7 @@ static double at(double map[H][W], const struct lull_host_block *b, int x, int y
     return map[y][x];
 }
 
-/* ggn/model/visibility.h on one patch: 1 is just seen. */
+/* ggn/sight/visibility.h on one patch: 1 is just seen. */
 static double visible(const struct lull_host_block *b, const struct pt_film *film, const float *rgb)
 {
     static const double blur[] = {0.009620057, 0.205423697, 0.569912492, 0.205423697, 0.009620057};

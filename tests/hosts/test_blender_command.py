@@ -196,11 +196,15 @@ def test_quote():
     output = io.StringIO()
     with contextlib.redirect_stdout(output):
         assert command(*common, "-q", "--quote", "--checkpoint", tmp("quote.npz")) == (0, "")
-    table = output.getvalue().splitlines()
+    table = [line for line in output.getvalue().splitlines() if "have not met their light yet" not in line]
     settings = [tuple(r.split()[:2]) for r in table[1:]]
     assert "spp min / mean / max" in table[0] and settings == [
         ("error", "8"), ("error", "4"), ("error", "2"), ("visible", "0.35"), ("visible", "0.2"), ("visible", "0.05")], table
     assert "chosen" in table[5] and not os.path.exists("quote.exr")
+    for both in (("--error", "2"), ("-p", "error=2")):
+        status, text = command(*common, *both, "-q", "--quote")
+        assert (status, text.count("\n")) == (2, 1) and "error and visible each say when a block stops: leave out one" in text, text
+    assert all(re.search(r" [0-9.]+ (s|min) \([0-9.]+ (s|min) to [0-9.]+ (s|min)\)", row) for row in table[1:]), table
     means = [float(r.split("/")[1].replace(",", "")) for r in table[1:]]
     assert means == sorted(means) and means[0] < means[-1], table
     assert command(*common, "-q", "--checkpoint", tmp("quote.npz"), "--resume", "-o", tmp("after.exr")) == (0, "")
@@ -218,8 +222,8 @@ def test_quote_of_frames():
         assert command(blend, "--frames", "all", "--quote", "--spp-max", "64", "-q") == (0, "")
     lines = output.getvalue().splitlines()
     means = [float(r.split("/")[1].replace(",", "")) for r in lines if r.endswith("chosen")]
-    assert len(means) == 3 and re.fullmatch(r"3 frames, by 3 pilots: (about|at most) [0-9.]+ (s|min), [0-9,]+ spp on average",
-                                            lines[-1]), lines
+    assert len(means) == 3 and re.fullmatch(r"3 frames, by 3 pilots: (about|at most) [0-9.]+ (s|min) "
+                                            r"\([0-9.]+ (s|min) to [0-9.]+ (s|min)\), [0-9,]+ spp on average", lines[-1]), lines
     assert abs(float(re.search(r"([0-9,]+) spp on", lines[-1])[1].replace(",", "")) - sum(means) / 3) <= 1, lines
     output = io.StringIO()
     with contextlib.redirect_stdout(output):

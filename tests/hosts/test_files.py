@@ -165,4 +165,49 @@ def test_read_only():
     raises(OSError, "shut/a: cannot write there: Permission denied", check_outputs, [Output("-o", "shut/a")])
 
 
+HOST = '''
+import sys
+import numpy as np
+import lull
+from lull import checkpoint, exr, files, outputs
+name = eval(sys.argv[1])
+with lull.load("fixed", spp=32) as c:
+    f = lull.Frame(c, 32, 16, block=16)
+    d = lull.Driver(f, lambda rects, *_: [np.full((r.height, r.width, 3), .5) for r in rects], identity={"scene": name})
+    keeper = checkpoint.Keeper(name + ".npz", d)
+    files.check_outputs([files.Output("report", name + ".json"), files.Output("page", name + ".html")], [name + ".npz"])
+    progress = outputs.Progress()
+    progress.live, progress._next_s = True, 0
+    d.after_call = progress.show
+    d.warn("\u2265 é")
+    assert d.run().outcome == "done"
+    progress.clear()
+    done, failed = files.write_each([
+        (name + ".json", lambda p: outputs.write_report(p, d, name)), (name + ".html", lambda p: outputs.write_page(p, d, name)),
+        (name + ".exr", lambda p: outputs.write_exr(p, d, name)), (name + ".png", lambda p: outputs.write_preview(p, d)),
+        (name + ".csv", lambda p: outputs.write_stop_map(p, f, name)), ("", print)])
+    assert not failed and not keeper.unsaved, (failed, keeper.unsaved)
+    assert outputs.is_ours(name + ".exr") and checkpoint.is_one(name + ".npz") and exr.texts(name + ".exr")["lull:scene"]
+    fresh = lull.Driver(lull.Frame(c, 32, 16, block=16), None, identity={"scene": name})
+    checkpoint.load(name + ".npz", fresh)
+'''
+
+
+def test_host():
+    """a host in a locale of ASCII, with streams that are closed or full: its files have their names, and nothing is lost"""
+    Path("host.py").write_text(HOST, encoding="utf-8")
+    wanted = [f"\u00e9 \u2265{end}" for end in (".csv", ".exr", ".html", ".json", ".npz", ".png")]
+    ascii_only = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    # as text of the program, and as Python has it from the command line
+    names = {ascii("\u00e9 \u2265"), ascii("\u00e9 \u2265".encode().decode("ascii", "surrogateescape"))}
+    for env, given in [(ascii_only, name) for name in sorted(names)] + [({"LC_ALL": "C.UTF-8"}, ascii("\u00e9 \u2265"))]:
+        for streams in ("", ">&-", "2>&-", ">&- 2>&- <&-", ">/dev/full 2>/dev/full"):
+            for name in wanted:
+                Path(name).unlink(missing_ok=True)
+            done = subprocess.run(["sh", "-c", f'"$0" host.py "$1" {streams}', sys.executable, given], capture_output=True,
+                                  env={**os.environ, **env, "PYTHONPATH": str(Path(lull.__file__).parents[1])})
+            assert done.returncode == 0 and b"Traceback" not in done.stderr, (env, given, streams, done)
+            assert sorted(name for name in os.listdir(".") if name.startswith("\u00e9")) == wanted, (env, given, streams, os.listdir("."))
+
+
 tap.main(dict(globals()))

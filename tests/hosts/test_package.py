@@ -139,6 +139,8 @@ def test_refused_parameters():
     raises(lull.LullError, "spp: 'x'", lull.load, "fixed", spp="x")
     raises(lull.LullError, "no-such", lull.load, "fixed", no_such=1)
     raises(lull.LullError, "threshold", lull.load, "halfbuf", threshold=-1.)
+    for name in ("observer", "denoised"):
+        raises(lull.LullError, "error and visible each say when a block stops: leave out one", lull.load, name, visible=.2, error=2)
     try:
         lull.load("fixed", no_such=1)
     except lull.LullError as error:
@@ -419,6 +421,10 @@ def test_bad_pictures():
         assert f.blocks[0].spp == 0 and not f.sums["color"].any()
     result, f, _ = run(host=lambda rects, *_: [good.astype(np.float32)] * (len(rects) - 1))
     assert "3 pictures for 4 rectangles" in str(result.exception) and [b.spp for b in f.blocks] == [16, 16, 16, 0]
+    five = lambda rects, *_: [good.astype(np.float32)] * (len(rects) + 1)  # noqa: E731
+    for host, text, spp in ((five, "5 pictures for 4 rectangles", 0), (lambda *a: iter(five(*a)), "more than 4 pictures for 4 rectangles", 16)):
+        result, f, _ = run(host=host)
+        assert result.outcome == "failed" and text in str(result.exception) and [b.spp for b in f.blocks] == [spp] * 4, result
 
 
 def test_strides():
@@ -561,7 +567,7 @@ def test_put_and_weights_not_finite():
         raises(error, text, call)
         assert b.spp == 48 and all((now == was[name]).all() for name, now in f.arrays().items()), text
     raises(TypeError, "threads 'all'", f.forecast, "all")
-    raises(TypeError, "threads 'all'", f.quote, "all", [], ("visible", .35))
+    raises(TypeError, "threads 'all'", f.quote, "all")
     for value in (np.nan, np.inf):
         f, weight = lull.Frame(lull.load("observer"), 16, 16, block=16, weighted=True), np.ones((16, 16))
         f.add(f.blocks[0], {"color": mean, "weight": weight}, 16, True)
@@ -964,10 +970,61 @@ def test_quote():
     twice = own._replace(spp=tuple(2 * n for n in own.spp), time_s=own.time_s + 100)
     assert quote.pilots(24) == [0, 8, 16, 23] and quote.pilots(1) == [0] and quote.pilots(9) == [0, 8]
     told = quote.shot([(0, own), (2, twice), (4, own._replace(at_most=True))], 5)  # 1, 1.5, 2, 1.5 and 1 times as much
-    assert told == f"5 frames, by 3 pilots: at most {quote.time_text(5 * own.time_s + 200)}, {own.spp[1] * 1.4:,.0f} spp on average", told
+    times = [quote.time_text(5 * s) for s in (own.low[1], own.high[1])]
+    wanted = f"at most {quote.time_text(5 * own.time_s + 200)} ({times[0]} to {times[1]}), {own.spp[1] * 1.4:,.0f} spp on average"
+    assert told == f"5 frames, by 3 pilots: {wanted}", told
+    assert quote.shot([(0, own), (2, own._replace(told=False))], 3) == "3 frames, by 2 pilots: not known, they have met too little"
     assert quote.shot([(0, own), (1, None)], 2) == "" == quote.shot([], 0)
     _, _, d = run("fixed", parameters={})
     assert quote.rows(d) == [] and quote.line(d) == "" and "no quality parameter" in quote.table(d)
+
+
+def test_quote_says_what_it_does_not_know():
+    """a quote has an interval, names what has not met its light, and gives no number where that is too much"""
+    sigmas = [[.05, .2, .5, 1], [.3] * 4, [.1, .2, .3, .4]]
+
+    class Rare(Noise):
+        """One pixel in a hundred of the first `rare` blocks is struck once in a hundred samples."""
+        def sample(self, r, index):
+            plain, at = super().sample(r, index), r.y0 // 16 * 4 + r.x0 // 16
+            struck = np.random.default_rng((r.x0, r.y0, index, 7)).random((16, 16, 1)) < 1e-4
+            return plain + (struck * 500. if at < self.rare else 0.)
+
+    def piloted(rare, **parameters):
+        noise = Rare(sigmas)
+        noise.rare = rare
+        d = lull.Driver(lull.Frame(lull.load("observer", **parameters), 64, 48, block=16, spp_max=1 << 20), noise)
+        while not quote.pilot_done(d, 48):
+            d.step()
+        return d
+    d = piloted(0)
+    own = quote.chosen(d)
+    assert own.told and own.unmet == 0 and own.low[0] < own.spp[1] < own.high[0] and own.low[1] <= own.time_s <= own.high[1], own
+    assert re.search(r"<- chosen", quote.table(d)) and quote.table(d).count(" to ") == 5 and "light" not in quote.table(d), quote.table(d)
+    d = piloted(12)
+    own = quote.chosen(d)
+    assert not own.told and own.unmet > 6, own
+    chosen, last = [t for t in quote.table(d).splitlines() if "<- chosen" in t][0], quote.table(d).splitlines()[-1]
+    assert "not known: the pilot has met too little" in chosen and "/" not in chosen, chosen
+    assert last == f"{own.unmet} of 12 blocks have not met their light yet: a longer pilot says more", last
+    assert quote.line(d).startswith("visible 0.35 takes more than can be told yet: too little was met"), quote.line(d)
+
+
+def test_quote_of_any_criterion():
+    """parameters without a default, or of another type, take nothing from a quote; what is set has its row"""
+    def rows(name, **parameters):
+        d = lull.Driver(lull.Frame(lull.load(name, **parameters), 32, 32, block=16, spp_max=512), Noise([[.1] * 2] * 2))
+        while not quote.pilot_done(d, 48):
+            d.step()
+        return [(r.parameter, r.value, r.name) if r.parameter else r.name for r in quote.rows(d)]
+    shares = [("visible", .25, "normal"), ("visible", .05, "strict")]
+    coarser = [("error", 8, "rough"), ("error", 4, "draft"), ("error", 2, "good")]
+    assert rows("ggn") == ["as asked", ("visible", .5, "draft"), *shares]
+    assert rows(f"{PLUGINS}/unset.so") == ["as asked", *coarser, *shares]
+    assert rows(f"{PLUGINS}/unset.so", visible=.1) == [*coarser, shares[0], ("visible", .1, "as asked"), shares[1]]
+    assert rows(f"{PLUGINS}/unset.so", threshold=3) == [("threshold", 12, "rough"), ("threshold", 6, "draft"), ("threshold", 3, "as asked")]
+    assert rows(f"{PLUGINS}/unset.so:odd", visible="low", error="x", threshold=3) == [("threshold", 3, "as asked")]
+    assert rows(f"{PLUGINS}/unset.so:odd", visible="low", error="x") == []
 
 
 def test_display_server():

@@ -319,6 +319,9 @@ def test_command():
     assert said == f"fixed: 4 of 4 blocks stopped, at {first} to {first} samples; {len(found['answers'])} answers\n"
     assert found["stops"] == [first] * 4 and found["criterion"]["parameters"] == {"spp": "20"} and found["columns"][:6] == ["block", "spp", "action", "error", "p", "next"]
     assert found["answers"][-1][:4] == [3, first, 1, None] and found["scene"] == "cornell-box"
+    shutil.copytree("ladder", "caf\u00e9")
+    ascii_only = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    subprocess.run([sys.executable, "-c", r"from lull import recording; recording.read('caf\u00e9').planes(0, 8)"], env=ascii_only, check=True)
     once("own-observer", "-c", "observer", "--planes", "color")
     own = recording.read("own-observer")
     command("own-observer", "-q", "-o", "own.json")

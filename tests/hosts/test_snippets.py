@@ -36,7 +36,7 @@ CHECKED = {("README.md", 1): "tests/packages/readme.sh", ("docs/hosts.md", 1): "
            ("docs/watching.md", 2): "a server; tests/cli/watch.sh",
            ("plugin-api/python/README.md", 1): "tests/packages/wheel.sh"}
 CODE = {("docs/denoised.md", "python", 1), ("docs/hosts.md", "python", 1), ("docs/hosts.md", "python", 2), ("docs/hosting.md", "cpp", 1), ("plugin-api/README.md", "c", 1),
-        ("plugin-api/README.md", "c", 2), ("plugin-api/python/README.md", "python", 1), ("plugin-api/python/README.md", "python", 2)}
+        ("plugin-api/README.md", "c", 2), ("plugin-api/README.md", "c", 3), ("plugin-api/README.md", "cpp", 1), ("plugin-api/README.md", "rust", 1), ("plugin-api/python/README.md", "python", 1), ("plugin-api/python/README.md", "python", 2)}
 
 
 def snippets():
@@ -159,6 +159,51 @@ def test_c_criterion():
         assert done.returncode == 0, done.stdout + done.stderr
 
 
+def command_of(page, begin, **changed):
+    """The words of the command in a line of text that begins so."""
+    text = re.search(rf"`({re.escape(begin)}[^`]*)`", Path(page).read_text())[1]
+    return shlex.split(functools.reduce(lambda t, change: t.replace(*change), changed.items(), text))
+
+
+def keeps_the_contract(build, source, fault):
+    """build(): makes mine.so of `source`; with `fault` in the place of the idea that stops no block, and the render is whole."""
+    build()
+    done = subprocess.run([BUILD / "bin/lull-check", "./mine.so"], text=True, capture_output=True)
+    assert done.returncode == 0 and "42 checks, 0 failed" in done.stdout, done.stdout + done.stderr
+    exported = subprocess.run(["nm", "-D", "--defined-only", "mine.so"], text=True, capture_output=True, check=True).stdout
+    assert [line.split()[2] for line in exported.splitlines() if " A " not in line] == ["lull_criterion_entry_v1"], exported
+    render = [BUILD / "bin/lull-render", ROOT / "tests/cli/room.pbrt", "-q", "--size", "24x16", "--block", "8", "--spp-max", "128", "-c", "./mine.so"]
+    for spp, reason in ((64, "criterion"), (128, "spp-max")):
+        subprocess.run([*render, "-o", "picture.exr", "--report", "report.json"], check=True, capture_output=True)
+        blocks = json.loads(Path("report.json").read_text())["blocks"]
+        assert {b["reason"] for b in blocks} == {reason} and spp <= min(b["spp"] for b in blocks), (reason, blocks)
+        text = Path(source).read_text()
+        Path(source).write_text(text.replace("block.spp >= 64", fault))
+        build()
+
+
+def test_cpp_criterion():
+    """plugin-api/README.md: the criterion in C++ compiles by its line, keeps every rule, and lets no exception out"""
+    with elsewhere() as folder:
+        (folder / "mine.cpp").write_text(FOUND["plugin-api/README.md", "cpp", 1])
+        words = command_of(ROOT / "plugin-api/README.md", "c++ -std=c++11 -shared",
+                           **{"-Iinclude": f"-I{ROOT}/plugin-api/include", "script=plugin.map": f"script={ROOT}/plugin-api/plugin.map"})
+        keeps_the_contract(lambda: subprocess.run([*words, "-Wall", "-Wextra", "-Werror"], check=True), "mine.cpp", "block.spp > 2 ? throw 1 : false")
+
+
+def test_rust_criterion():
+    """plugin-api/README.md: the criterion in Rust, the same"""
+    if not shutil.which("rustc"):
+        raise Skip("no rustc: apt-get install rustc")
+    with elsewhere() as folder:
+        page = ROOT / "plugin-api/README.md"
+        (folder / "mine.rs").write_text(FOUND["plugin-api/README.md", "rust", 1])
+        (folder / "kit.c").write_text(FOUND["plugin-api/README.md", "c", 2])
+        subprocess.run(command_of(page, "cc -c -fPIC", **{"-Iinclude": f"-I{ROOT}/plugin-api/include"}), check=True)
+        words = command_of(page, "rustc -O")
+        keeps_the_contract(lambda: subprocess.run(words, check=True, capture_output=True), "mine.rs", 'panic!("{}", block.spp)')
+
+
 HOST = """
 #include <lull/host.h>
 #include <stdio.h>
@@ -200,7 +245,7 @@ int main(void)
 
 def test_c_host():
     """plugin-api/README.md: the host of the page compiles, renders and writes its files"""
-    text = FOUND["plugin-api/README.md", "c", 2]
+    text = FOUND["plugin-api/README.md", "c", 3]
     assert text.count("/* render each block") == 1
     with elsewhere() as folder:
         (folder / "host.c").write_text(HOST + text.replace("/* render each block", "render(blocks); /* render each block") + "return err.code;\n}\n")

@@ -63,12 +63,9 @@ t "  …with the view's name and camera" sh -c "tr -d '\t\n ' <data/test/t-view1
 t "  …and again: nothing to do" sh -c "tail -1 out | grep -q '6 of 6 (test t/view1 6); to go: 0:00 h'"
 t "--only" sh -c "'$M' data-set --plan order.plan --only test data | grep -c ' of 3 ' | grep -qx 3"
 
-# --- smaller pictures, and by how few paths their noise is made ---
+# --- smaller pictures ---
 printf '%s\n' "test a scenes/cornell-box.pbrt 1 linear:8:16:8 0 0" "film 64x48 16" "test b scenes/hard-firefly.pbrt 1 linear:8:32:8 0 4,5" >film.plan
 t "a film and its blocks" sh -c "'$M' data-set --plan film.plan --only test film && tr -d '\t\n ' <film/test/b/manifest.json | grep -q '\"width\":64,\"height\":48,\"block\":16,' && grep -q '\"block\":.*200' film/test/a/manifest.json"
-t "rare-light: of few paths" sh -c "'$M' rare-light film | grep -q '^| b | 5 | 0\.[0-9]* % |'"
-t "  …as the noise of one path in 300 and less" sh -c "'$M' rare-light --most 0.33 film | grep -q '^1 of 3 blocks are below 0.33 %'"
-t "  …nothing there: one line" sh -c "mkdir empty; '$M' rare-light empty 2>err; test \$? -eq 2 -a \$(wc -l <err) -eq 1"
 
 # --- what there is, as a list ---
 t "--csv: one line per block" test "$("$M" data-set --csv data | tail -n +2 | cut -d';' -f1-3,5-8 | tr '\n' ' ')" = \

@@ -37,7 +37,7 @@ t "refused: other lengths" grep -q '^refused ColorVideoVDP: 2 pictures against 1
 t "refused: no such file" grep -q '^refused ColorVideoVDP: .*none.png' said
 t "refused: another size" grep -q '^refused ColorVideoVDP: .*small.png has another size' said
 "${P%/bin/*}/judge/bin/python" "$here/../../scripts/lablib/cvvdp.py" --sensitivities >tables
-t "the tables by which the model observer weighs what is viewed are what its functions say" sh -c "tr -s ' \n' '  ' <'$here/../../ggn/observer/viewing.c' >code && \
+t "the tables by which the model observer weighs what is viewed are what its functions say" sh -c "tr -s ' \n' '  ' <'$here/../../ggn/sight/viewing.c' >code && \
     sed -n 1p tables | xargs -I{} grep -qF '{{}}' code && sed -n 2p tables | xargs -I{} grep -qF '{{}}' code"
 echo "1..$n"
 exit $bad

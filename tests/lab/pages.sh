@@ -25,7 +25,7 @@ says() { # says LINE: the last check of the copy ended with status 1 and said th
     [ $? -eq 1 ] && [ "$(wc -l <"$tmp/err")" -eq 1 ] && grep -qE -e "$1" "$tmp/err"
 }
 helps() { for job in $(scripts/lab --help | sed -n 's/^  \([a-z-]*\)  .*/\1/p'); do scripts/lab "$job" --help | grep -q "^usage: scripts/lab $job" || exit 1; done; }
-t "--help names twenty-two jobs" test "$(scripts/lab --help | grep -c '^  [a-z-]*  ')" -eq 22
+t "--help names twenty-one jobs" test "$(scripts/lab --help | grep -c '^  [a-z-]*  ')" -eq 21
 t "  …each with its own" helps
 t "no such job: one line" refuses "expected data-set, cost, " nonsense
 t "no such option: one line" refuses "lab pages: unrecognized arguments: --what" pages --what
@@ -36,13 +36,13 @@ t "without jinja2: one line says what to install" refuses "apt-get install pytho
 unset PYTHONPATH
 t "every page is what the templates make of the figures" scripts/lab pages --check
 
-mkdir -p "$tmp/tree/docs" "$tmp/tree/ggn/observer"
-cp -r docs/*.md docs/results "$tmp/tree/docs" && cp README.md "$tmp/tree" && cp ggn/README.md "$tmp/tree/ggn" && cp ggn/observer/README.md "$tmp/tree/ggn/observer"
+mkdir -p "$tmp/tree/docs" "$tmp/tree/ggn/sight"
+cp -r docs/*.md docs/results docs/notebook "$tmp/tree/docs" && cp README.md "$tmp/tree" && cp ggn/README.md "$tmp/tree/ggn" && cp ggn/sight/README.md "$tmp/tree/ggn/sight"
 figure=$(grep -o '[0-9]\.[0-9][0-9][0-9]' "$tmp/tree/docs/results/decisions.md" | head -n 1)
 echo "AUC $figure against people" >>"$tmp/tree/README.md"
 t "a figure of the tables in README is told" says "README.md tells $figure, a figure of docs/results.md or docs/results/decisions.md"
 cp README.md "$tmp/tree"
-for page in docs/results.md docs/results/decisions.md docs/results/speed.md ggn/observer/README.md; do
+for page in docs/results.md docs/results/decisions.md docs/results/speed.md ggn/sight/README.md; do
     sed -i "/^# \(Results\|How well the criteria\)/,\$s/ 0\.[0-9]/ 7.1/; /<!-- lab: [a-z]*\./,/<!-- lab: end/s/ 0\.[0-9]/ 7.1/" "$tmp/tree/$page"
     t "a figure that was changed in $page is told" says "$page is not what its template makes of the figures"
     t "  …and mended" sh -c "scripts/lab pages --docs '$tmp/tree/docs' && cmp '$tmp/tree/$page' $page"
@@ -53,7 +53,7 @@ t "other figures make other pages" test "$(cut -d' ' -f3 "$tmp/err" | xargs -n 1
 sed -i 's/"people"/"somebody"/' "$tmp/tree/docs/results/agreement.json"
 t "figures that lack are one line" refuses "results/decisions.md: its figures are not whole" pages --docs "$tmp/tree/docs"
 
-mkdir -p "$tmp/out/results" && cp docs/results/cost.json "$tmp/out/results"
+mkdir -p "$tmp/out/results" && cp docs/results/cost.json docs/results/sources.json "$tmp/out/results"
 t "lab cost draws from the figures" scripts/lab cost --only draw --out "$tmp/out"
 t "  …the same page" diff "$tmp/out/results/cost.md" docs/results/cost.md
 t "  …and every picture of it" sh -c 'for p in $(grep -o "](cost-[a-z-]*\.png)" "$1/results/cost.md" | tr -d "]()"); do [ -s "docs/results/$p" ] || { echo "$p"; exit 1; }; done' - "$tmp/out"

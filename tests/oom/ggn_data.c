@@ -14,10 +14,10 @@
 #include "data/import.h"
 #include "picture/read.h"
 #include "data/thresholds.h"
-#include "figures/stats.h"
-#include "observer/curve.h"
-#include "observer/flip.h"
-#include "observer/views.h"
+#include "sight/stats.h"
+#include "sight/curve.h"
+#include "sight/flip.h"
+#include "train/views.h"
 #include "support/fail_alloc.h"
 
 enum { W = 12, H = 10, P = W * H };
@@ -128,7 +128,7 @@ static int tables(struct base_err *err)
     const double x[] = {1, 2, 3};
     const unsigned char label[] = {0, 1, 1};
     double auc;
-    int rc = ggn_thresholds_parse_csv("t.csv", text, &t, err);
+    int rc = ggn_thresholds_parse_csv("t.csv", text, strlen(text), &t, err);
     if (rc)
         return rc;
     ggn_thresholds_release(&t);

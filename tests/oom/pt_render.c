@@ -312,7 +312,7 @@ static int quote(struct pt_render *render, int finishing, long k, int *happened,
     struct pt_quote *q = NULL;
     enum pt_render_outcome outcome;
     fail_arm(finishing ? LONG_MAX : k);
-    int rc = pt_quote_create(render, NULL, 0, NULL, NULL, &q, err);
+    int rc = pt_quote_create(render, NULL, &q, err);
     *happened = fail_disarm();
     struct pt_render_hooks hooks = {.quote = q ? q->quote : NULL};
     if (!rc && finishing) {

@@ -18,39 +18,7 @@ enum { SEED = 20261121, CHI2_SAMPLES = 300000, ENERGY_SAMPLES = 60000 };
 static const double significance = 0.01;
 
 static const float cosines[] = {0.9f, 0.6f, 0.12f, -0.5f};
-enum { COSINES = sizeof cosines / sizeof cosines[0], CASES_MAX = 32 };
-
-static int all_cases(struct bsdf_case *c)
-{
-    int n = 0;
-#define CASE(...) c[n++] = (struct bsdf_case){#__VA_ARGS__, __VA_ARGS__}
-    CASE(bsdf_diffuse(0.8f));
-    CASE(bsdf_diffuse_transmission(0.3f, 0.6f));
-    CASE(bsdf_diffuse_transmission(0.0f, 0.6f));
-    CASE(bsdf_conductor(0.15f, 0.15f));
-    CASE(bsdf_conductor(0.5f, 0.5f));
-    CASE(bsdf_conductor(1.0f, 1.0f));
-    CASE(bsdf_conductor(0.15f, 0.6f));
-    CASE(bsdf_conductor(0.0f, 0.0f));
-    CASE(bsdf_lossless_conductor(0.3f));
-    CASE(bsdf_dielectric(0.2f, 0.2f, 1.5f));
-    CASE(bsdf_dielectric(0.7f, 0.3f, 1.33f));
-    CASE(bsdf_dielectric(0.4f, 0.4f, 0.7f));
-    CASE(bsdf_dielectric(0.3f, 0.3f, 1.0f));
-    CASE(bsdf_dielectric(0.0f, 0.0f, 1.5f));
-    CASE(bsdf_dielectric(0.0f, 0.0f, 0.6f));
-    CASE(bsdf_thin(1.5f));
-    CASE(bsdf_coated_diffuse(0.0f, 1.5f, 0.8f, 0.01f));
-    CASE(bsdf_coated_diffuse(0.2f, 1.5f, 0.8f, 0.01f));
-    CASE(bsdf_coated_diffuse(0.8f, 1.9f, 0.3f, 0.0f));
-    CASE(bsdf_coated_conductor(0.0f, 0.2f));
-    CASE(bsdf_coated_conductor(0.3f, 0.2f));
-    CASE(bsdf_coated_conductor(0.3f, 0.0f));
-    CASE(bsdf_coated_conductor(0.0f, 0.0f));
-    CASE(bsdf_scattering_coat(0.2f, 0.9f, 0.5f, 0.3f));
-#undef CASE
-    return n;
-}
+enum { COSINES = sizeof cosines / sizeof cosines[0] };
 
 struct pdf_of {
     const struct pt_bsdf *b;
@@ -62,6 +30,18 @@ static float pdf_of(const void *data, pt_vec3 wi)
     float pdf;
     pt_bsdf_eval(PT_FX_ALL, p->b, p->wo, wi, &pdf);
     return pdf;
+}
+
+static void every_model_has_a_case(void **state)
+{
+    (void)state;
+    struct bsdf_case cases[CASES_MAX];
+    int n = all_cases(cases), counts[PT_BSDF_COUNT] = {0};
+    for (int i = 0; i < n; i++)
+        counts[cases[i].b.kind]++;
+    for (int kind = 0; kind < PT_BSDF_COUNT; kind++)
+        if (!counts[kind])
+            fail_msg("%s has no case in tests/support/pt_bsdf_cases.h", pt_bsdf_models[kind].words);
 }
 
 static void samples_follow_the_density(void **state)
@@ -325,6 +305,7 @@ static void visible_normals_agree_with_plain_ones(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_model_has_a_case),
         cmocka_unit_test(samples_follow_the_density),
         cmocka_unit_test(weights_are_f_cos_over_pdf),
         cmocka_unit_test(walked_samples_follow_the_value),

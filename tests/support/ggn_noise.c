@@ -14,7 +14,7 @@
 
 #include "data/labels.h"
 #include "sequence/manifest.h"
-#include "model/preprocess.h"
+#include "sight/preprocess.h"
 
 uint32_t ggn_noise_hash(uint32_t k, uint32_t s)
 {

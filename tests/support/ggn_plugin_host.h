@@ -4,7 +4,7 @@
 
 #include <lull/criterion.h>
 
-#include "model/preprocess.h"
+#include "sight/preprocess.h"
 
 enum { GP_HOST_WIDTH = 60, GP_HOST_HEIGHT = 44, GP_HOST_BLOCKS = 3 };
 

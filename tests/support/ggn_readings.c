@@ -96,9 +96,8 @@ static double read_table(char *text, size_t size, size_t items)
     struct ggn_thresholds t;
     struct base_err err = {0};
     double start_s = base_clock_thread_s();
-    int rc = ggn_thresholds_parse_csv("table.csv", text, &t, &err);
+    int rc = ggn_thresholds_parse_csv("table.csv", text, size, &t, &err);
     double s = ended(start_s, rc || (size_t)t.n != items, &err);
-    (void)size;
     if (!rc)
         ggn_thresholds_release(&t);
     free(text);

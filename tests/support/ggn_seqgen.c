@@ -17,7 +17,7 @@
 #include "base/files.h"
 #include "data/labels.h"
 #include "sequence/manifest.h"
-#include "model/preprocess.h"
+#include "sight/preprocess.h"
 #include "nn/hash.h"
 
 enum { MAX_LEVELS = 64 };

@@ -91,6 +91,41 @@ static inline struct pt_bsdf bsdf_scattering_coat(float alpha, float albedo, flo
     return b;
 }
 
+enum { CASES_MAX = 32 };
+
+/* Fills c[CASES_MAX]; how many. A model without a row here fails stat/pt_bsdf.c. */
+static inline int all_cases(struct bsdf_case *c)
+{
+    int n = 0;
+#define CASE(...) c[n++] = (struct bsdf_case){#__VA_ARGS__, __VA_ARGS__}
+    CASE(bsdf_diffuse(0.8f));
+    CASE(bsdf_diffuse_transmission(0.3f, 0.6f));
+    CASE(bsdf_diffuse_transmission(0.0f, 0.6f));
+    CASE(bsdf_conductor(0.15f, 0.15f));
+    CASE(bsdf_conductor(0.5f, 0.5f));
+    CASE(bsdf_conductor(1.0f, 1.0f));
+    CASE(bsdf_conductor(0.15f, 0.6f));
+    CASE(bsdf_conductor(0.0f, 0.0f));
+    CASE(bsdf_lossless_conductor(0.3f));
+    CASE(bsdf_dielectric(0.2f, 0.2f, 1.5f));
+    CASE(bsdf_dielectric(0.7f, 0.3f, 1.33f));
+    CASE(bsdf_dielectric(0.4f, 0.4f, 0.7f));
+    CASE(bsdf_dielectric(0.3f, 0.3f, 1.0f));
+    CASE(bsdf_dielectric(0.0f, 0.0f, 1.5f));
+    CASE(bsdf_dielectric(0.0f, 0.0f, 0.6f));
+    CASE(bsdf_thin(1.5f));
+    CASE(bsdf_coated_diffuse(0.0f, 1.5f, 0.8f, 0.01f));
+    CASE(bsdf_coated_diffuse(0.2f, 1.5f, 0.8f, 0.01f));
+    CASE(bsdf_coated_diffuse(0.8f, 1.9f, 0.3f, 0.0f));
+    CASE(bsdf_coated_conductor(0.0f, 0.2f));
+    CASE(bsdf_coated_conductor(0.3f, 0.2f));
+    CASE(bsdf_coated_conductor(0.3f, 0.0f));
+    CASE(bsdf_coated_conductor(0.0f, 0.0f));
+    CASE(bsdf_scattering_coat(0.2f, 0.9f, 0.5f, 0.3f));
+#undef CASE
+    return n;
+}
+
 /* Coatings that only the walk can evaluate: their value is one estimate of many. */
 static inline int bsdf_is_walked(const struct pt_bsdf *b)
 {

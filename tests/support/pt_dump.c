@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "shade/bsdf.h"
+
 /* Of more than so many items only some are written out. */
 enum { WHOLE = 16 };
 
@@ -106,13 +108,16 @@ static void dump_textures(FILE *out, const struct pt_scene *s)
     }
 }
 
+static const char *material_word(int32_t kind)
+{
+    return kind < PT_BSDF_COUNT ? pt_bsdf_models[kind].file_name : kind == PT_MATERIAL_MIX ? "mix" : "interface";
+}
+
 static void dump_materials(FILE *out, const struct pt_scene *s)
 {
-    static const char *const kinds[] = {"diffuse",        "conductor",        "dielectric", "thin",     "transmission",
-                                        "coated-diffuse", "coated-conductor", "mix",        "interface"};
     for (int32_t id = 0; id < s->material_count; id++) {
         const struct pt_material *m = &s->materials[id];
-        fprintf(out, "material %d %s", id, kinds[m->kind]);
+        fprintf(out, "material %d %s", id, material_word(m->kind));
         number(out, "remap", m->remap_roughness);
         number(out, "by-colour", m->conductor_by_colour);
         number(out, "bump", m->bump);

@@ -1,7 +1,8 @@
-/* UTF-8 and names for tables. */
+/* UTF-8, lines of tables, names for them. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <string.h>
 #include <cmocka.h>
 
@@ -36,6 +37,51 @@ static void characters(void **state)
     assert_string_equal(text, "h?user \xe2\x82\xac ?");
 }
 
+/* Each line in <>, what has no end without '>'; the number of those that follow the first must be told before. */
+static void lines_end_as_they_like(void **state)
+{
+    static const char *const cases[][2] = {{"", ""},
+                                           {"\n", "<>"},
+                                           {"\r", "<>"},
+                                           {"\r\n", "<>"},
+                                           {"\n\r", "<><>"},
+                                           {"a", "<a"},
+                                           {"a\nb\n", "<a><b>"},
+                                           {"a\rb\r", "<a><b>"},
+                                           {"a\r\nb\r\n", "<a><b>"},
+                                           {"a\nb\rc\r\nd", "<a><b><c><d"},
+                                           {"a\r\rb", "<a><><b"},
+                                           {"\xef\xbb\xbf"
+                                            "a\r",
+                                            "<a>"},
+                                           {"a\v\f\x1c\xc2\x85"
+                                            "b\r",
+                                            "<a\v\f\x1c\xc2\x85"
+                                            "b>"}};
+    (void)state;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct base_lines l;
+        const char *line;
+        char got[64] = "";
+        size_t length, count;
+        base_lines_init(&l, "t", cases[i][0], strlen(cases[i][0]));
+        for (count = base_lines_left(&l); base_lines_next(&l, &line, &length, NULL) == 0 && line; count--)
+            snprintf(got + strlen(got), sizeof got - strlen(got), "<%.*s%s", (int)length, line, l.is_ended ? ">" : "");
+        assert_string_equal(got, cases[i][1]);
+        assert_int_equal(count, 0);
+    }
+    static const char wide[] = "a\r\0b\0";
+    struct base_lines l;
+    struct base_err err = {0};
+    const char *line;
+    size_t length;
+    base_lines_init(&l, "t.csv", wide, sizeof wide - 1);
+    assert_int_equal(base_lines_next(&l, &line, &length, &err), 0);
+    assert_int_equal(base_lines_next(&l, &line, &length, &err), BASE_EINVAL);
+    assert_null(line);
+    assert_string_equal(err.text, "t.csv:2: has a byte 0 (expected a line of text, in UTF-8)");
+}
+
 static void view_names(void **state)
 {
     static const char *const cases[][2] = {{"scenes/room.pbrt", "room"},
@@ -66,6 +112,7 @@ static void view_names(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(characters), cmocka_unit_test(view_names)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(characters), cmocka_unit_test(lines_end_as_they_like),
+                                       cmocka_unit_test(view_names)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -20,12 +20,30 @@ static void a_view_is_listed_once(void **state)
     struct ggn_thresholds t;
     struct base_err err = {0};
     (void)state;
-    assert_int_equal(ggn_thresholds_parse_csv("t.csv", once, &t, &err), 0);
+    assert_int_equal(ggn_thresholds_parse_csv("t.csv", once, sizeof once - 1, &t, &err), 0);
     assert_int_equal(t.n, 2);
-    assert_non_null(ggn_thresholds_find(&t, "a"));
+    assert_non_null(ggn_thresholds_of(&t, "a"));
     ggn_thresholds_release(&t);
-    assert_int_equal(ggn_thresholds_parse_csv("t.csv", twice, &t, &err), BASE_EINVAL);
+    assert_int_equal(ggn_thresholds_parse_csv("t.csv", twice, sizeof twice - 1, &t, &err), BASE_EINVAL);
     assert_string_equal(err.text, "t.csv: view 'a' appears twice");
+}
+
+static void lines_end_as_they_like(void **state)
+{
+    char alone[] = "hall;1;2\r# c\rroom;3;4\ryard;5;6\r", mixed[] = "hall;1;2\r\nroom;3;4\nyard;5;6",
+         wide[] = "hall;1;2\nro\0om;3;4\n";
+    struct ggn_thresholds t;
+    struct base_err err = {0};
+    (void)state;
+    for (int i = 0; i < 2; i++) {
+        char *text = i ? mixed : alone;
+        assert_int_equal(ggn_thresholds_parse_csv("t.csv", text, strlen(text), &t, &err), 0);
+        assert_int_equal(t.n, 3);
+        assert_true(ggn_thresholds_of(&t, "hall")->n == 2 && ggn_thresholds_of(&t, "yard")->spp[1] == 6);
+        ggn_thresholds_release(&t);
+    }
+    assert_int_equal(ggn_thresholds_parse_csv("t.csv", wide, sizeof wide - 1, &t, &err), BASE_EINVAL);
+    assert_string_equal(err.text, "t.csv:2: has a byte 0 (expected a line of text, in UTF-8)");
 }
 
 static void print_thresholds(FILE *f, int rc, struct ggn_thresholds *t, const struct base_err *err)
@@ -40,7 +58,7 @@ static void print_thresholds(FILE *f, int rc, struct ggn_thresholds *t, const st
             fprintf(f, " %g", t->views[i].spp[b]);
         fputs("; ", f);
     }
-    const struct ggn_view *part = ggn_thresholds_of(t, "p"), *found = ggn_thresholds_find(t, "b");
+    const struct ggn_view *part = ggn_thresholds_of(t, "p"), *found = ggn_thresholds_of(t, "b");
     fprintf(f, "of p: %s, find b: %s\n", part ? part->name : "-", found ? found->name : "-");
     ggn_thresholds_release(t);
 }
@@ -53,7 +71,7 @@ static void print_table(FILE *f, const char *name, const char *contents)
     put_file(name, contents);
     snprintf(path, sizeof path, "%s/%s", root, name);
     fprintf(f, "%s %.70s: ", name, contents);
-    int rc = ggn_thresholds_read(path, 8, &t, &err);
+    int rc = ggn_thresholds_read(path, (int[2]){8, 8}, &t, &err);
     print_thresholds(f, rc, &t, &err);
 }
 
@@ -132,7 +150,7 @@ static void thresholds_are_told_word_by_word(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_view_is_listed_once),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_view_is_listed_once), cmocka_unit_test(lines_end_as_they_like),
                                        cmocka_unit_test(thresholds_are_told_word_by_word)};
     return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

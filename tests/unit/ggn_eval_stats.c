@@ -11,7 +11,7 @@
 #include "support/ggn_near.h"
 
 #include "data/thresholds.h"
-#include "figures/stats.h"
+#include "sight/stats.h"
 
 static void quantiles(void **state)
 {
@@ -41,7 +41,7 @@ static int parse(const char *text, struct ggn_thresholds *t, struct base_err *er
 {
     char *copy = malloc(strlen(text) + 1);
     strcpy(copy, text);
-    int rc = ggn_thresholds_parse_csv("x.csv", copy, t, err);
+    int rc = ggn_thresholds_parse_csv("x.csv", copy, strlen(copy), t, err);
     free(copy);
     return rc;
 }
@@ -54,9 +54,9 @@ static void csv(void **state)
     assert_int_equal(parse("# note\na;1;2.5;3;\r\n\nb;7\n", &t, &err), 0);
     assert_int_equal(t.n, 2);
     assert_int_equal(t.views[0].n, 3);
-    assert_near(ggn_thresholds_find(&t, "a")->spp[1], 2.5, 0);
-    assert_near(ggn_thresholds_find(&t, "b")->spp[0], 7, 0);
-    assert_null(ggn_thresholds_find(&t, "c"));
+    assert_near(ggn_thresholds_of(&t, "a")->spp[1], 2.5, 0);
+    assert_near(ggn_thresholds_of(&t, "b")->spp[0], 7, 0);
+    assert_null(ggn_thresholds_of(&t, "c"));
     ggn_thresholds_release(&t);
     static const char *const bad[] = {"",      "a",      "a;",     ";1;",    "a;x;",       "a;1;;",
                                       "a;-1;", "a;nan;", "a;inf;", "a;1 2;", "a;1;\na;2;", "a;0;"};

@@ -12,7 +12,7 @@
 #include "support/ggn_near.h"
 
 #include "picture/read.h"
-#include "observer/flip.h"
+#include "sight/flip.h"
 
 static const char sequence[] = "../shared/sequences/cornell-box/p3d_cornel-box-view0_%05d.png";
 

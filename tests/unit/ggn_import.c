@@ -17,6 +17,7 @@
 #include "data/dataset.h"
 #include "picture/read.h"
 #include "data/import.h"
+#include "sequence/simulate.h"
 #include "support/ggn_transcript.h"
 #include "picture/png.h"
 
@@ -82,7 +83,7 @@ static void layout(void **state)
     snprintf(out, sizeof out, "%s/out", root);
     mkdir(out, 0777);
     snprintf(out, sizeof out, "%s/out/toy", root);
-    assert_int_equal(ggn_thresholds_parse_csv("t.csv", text, &t, NULL), 0);
+    assert_int_equal(ggn_thresholds_parse_csv("t.csv", text, strlen(text), &t, NULL), 0);
     struct ggn_import_options o = plain;
     o.thresholds = &t;
     if (ggn_import_view(dir, out, &o, &labelled, &err) != 0)
@@ -170,7 +171,13 @@ static void cut_level(const char *dir)
     assert_int_equal(truncate(path, 60), 0);
 }
 static void one_level(const char *dir) { shell("rm %s/*_000[4-9]0.png %s/*_00100.png", dir, dir); }
-static void stranger(const char *dir) { shell("cp %s/p3d_toy-view2_00060.png %s/p3d_other_00060.png", dir, dir); }
+static void strangers(const char *dir)
+{
+    shell("cp %s/p3d_toy-view2_00060.png %s/p3d_other_00060.png", dir, dir);
+    shell("cp %s/p3d_toy-view2_00060.png %s/p3d_other_00080.png", dir, dir);
+}
+static void twice(const char *dir) { shell("cp %s/p3d_toy-view2_00060.png %s/p3d_toy-view2_060.png", dir, dir); }
+static void other_kind(const char *dir) { shell("cp %s/p3d_toy-view2_00060.png %s/p3d_toy-view2_00120.rawls", dir, dir); }
 static void odd_size(const char *dir)
 {
     for (int i = 1; i <= LEVELS; i++)
@@ -184,7 +191,9 @@ static void bad_layouts(void **state)
     refuse("sizes", mix_sizes, "the other levels are");
     refuse("cut", cut_level, "00060.png");
     refuse("single", one_level, "1 levels");
-    refuse("stranger", stranger, "does not belong");
+    refuse("strangers", strangers, "pictures of 'p3d_toy-view2' and of 'p3d_other' (expected those of one view)");
+    refuse("two", twice, "two images for 60 spp, 'p3d_toy-view2_00060.png' and 'p3d_toy-view2_060.png'");
+    refuse("two-kinds", other_kind, "p3d_toy-view2_00120.rawls: the sequence 'p3d_toy-view2' has .png files, too");
     refuse("odd", odd_size, "not a multiple");
     struct ggn_import_options o = plain;
     char dir[600], out[600];
@@ -193,6 +202,90 @@ static void bad_layouts(void **state)
     snprintf(dir, sizeof dir, "%s/gap", root);
     snprintf(out, sizeof out, "%s/gapped", root);
     assert_int_equal(ggn_import_view(dir, out, &o, &labelled, NULL), 0);
+}
+
+static void litter(const char *dir)
+{
+    static const char *const names[] = {
+        "preview-256.png",  "._p3d_toy-view2_00020.png",   ".DS_Store", "Thumbs.db",
+        "notes_7.txt",      "p3d_toy-view2_00020 (1).png", "x~",        "p3d_toy-view2_00020.png~",
+        "p3d_other_9.jpeg", "._p3d_toy-view2_00120.png",   "p3d.exr"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        shell("echo litter >'%s/%s'", dir, names[i]);
+    shell("mv %s/p3d_toy-view2_00040.png %s/p3d_toy-view2_40.PNG", dir, dir);
+}
+
+/* What is hidden or called otherwise is none of the sequence. */
+static void litter_is_left_where_it_is(void **state)
+{
+    char out[2][600];
+    struct base_err err = {0};
+    int labelled;
+    (void)state;
+    for (int i = 0; i < 2; i++) {
+        const char *dir = make_view(i ? "littered" : "clean");
+        if (i)
+            litter(dir);
+        snprintf(out[i], sizeof out[i], "%s/%s-out", root, i ? "littered" : "clean");
+        assert_int_equal(ggn_import_pictures(dir), LEVELS);
+        assert_int_equal(ggn_import_check(dir, &plain, &err), 0);
+        if (ggn_import_view(dir, out[i], &plain, &labelled, &err) != 0)
+            fail_msg("%s", err.text);
+    }
+    shell("diff -r %s %s", out[0], out[1]);
+}
+
+/* Halves of ACES primaries, in files of their own, as layers, and as layers that are the picture: the first two are the same
+ * sequence, the third has no noise. Values are light, whose planes are half floats. */
+static void halves_are_converted_as_pictures(void **state)
+{
+    static const char *const kinds[] = {"files", "layers", "still"};
+    static float mean[3 * BLOCK * BLOCK], d[3][3 * BLOCK * BLOCK];
+    (void)state;
+    shell("cd %s && mkdir %s", root,
+          "aces aces/files aces/layers aces/still && "
+          "aces='--attrib:type=float[8] chromaticities .7347,.2653,0,1,.0001,-.077,.32168,.33767 -d float' && for n in 4 8; "
+          "do "
+          "oiiotool --pattern constant:color=.5,.4,.3 8x8 3 $aces -o aces/files/a_$n.exr "
+          "--pattern constant:color=.52,.38,.31 8x8 3 $aces -o aces/files/a_half_$n.exr "
+          "--pattern constant:color=.5,.4,.3,.52,.38,.31 8x8 6 --chnames R,G,B,half.R,half.G,half.B $aces "
+          "-o aces/layers/a_$n.exr --pattern constant:color=.5,.4,.3,.5,.4,.3 8x8 6 "
+          "--chnames R,G,B,half.R,half.G,half.B $aces -o aces/still/a_$n.exr; done");
+    for (int k = 0; k < 3; k++) {
+        char dir[600], out[600];
+        struct base_err err = {0};
+        struct seq_manifest m;
+        struct seq_block b;
+        int labelled;
+        snprintf(dir, sizeof dir, "%s/aces/%s", root, kinds[k]);
+        snprintf(out, sizeof out, "%s/aces-%s", root, kinds[k]);
+        if (ggn_import_view(dir, out, &plain, &labelled, &err) != 0 || seq_manifest_read(out, &m, &err) != 0 ||
+            seq_manifest_read_block(out, &m, 0, &b, &err) != 0 || seq_halves(&b, &b.levels[1], mean, d[k], &err) != 0)
+            fail_msg("%s", err.text);
+        assert_near((double)mean[0], .71386097, 1e-3); /* red of Rec. 709: tests/cli/ggn_compare.sh has it from elsewhere */
+        seq_block_release(&b);
+        seq_manifest_release(&m);
+    }
+    for (size_t i = 0; i < 3 * BLOCK * BLOCK; i++) {
+        assert_near((double)d[1][i], (double)d[0][i], 1e-6);
+        assert_near((double)d[2][i], 0, 0);
+    }
+    assert_true(fabsf(d[0][0]) > 0.01f);
+}
+
+/* A layer that only some levels have is no reason to do without it. */
+static void halves_of_some_levels(void **state)
+{
+    char dir[600], out[600];
+    struct base_err err = {0};
+    int labelled;
+    (void)state;
+    snprintf(dir, sizeof dir, "%s/some", root);
+    snprintf(out, sizeof out, "%s/some-out", root);
+    shell("cp -r %s/aces/layers %s", root, dir);
+    shell("cp %s/aces/files/a_4.exr %s/", root, dir);
+    assert_int_equal(ggn_import_view(dir, out, &plain, &labelled, &err), BASE_EINVAL);
+    assert_non_null(strstr(err.text, "'a_8.exr' has a half, 'a_4.exr' has none"));
 }
 
 static void scene_names(void **state)
@@ -343,7 +436,7 @@ static void names_of_levels(FILE *f)
         else
             snprintf(name, sizeof name, "%0*d_20.png", (int)more + GGN_VIEW_NAME - 2, 0);
         put("%s/name/%s", name, "");
-        fprintf(f, "%s: %d\n", name, ggn_import_is_view(dir));
+        fprintf(f, "%s: %d\n", name, ggn_import_pictures(dir));
         shell("rm -r %s%s", dir, "");
     }
 }
@@ -384,8 +477,6 @@ static void print_import(FILE *f, const char *name, const char *dir, const char 
     ggn_labels_release(&l);
 }
 
-static void twice(const char *dir) { shell("cp %s/p3d_toy-view2_00060.png %s/p3d_toy-view2_060.png", dir, dir); }
-static void other_kind(const char *dir) { shell("cp %s/p3d_toy-view2_00060.png %s/p3d_toy-view2_00120.rawls", dir, dir); }
 static void second_gone(const char *dir) { shell("rm %s/*_00040.png%s", dir, ""); }
 static void early(const char *dir) { shell("mv %s/p3d_toy-view2_00080.png %s/p3d_toy-view2_00070.png", dir, dir); }
 static void keep(const char *dir) { (void)dir; }
@@ -409,7 +500,7 @@ static void views_are_told_word_by_word(void **state)
                  {"gaps", NULL, early, BLOCK, 1},
                  {"mix", NULL, mix_sizes, BLOCK, 0},
                  {"one", NULL, one_level, BLOCK, 0},
-                 {"stranger2", NULL, stranger, BLOCK, 0},
+                 {"stranger2", NULL, strangers, BLOCK, 0},
                  {"twice", NULL, twice, BLOCK, 0},
                  {"kind", NULL, other_kind, BLOCK, 0}};
     struct transcript t;
@@ -426,7 +517,7 @@ static void views_are_told_word_by_word(void **state)
         cases[i].spoil(dir);
         if (cases[i].thresholds) {
             snprintf(csv, sizeof csv, "%s", cases[i].thresholds);
-            assert_int_equal(ggn_thresholds_parse_csv("t.csv", csv, &thresholds, NULL), 0);
+            assert_int_equal(ggn_thresholds_parse_csv("t.csv", csv, strlen(csv), &thresholds, NULL), 0);
             o.thresholds = &thresholds;
         }
         snprintf(out, sizeof out, "%s/%s-out", root, cases[i].name);
@@ -575,6 +666,9 @@ int main(void)
         cmocka_unit_test(layout),
         cmocka_unit_test(resume),
         cmocka_unit_test(bad_layouts),
+        cmocka_unit_test(litter_is_left_where_it_is),
+        cmocka_unit_test(halves_are_converted_as_pictures),
+        cmocka_unit_test(halves_of_some_levels),
         cmocka_unit_test(scene_names),
         cmocka_unit_test(rawls),
         cmocka_unit_test(rawls_layout),

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "observer/kept.h"
+#include "sight/kept.h"
 
 enum { SIDE = 120, MOST = SIDE * SIDE };
 

@@ -10,7 +10,7 @@
 
 #include "base/files.h"
 #include "model/container.h"
-#include "model/measure.h"
+#include "sight/measure.h"
 #include "model/model.h"
 #include "base/bytes.h"
 

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "model/inference.h"
-#include "model/preprocess.h"
+#include "sight/preprocess.h"
 #include "model/window.h"
 #include "nn/exec.h"
 #include "nn/hash.h"

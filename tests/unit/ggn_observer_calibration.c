@@ -16,9 +16,9 @@
 #include "support/ggn_observer_block.h"
 
 #include "base/files.h"
-#include "observer/calibrate.h"
-#include "observer/views.h"
-#include "model/visibility.h"
+#include "train/calibrate.h"
+#include "train/views.h"
+#include "sight/visibility.h"
 
 /* --- calibration --- */
 
@@ -234,7 +234,7 @@ static void built_in(void **state)
     (void)state;
     struct ggn_observer o;
     struct base_err err = {0};
-    if (ggn_observer_read("ggn/observer/observer.json", NULL, &o, &err) != 0)
+    if (ggn_observer_read("ggn/sight/observer.json", NULL, &o, &err) != 0)
         fail_msg("%s", err.text);
     assert_near(o.level, ggn_observer_default.level, 1e-6);
     assert_near(o.spread, ggn_observer_default.spread, 1e-6);

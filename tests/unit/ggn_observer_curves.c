@@ -13,8 +13,8 @@
 #include "support/ggn_observer_block.h"
 
 #include "base/files.h"
-#include "observer/views.h"
-#include "model/visibility.h"
+#include "train/views.h"
+#include "sight/visibility.h"
 
 /* --- thresholds --- */
 
@@ -103,6 +103,44 @@ static void beyond_the_last_level(void **state)
     assert_near(log2(b / a), 0.0, 0.15);
     seq_block_release(&all);
     seq_block_release(&head);
+}
+
+/* Thresholds against the block's own level 1730, whose samples are those of the levels: noise of variance sigma^2/n is as
+ * visible at k^2 n samples as k sigma at n, whatever the reference. What 2 * 1730 samples would still show is censored. */
+static void reference_of_the_same_samples(void **state)
+{
+    enum { LAST = 11 };
+    static const double sigmas[] = {0.15, 0.3, 0.6, 1.2};
+    const double least = 1 / (1.0 / levels[LAST - 1] - 1.0 / levels[LAST]);
+    struct ggn_observer o = {0.33, 0.4};
+    double found[4];
+    int censored[4];
+    (void)state;
+    for (int i = 0; i < 4; i++) {
+        struct seq_block b = make_block(sigmas[i], 0.0, 8, 0);
+        const struct seq_block whole = b;
+        struct seq_record own = b.levels[LAST];
+        struct ggn_curve c;
+        const double halves = threshold_of(&b, &o, GGN_FROM_HALVES);
+        b.reference = &own;
+        b.n_levels = LAST + 1;
+        assert_int_equal(ggn_curve_make(&b, GGN_FROM_LEVELS, 0, &c, NULL), 0);
+        assert_near(c.spp[c.n - 1], least, 1e-9); /* 1153 and 1730 */
+        found[i] = ggn_curve_threshold(&c, o.level, &censored[i]);
+        if (censored[i])
+            assert_true(found[i] == c.spp[c.n - 1] && halves > 0.8 * least);
+        else
+            assert_near(log2(found[i] / halves), 0.0, 0.25);
+        ggn_curve_release(&c);
+        b.n_levels = 1; /* the reference's own */
+        b.levels += LAST;
+        assert_int_equal(ggn_curve_make(&b, GGN_FROM_LEVELS, 0, &c, NULL), BASE_EINVAL);
+        b = whole;
+        seq_block_release(&b);
+    }
+    assert_true(!censored[0] && !censored[1] && !censored[2] && censored[3]);
+    for (int i = 1; i < 3; i++)
+        assert_near(log2(found[i] / found[i - 1]), 2.0, 0.25);
 }
 
 static void needs(void **state)
@@ -203,16 +241,18 @@ static void levels_of_curves(void **state)
     c.visible[21] = keep;
     ggn_curve_release(&c);
     assert_true(!c.spp && !c.visible && c.n == 0);
-    for (int independent = 0; independent < 2; independent++) {
-        assert_int_equal(ggn_curve_make(&b, GGN_FROM_LEVELS, independent, &c, &err), 0);
-        assert_int_equal(c.recorded, LEVELS);
-        assert_int_equal(c.n, LEVELS + 5 * independent); /* 8758 * 1.07 < 10000, 11892, 14142, 16818, 20000 */
-        for (int i = 0; i < LEVELS; i++)
-            assert_near(c.spp[i], levels[i], 0);
-        if (independent)
-            assert_near(c.spp[LEVELS + 4], 20000, 0);
-        ggn_curve_release(&c);
-    }
+    assert_int_equal(ggn_curve_make(&b, GGN_FROM_LEVELS, 1, &c, &err), 0);
+    assert_int_equal(c.recorded, LEVELS);
+    assert_int_equal(c.n, LEVELS + 5); /* 8758 * 1.07 < 10000, 11892, 14142, 16818, 20000 */
+    for (int i = 0; i < LEVELS; i++)
+        assert_near(c.spp[i], levels[i], 0);
+    assert_near(c.spp[LEVELS + 4], 20000, 0);
+    ggn_curve_release(&c);
+    assert_int_equal(ggn_curve_make(&b, GGN_FROM_LEVELS, 0, &c, &err), 0); /* below 4096 samples, in noise of at most 8192 */
+    assert_true(c.n == 13 && c.recorded == 13);
+    for (int i = 0; i < c.n; i++)
+        assert_near(c.spp[i], levels[i] * 4096.0 / (4096 - levels[i]), 1e-9 * c.spp[i]);
+    ggn_curve_release(&c);
     double grey[2];
     for (int k = 0; k < 2; k++) /* luminance alone is kept of other levels: as visible as their samples say */
         assert_int_equal(ggn_curve_level(&b, NULL, full_of(&b) - 2 * k, &grey[k], &err), 0);
@@ -220,7 +260,7 @@ static void levels_of_curves(void **state)
     seq_block_release(&b);
 }
 
-/* Where the noise of one level is, of a block seen through its reference: by hand, of shared and of other samples. */
+/* Where the noise of one level is, of a block seen through its reference of other samples: by hand. */
 static void levels_by_hand(void **state)
 {
     (void)state;
@@ -231,23 +271,20 @@ static void levels_by_hand(void **state)
     double *scratch = malloc(ggn_visibility_scratch(W) * sizeof *scratch), texture;
     assert_int_equal(seq_mean(&b, b.reference, reference, &err), 0);
     ggn_visible_lightness(reference, P, l[2]);
-    for (int independent = 0; independent < 2; independent++) {
-        assert_int_equal(ggn_curve_make(&b, GGN_FROM_LEVELS, independent, &c, &err), 0);
-        assert_int_equal(seq_mean(&b, &b.levels[LEVELS - 1], mean, &err), 0);
-        ggn_visible_lightness(independent ? mean : reference, P, l[1]); /* the last level's */
-        ggn_visible_texture(l[1], l[2], W, H, scratch, &texture);
-        for (int k = 0; k < LEVELS; k += LEVELS - 1) {
-            const double scale = independent ? sqrt(1024 / (1024.0 + levels[k])) : 1;
-            assert_int_equal(seq_mean(&b, &b.levels[k], mean, &err), 0);
-            for (int i = 0; i < 3 * P; i++)
-                work[i] = reference[i] + (float)scale * (mean[i] - reference[i]);
-            ggn_visible_lightness(work, P, l[0]);
-            for (int i = 0; i < P; i++)
-                l[0][i] -= l[2][i];
-            assert_near(c.visible[k], ggn_visible_noise(l[0], W, H, &texture, scratch, NULL), 1e-6);
-        }
-        ggn_curve_release(&c);
+    assert_int_equal(ggn_curve_make(&b, GGN_FROM_LEVELS, 1, &c, &err), 0);
+    assert_int_equal(seq_mean(&b, &b.levels[LEVELS - 1], mean, &err), 0);
+    ggn_visible_lightness(mean, P, l[1]);
+    ggn_visible_texture(l[1], l[2], W, H, scratch, &texture);
+    for (int k = 0; k < LEVELS; k += LEVELS - 1) {
+        assert_int_equal(seq_mean(&b, &b.levels[k], mean, &err), 0);
+        for (int i = 0; i < 3 * P; i++)
+            work[i] = reference[i] + (float)sqrt(1024 / (1024.0 + levels[k])) * (mean[i] - reference[i]);
+        ggn_visible_lightness(work, P, l[0]);
+        for (int i = 0; i < P; i++)
+            l[0][i] -= l[2][i];
+        assert_near(c.visible[k], ggn_visible_noise(l[0], W, H, &texture, scratch, NULL), 1e-6);
     }
+    ggn_curve_release(&c);
     free(scratch);
     seq_block_release(&b);
 }
@@ -259,6 +296,7 @@ int main(void)
         cmocka_unit_test(scaling),
         cmocka_unit_test(noisy_reference),
         cmocka_unit_test(beyond_the_last_level),
+        cmocka_unit_test(reference_of_the_same_samples),
         cmocka_unit_test(needs),
         cmocka_unit_test(simulated_by_hand),
         cmocka_unit_test(levels_of_curves),

@@ -14,8 +14,8 @@
 #include "support/splitmix.h"
 
 #include "base/files.h"
-#include "observer/remaining.h"
-#include "model/visibility.h"
+#include "sight/remaining.h"
+#include "sight/visibility.h"
 
 /* --- the kernel --- */
 

@@ -7,10 +7,10 @@
 #include <lull/criterion.h>
 
 #include "base/colour.h"
-#include "model/visibility.h"
-#include "observer/curve.h"
-#include "observer/observer.h"
-#include "observer/remaining.h"
+#include "sight/visibility.h"
+#include "sight/curve.h"
+#include "sight/observer.h"
+#include "sight/remaining.h"
 #include "plugin/criteria.h"
 #include "support/ggn_noise.h"
 

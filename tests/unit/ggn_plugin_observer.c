@@ -7,8 +7,8 @@
 
 #include "base/colour.h"
 #include "nn/hash.h"
-#include "observer/observer.h"
-#include "model/visibility.h"
+#include "sight/observer.h"
+#include "sight/visibility.h"
 #include "plugin/criteria.h"
 #include "plugin/windowed.h"
 #include "support/ggn_plugin_host.h"

@@ -12,12 +12,12 @@
 #include <lull/criterion.h>
 
 #include "model/inference.h"
-#include "model/measure.h"
+#include "sight/measure.h"
 #include "model/stopper.h"
 #include "model/trainer.h"
-#include "model/visibility.h"
+#include "sight/visibility.h"
 #include "nn/hash.h"
-#include "observer/observer.h"
+#include "sight/observer.h"
 #include "plugin/criteria.h"
 
 enum { WIDTH = 64, HEIGHT = 48, BLOCKS = 2, WINDOW = 3, LOOKS = 40 };

@@ -10,7 +10,7 @@
 #include <stddef.h>
 #include <cmocka.h>
 
-#include "model/preprocess.h"
+#include "sight/preprocess.h"
 #include "data/stimuli.h"
 #include "support/ggn_near.h"
 #include "support/ggn_noise.h"

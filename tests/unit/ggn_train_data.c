@@ -15,7 +15,7 @@
 #include "sequence/manifest.h"
 #include "sequence/simulate.h"
 #include "data/windows.h"
-#include "observer/curve.h"
+#include "sight/curve.h"
 
 static void splits_and_levels(void **state)
 {

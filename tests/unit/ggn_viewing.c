@@ -7,7 +7,7 @@
 #include "nn/hash.h"
 #include "support/ggn_near.h"
 
-#include "observer/viewing.h"
+#include "sight/viewing.h"
 
 enum { SIDE = 200 };
 

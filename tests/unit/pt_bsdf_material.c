@@ -160,21 +160,22 @@ static void effects_are_those_the_closure_needs(void **state)
     pt_arena_release(&scene.arena);
 }
 
-/* What each model needs by itself, and what each of its parameters adds when it is a texture. */
+/* What models need by themselves, and what each of their parameters adds when it is a texture. */
 static void effects_of_every_model(void **state)
 {
     (void)state;
-    static const pt_effects plain[PT_BSDF_COUNT] = {0,
-                                                    PT_FX_SPECULAR,
-                                                    PT_FX_TRANSMISSION | PT_FX_SPECULAR,
-                                                    PT_FX_TRANSMISSION | PT_FX_SPECULAR,
-                                                    PT_FX_TRANSMISSION,
-                                                    PT_FX_COATED | PT_FX_SPECULAR,
-                                                    PT_FX_COATED | PT_FX_SPECULAR};
+    static const pt_effects plain[] = {0,
+                                       PT_FX_SPECULAR,
+                                       PT_FX_TRANSMISSION | PT_FX_SPECULAR,
+                                       PT_FX_TRANSMISSION | PT_FX_SPECULAR,
+                                       PT_FX_TRANSMISSION,
+                                       PT_FX_COATED | PT_FX_SPECULAR,
+                                       PT_FX_COATED | PT_FX_SPECULAR};
+    enum { MODELS = sizeof plain / sizeof *plain }; /* those whose parameters are not plainly colours and numbers */
     /* which of reflectance, transmittance, roughness, roughness of the base, eta, k, thickness, g, albedo it reads */
-    static const char *const reads[PT_BSDF_COUNT] = {"r", "aek", "a", "", "rt", "ratgs", "abtgsek"};
-    static const int coated[PT_BSDF_COUNT] = {[PT_BSDF_COATED_DIFFUSE] = 1, [PT_BSDF_COATED_CONDUCTOR] = 1};
-    for (int kind = 0; kind < PT_BSDF_COUNT; kind++) {
+    static const char *const reads[MODELS] = {"r", "aek", "a", "", "rt", "ratgs", "abtgsek"};
+    static const int coated[MODELS] = {[PT_BSDF_COATED_DIFFUSE] = 1, [PT_BSDF_COATED_CONDUCTOR] = 1};
+    for (int kind = 0; kind < MODELS; kind++) {
         struct pt_material m = {.kind = kind, PLAIN, ROUGH(0.0f)};
         struct pt_scene scene = {.materials = &m, .material_count = 1};
         struct {

@@ -68,7 +68,7 @@ static void start(struct run *run, const char *visible, uint64_t pilot_spp)
         assert_int_equal(pt_criterion_create(table, &run->pair, 1, run->pool, NULL, &run->criterion, &err), 0);
     assert_int_equal(pt_render_create(&config, NULL, pt_fake_noise, run->pool, run->criterion, &run->render, &err), 0);
     if (pilot_spp > 0)
-        assert_int_equal(pt_quote_create(run->render, &run->pair, visible != NULL, NULL, NULL, &run->quote, &err), 0);
+        assert_int_equal(pt_quote_create(run->render, NULL, &run->quote, &err), 0);
 }
 
 static enum pt_render_outcome go(struct run *run)
@@ -179,12 +179,13 @@ static void what_was_asked_has_a_row(void **state)
     (void)state;
     struct run run;
     start(&run, "0.1", 64);
-    assert_int_equal(run.quote->row_count, 4);
-    assert_true(run.quote->settings[2].value == 0.1 && run.quote->quote->asked[2].itself &&
-                run.quote->settings[3].value == 0.05);
+    const struct lull_host_quote *q = run.quote->quote;
+    assert_int_equal(q->count, 4);
+    assert_true(q->asked[2].value == 0.1 && q->asked[2].itself && q->asked[3].value == 0.05);
     end(&run);
     start(&run, "0.01", 64);
-    assert_true(run.quote->row_count == 4 && run.quote->settings[3].value == 0.01 && run.quote->quote->asked[3].itself);
+    q = run.quote->quote;
+    assert_true(q->count == 4 && q->asked[3].value == 0.01 && q->asked[3].itself);
     end(&run);
 }
 
@@ -209,10 +210,14 @@ static void another_criterion_takes_its_own_time(void **state)
 {
     (void)state;
     struct base_err err = {0};
+    struct lull_host_criterion *other;
     struct run run;
     start(&run, "0.25", 64);
-    pt_quote_destroy(run.quote);
-    assert_int_equal(pt_quote_create(run.render, &run.pair, 1, lull_criterion_entry_v1(0), NULL, &run.quote, &err), 0);
+    lull_host_quote_end(run.quote->quote);
+    assert_int_equal(lull_host_quote_begin(run.render->frame, 2, &run.quote->quote, NULL), LULL_OK);
+    assert_int_equal(lull_host_quote_add(run.quote->quote, NULL, 1, NULL), LULL_OK);
+    assert_int_equal(lull_host_create(NULL, lull_criterion_entry_v1(0), &run.pair, 1, &other, NULL), LULL_OK);
+    assert_int_equal(lull_host_quote_add_other(run.quote->quote, other, NULL), LULL_OK);
     go(&run);
     run.render->totals->criterion_s = 0.25 * (double)run.render->totals->checks;
     assert_int_equal(pt_quote_finish(run.quote, run.render, &err), 0);
@@ -278,6 +283,34 @@ static void light_that_few_pixels_met_is_told(void **state)
     assert_true(run.quote->rows[2].blocks[0].unmet);
     assert_int_equal(run.quote->rows[2].unmet, 1);
     end(&run);
+}
+
+/* What few pixels have met tells from a hundred samples on; before there is no number as soon as more than half of the
+ * samples hang on it. */
+static void a_pilot_that_met_too_little_is_told(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t blocks; /* with such light, of the twelve; the law asks for 160, 320, 480, 640 spp column by column */
+        uint64_t spp;    /* at which they were asked, for 1,030 */
+        int told;
+    } cases[] = {{12, 100, 1}, {12, 99, 0}, {6, 99, 0}, {2, 99, 1}, {0, 99, 1}};
+    struct base_err err = {0};
+    for (size_t c = 0; c < sizeof cases / sizeof cases[0]; c++) {
+        struct run run;
+        start(&run, "0.25", 64);
+        go(&run);
+        struct lull_host_quote_asked *asked = &run.quote->quote->asked[1];
+        for (uint32_t i = 0; i < cases[c].blocks; i++)
+            asked->responses[i].first = (struct lull_host_response){.spp = 8, .predicted = 8};
+        for (uint32_t i = 0; i < cases[c].blocks; i++)
+            asked->responses[i].last = (struct lull_host_response){.spp = cases[c].spp, .predicted = 1030};
+        assert_int_equal(pt_quote_finish(run.quote, run.render, &err), 0);
+        assert_int_equal(run.quote->rows[1].unmet, cases[c].blocks);
+        assert_int_equal(run.quote->rows[1].told, cases[c].told);
+        assert_true(run.quote->rows[0].told && run.quote->rows[2].told);
+        end(&run);
+    }
 }
 
 /* A pilot is over after its time, too: here after one slice. */
@@ -386,7 +419,7 @@ static char *quote_of(struct approve_case *c)
         r->blocks->list[i].thread_s = 1e-3 * (1 + i) * (double)r->blocks->list[i].spp;
     if (strstr(c->text, "unasked"))
         r->blocks->list[3].spp = r->blocks->list[3].half_spp = r->blocks->list[3].asked = 0;
-    for (uint32_t i = 0; i < run.quote->row_count && strstr(c->text, "unsaid"); i++)
+    for (uint32_t i = 0; i < run.quote->quote->count && strstr(c->text, "unsaid"); i++)
         run.quote->quote->asked[i].responses[2].last =
             (struct lull_host_response){.spp = r->blocks->list[2].spp, .predicted = (double)NAN};
     r->totals->criterion_s = 0.25 * (double)r->totals->checks;
@@ -397,7 +430,7 @@ static char *quote_of(struct approve_case *c)
         fprintf(
             out,
             "row %g asked %d spp %.9g %.9g %.9g from %.9g to %.9g thread %.9g %.9g %.9g wall %.9g %.9g %.9g of uniform %.9g",
-            run.quote->settings[i].value, row->asked, row->spp_min, row->spp_mean, row->spp_max, row->spp_mean_low,
+            run.quote->rows[i].value, row->asked, row->spp_min, row->spp_mean, row->spp_max, row->spp_mean_low,
             row->spp_mean_high, row->thread_s, row->thread_low_s, row->thread_high_s, row->wall_s, row->wall_low_s,
             row->wall_high_s, row->against_uniform);
         fprintf(out, " unknown %u unmet %u capped %u\n", row->unknown, row->unmet, row->capped);
@@ -439,6 +472,7 @@ int main(void)
         cmocka_unit_test(outlooks_in_closed_form),
         cmocka_unit_test(quotes_in_every_number),
         cmocka_unit_test(a_pilot_ends_with_its_time),
+        cmocka_unit_test(a_pilot_that_met_too_little_is_told),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -34,7 +34,11 @@ static void fill_row(struct lull_host_quote_row *row, int k)
                                         .thread_high_s = 60 + k,
                                         .against_uniform = 0.25 * (k + 1),
                                         .unmet = (uint32_t)k,
-                                        .capped = k == 2 ? 5 : 0};
+                                        .capped = k == 2 ? 5 : 0,
+                                        .parameter = k == 0 ? "error" : "visible",
+                                        .value = (double[]){4, 0.125, 0.05}[k],
+                                        .name = (const char *[]){"draft", "as asked", "strict"}[k],
+                                        .told = 1};
     const double walls[3][3] = {{9.94, 0.04, 9.96}, {99.4, 99.6, 9.96 * 60}, {99.4 * 60, 99.6 * 60, 123456}};
     row->wall_s = walls[k][0];
     row->wall_low_s = walls[k][1];
@@ -54,11 +58,7 @@ static int set_up_quote(void **state)
 {
     (void)state;
     pt_seven_blocks_init(&seven);
-    quote =
-        (struct pt_quote){.row_count = 3,
-                          .rows = rows,
-                          .threads = 2,
-                          .settings = {{"error", 4, "draft"}, {"visible", 0.125, "as asked"}, {"visible", 0.05, "strict"}}};
+    quote = (struct pt_quote){.row_count = 3, .rows = rows, .threads = 2};
     for (int k = 0; k < 3; k++)
         fill_row(&rows[k], k);
     return 0;
@@ -83,10 +83,11 @@ static char *print_quote(struct approve_case *c)
     FILE *out = open_memstream(&text, &size);
     assert_non_null(out);
     rows[1].unknown = strstr(c->text, "unknown") ? 2 : 0;
-    quote.settings[1].parameter = strstr(c->text, "uniform") ? NULL : "visible";
-    quote.settings[1].value = strstr(c->text, "default") ? 0.25 : 0.125;
-    quote.settings[1].name = strstr(c->text, "default") ? "default" : "as asked";
+    rows[1].parameter = strstr(c->text, "uniform") ? NULL : strstr(c->text, "threshold") ? "threshold" : "visible";
+    rows[1].value = strstr(c->text, "default") ? 0.25 : 0.125;
+    rows[1].name = strstr(c->text, "default") ? "default" : "as asked";
     rows[1].unmet = strstr(c->text, "met") ? 0 : 1;
+    rows[1].told = rows[2].told = strstr(c->text, "untold") ? 0 : 1;
     quote.threads = strstr(c->text, "one-thread") ? 1 : 2;
     seven.render.criterion = strstr(c->text, "uniform") ? NULL : seven.criterion;
     if (strstr(c->text, "json"))
@@ -110,7 +111,6 @@ static void quotes_as_pictures(void **state)
     struct base_err err = {0};
     char path[64];
     snprintf(path, sizeof path, "/tmp/pt_quote_output_%ld.png", (long)getpid());
-    quote.settings[1].value = 0.125;
     for (int k = 0; k < 2; k++) {
         struct pic_canvas map;
         double values[7];

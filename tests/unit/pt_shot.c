@@ -200,21 +200,39 @@ static void tables_come_back(void **state)
     unlink(path);
 }
 
-static void tables_with_ends_of_windows(void **state)
+/* text with `line_end` in the place of each '\n'. */
+static size_t with_ends(const char *text, const char *line_end, char *to)
 {
-    char text[2 * sizeof table_text], *to = text;
-    struct pt_shot_table t, plain;
+    const char *begin = to;
+    for (; *text != '\0'; text++)
+        to += sprintf(to, "%.*s", *text == '\n' ? 2 : 1, *text == '\n' ? line_end : text);
+    return (size_t)(to - begin);
+}
+
+static void lines_end_as_they_like(void **state)
+{
+    static const char *const ends[] = {"\n", "\r\n", "\r"};
+    static const char path[] = "frame;eye;at;up;fov\n1;0 1 5;0 0 0;0 1 0;45\n2;0 1 4;0 0 0;0 1 0;45\n";
+    char text[256];
     (void)state;
-    for (const char *from = table_text; *from != '\0'; *to++ = *from++)
-        if (*from == '\n')
-            *to++ = '\r';
-    assert_int_equal(pt_shot_table_parse("t", text, (size_t)(to - text), &t, NULL), 0);
-    assert_int_equal(pt_shot_table_parse("t", table_text, sizeof table_text - 1, &plain, NULL), 0);
-    assert_string_equal(t.grid, plain.grid);
-    assert_int_equal(pt_shot_table_frame(&t, 12)[1], pt_shot_table_frame(&plain, 12)[1]);
-    assert_int_equal(t.frame_count, plain.frame_count);
-    pt_shot_table_release(&t);
-    pt_shot_table_release(&plain);
+    for (size_t i = 0; i < sizeof ends / sizeof *ends; i++) {
+        struct pt_shot_table t;
+        struct pt_shot s = {0};
+        size_t size = with_ends(table_text, ends[i], text);
+        assert_int_equal(pt_shot_table_parse("t", text, size, &t, NULL), 0);
+        assert_int_equal(strncmp(t.grid, table_text + sizeof "lull-shot-table 1", strlen(t.grid)), 0);
+        assert_int_equal(t.frame_count, 2);
+        assert_int_equal(pt_shot_table_frame(&t, 12)[1], 4);
+        pt_shot_table_release(&t);
+        size = with_ends(path, ends[i], text);
+        assert_int_equal(pt_shot_parse_path("p", text, size, &s, NULL), 0);
+        assert_int_equal(s.count, 2);
+        assert_true(s.views[1].look_at_world[2] == 4.0);
+        pt_shot_release(&s);
+        text[size - 8] = '\0';
+        assert_int_equal(pt_shot_parse_path("p", text, size, &s, NULL), BASE_EINVAL);
+        pt_shot_release(&s);
+    }
 }
 
 static void bad_tables_are_one_line(void **state)
@@ -227,13 +245,13 @@ static void bad_tables_are_one_line(void **state)
                {";30;", ";-3;", "t:4: "},
                {";30;", ";2147483648;", "t:4: "},
                {";30;", ";30;5;", "t: "},
-               {";30;4\n", ";30;4", "t: "},
+               {";30;4\n", ";30;4", "t:4: "},
                {";30;", ";3x;", "t:4: "},
                {"0;1;2147483647\n", "\n", "t:3: "},
                {"12;30", "12,30", "t: "},
                {"12;", ";12", "t:4: "},
                {";4\n", ";\n", "t:4: "},
-               {";4\n", ";4\nx", "t:5: "}};
+               {";4\n", ";4\nx", "t: "}};
     (void)state;
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         char text[256];
@@ -264,7 +282,7 @@ int main(void)
         cmocka_unit_test(paths_of_the_camera),
         cmocka_unit_test(needs_between_pilots),
         cmocka_unit_test(tables_come_back),
-        cmocka_unit_test(tables_with_ends_of_windows),
+        cmocka_unit_test(lines_end_as_they_like),
         cmocka_unit_test(bad_tables_are_one_line),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

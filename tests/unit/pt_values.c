@@ -115,7 +115,8 @@ static void print_warps(void)
 
 static void print_phases(void)
 {
-    static const float gs[] = {-1, -0.9f, -2e-3f, -5e-4f, 0, 9e-4f, 0.5f, 1}, us[] = {0, 0.2f, 0.5f, 0.8f, PT_ONE_BELOW};
+    static const float gs[] = {-0.9999f, -0.9f, -2e-3f, -5e-4f, 0, 9e-4f, 0.5f, 0.9999f},
+                       us[] = {0, 0.2f, 0.5f, 0.8f, PT_ONE_BELOW};
     const pt_vec3 wo = {0.36f, 0.48f, -0.8f};
     for (size_t i = 0; i < COUNT(gs); i++)
         for (size_t k = 0; k < COUNT(us); k++) {

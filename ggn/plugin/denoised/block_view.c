@@ -2,7 +2,7 @@
 
 #include "base/colour.h"
 #include "denoise/blend.h"
-#include "model/visibility.h"
+#include "sight/visibility.h"
 #include "plugin/translate.h"
 #include "sequence/simulate.h"
 

@@ -1,7 +1,7 @@
 /*
  * The view of a block of a picture that will be denoised: both halves of its samples and what the denoiser makes of them
  * (plugin/denoised/look.h), of which two estimates say how visible the error is of the picture that will be kept
- * (observer/kept.h). This translates pictures into what a display shows.
+ * (sight/kept.h). This translates pictures into what a display shows.
  *
  * The picture that is kept is the mean of two, P(A) and P(B), each of one half: a blend of the noisy half and the denoised
  * one without its specks (denoise/blend.h), or the denoised one alone. What is crossed with the other half is a blend, too,
@@ -12,7 +12,7 @@
 #ifndef GGN_PLUGIN_DENOISED_BLOCK_VIEW_H
 #define GGN_PLUGIN_DENOISED_BLOCK_VIEW_H
 
-#include "observer/kept.h"
+#include "sight/kept.h"
 #include "plugin/denoised/look.h"
 
 struct gd_block_view {
@@ -29,7 +29,7 @@ struct gd_block_view {
     float *around;                  /* [2][P]: scratch of it */
     float *crossed[2];              /* [P][3]: those blends */
     float *kept[2];                 /* [P][3] */
-    double *judging;                /* scratch of observer/kept.h */
+    double *judging;                /* scratch of sight/kept.h */
     void *memory;                   /* owns all of the above but the part */
 };
 

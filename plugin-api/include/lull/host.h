@@ -38,6 +38,9 @@
 #include <lull/criterion.h>
 #include <lull/loader.h>
 
+#define LULL_HOST_MAJOR 1 /* part of the names of the file and of its symbols' version */
+#define LULL_HOST_MINOR 2 /* a comment says since which version something is there; else since 1.0 */
+
 #ifdef __cplusplus
 extern "C" {
 #endif

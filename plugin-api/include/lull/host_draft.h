@@ -20,6 +20,11 @@ extern "C" {
  * that was opened last: it answers about no other. */
 LULL_EXPORT int32_t lull_host_join(const struct lull_host_frame *frame, struct lull_host_criterion *criterion,
                                    struct lull_error *err);
+/* The parameter that says how good blocks are to be, which a mask scales and a quote varies: the first of `error`, `visible`
+ * and `threshold` that pairs or the table set to a number in its range; NULL: there is none. value: may be NULL. */
+LULL_EXPORT const struct lull_param *lull_host_quality(const struct lull_criterion *table, const struct lull_pair *pairs,
+                                                       uint32_t pair_count, double *value);
+
 /* --- forecast -------------------------------------------------------------------------------------------------------- */
 
 /* Where a block is expected to stop. */
@@ -75,6 +80,10 @@ struct lull_host_quote_row {
     double against_uniform;                       /* samples over those of the most expensive block everywhere */
     uint32_t unknown, unmet, capped; /* blocks without a prediction; without their light yet; that reach spp_max */
     int32_t asked;                   /* this is the render that is going on */
+    const char *parameter; /* what lull_host_quote_usual sets in this row; static text, NULL: nothing, or another row */
+    double value;
+    const char *name; /* static text: "rough", "draft", "good", "default", "strict", "as asked"; NULL: another row */
+    int64_t told;     /* 0: the pilot has met too little: the numbers are not to be believed */
 };
 
 /* A quote without rows. threads: that the renderer samples with, at least 1. */
@@ -92,6 +101,15 @@ LULL_EXPORT int32_t lull_host_quote_add_error(struct lull_host_quote *quote, dou
 /* One more row: any other criterion, which is the quote's from now on, even after a failure. */
 LULL_EXPORT int32_t lull_host_quote_add_other(struct lull_host_quote *quote, struct lull_host_criterion *criterion,
                                               struct lull_error *err);
+
+/* Rows that people compare, coarse to fine, with parameter, value and name. Where the criterion has `error`: 8, 4 and 2
+ * times what is just seen; where that is set, 1, 0.5 and the value itself, too. Else, of `visible`, 0.5 (where there is no
+ * `error`), the criterion's default (0.25 if it names none), 0.05 and the value itself; of `threshold` four times, twice and
+ * once the value; values that the criterion's table excludes have no row. The render itself always has one, "as asked" if it
+ * is none of these. noisy: NULL, or the criterion that judges the noisy picture: where the frame's criterion is `denoised`,
+ * rows are those of coarser errors, the render, "denoised", and "noisy". */
+LULL_EXPORT int32_t lull_host_quote_usual(struct lull_host_quote *quote, const struct lull_criterion *noisy,
+                                          struct lull_error *err);
 
 /* May be called at each check of the pilot, with its blocks, rising: stops between two checks are then known. A row whose
  * criterion fails keeps what it knew. */
@@ -180,7 +198,7 @@ LULL_EXPORT int32_t lull_host_denoise(const struct lull_host_frame *frame, const
 /* Whether there is a library; the error says how to get one. */
 LULL_EXPORT int32_t lull_host_denoiser(const char *library, struct lull_error *err);
 
-/* --- the live view (1.1) ---------------------------------------------------------------------------------------------- */
+/* --- the live view, since 1.1 ----------------------------------------------------------------------------------------- */
 
 /* Shows the picture in an image viewer while it is made: noisy R, G, B and lull.spp, lull.p_noisy, lull.error, and a frame
  * around each block, bright while it is active, thin with its samples when it has stopped. A thread of its own speaks the

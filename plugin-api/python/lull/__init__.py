@@ -17,6 +17,8 @@ import os
 import sys
 import sysconfig
 
+from .version import PRODUCT
+
 NEEDED = ""  # what this Python lacks, in one line
 try:
     import numpy  # noqa: F401
@@ -43,10 +45,10 @@ if not NEEDED:
 
 __all__ = ["Block", "Criterion", "Denoised", "Driver", "Frame", "HostFrame", "Info", "LullError", "Parameter", "Plane",
            "Rect", "Result", "criteria", "denoise", "find", "load"]
-__version__ = "1.0"
+__version__ = PRODUCT
 
 # The package is a Blender add-on too: make blender packs it.
-bl_info = {"name": "Lull", "author": "Lull", "version": (1, 0), "blender": (3, 4, 0), "category": "Render",
+bl_info = {"name": "Lull", "author": "Lull", "version": (1, 0, 0), "blender": (3, 4, 0), "category": "Render",
            "location": "Render Properties > Lull", "support": "COMMUNITY",
            "description": "Cycles stops each block when its noise can no longer be seen"}
 

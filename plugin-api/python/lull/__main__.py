@@ -7,9 +7,11 @@ import shutil
 import sys
 from pathlib import Path
 
+from .program import run
+
 if sys.argv[1:2] == ["watch"]:
     from .watch import main as watch
-    sys.exit(watch(sys.argv[2:]))
+    sys.exit(run("lull watch", lambda: watch(sys.argv[2:])))
 if sys.argv[1:2] == ["plot"]:
     from .plot.main import main as plot
     sys.exit(plot(sys.argv[2:]))
@@ -62,4 +64,4 @@ def main() -> int:
     return 0 if found else 2
 
 
-sys.exit(main())
+sys.exit(run("lull", main))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The structs and numbers of lull/criterion.h, loader.h and host.h 1.0 for ctypes: nothing else. The headers' comments are
+"""The structs and numbers of lull/criterion.h, loader.h and host.h for ctypes: nothing else. The headers' comments are
 the contract; tests/hosts compares every offset with plugin-api/layout-1.txt and host-layout-1.txt, every number with the
 headers."""
 import ctypes as C
@@ -72,7 +72,8 @@ HostReport: Any = _struct("HostReport", "u32 struct_size flags; text scene mask 
 HostPhase: Any = _struct("HostPhase", "text name; f64 seconds")
 HostQuoteRow: Any = _struct("HostQuoteRow", "ptr blocks; f64 spp_min spp_mean spp_max spp_mean_low spp_mean_high thread_s "
                                             "thread_low_s thread_high_s wall_s wall_low_s wall_high_s against_uniform; u32 "
-                                            "unknown unmet capped; i32 asked")
+                                            "unknown unmet capped; i32 asked; text parameter; f64 value; "
+                                            "text name; i64 told")
 HostDenoising: Any = _struct("HostDenoising", "u32 struct_size flags threads zero; text library; ptr context cancelled")
 HostPicture: Any = _struct("HostPicture", "u32 struct_size zero; ptr rgb denoised weight")
 HostSimulation: Any = _struct("HostSimulation", "u32 struct_size zero; u64 pixels spp half_spp to_spp; matrix rgb_to_xyz; "

@@ -15,13 +15,13 @@ import numpy as np
 from . import limits
 from .driver import Driver, Result
 from .files import replaced
-from .library import call
+from .library import call, encoded
 
 _OWN = ("identity", "state")  # the library's parts, as bytes
 
 
 def _identity(driver: Driver) -> bytes:
-    return os.fsencode("".join(f"{name}={value}\n" for name, value in driver.identity.items()))
+    return encoded("".join(f"{name}={value}\n" for name, value in driver.identity.items()))
 
 
 def save(path: str, driver: Driver) -> None:
@@ -34,7 +34,7 @@ def save(path: str, driver: Driver) -> None:
 def is_one(path: str) -> bool:
     """Is there a file of this kind? What is none must not be replaced by one."""
     try:
-        with zipfile.ZipFile(path) as file:
+        with open(encoded(path), "rb") as opened, zipfile.ZipFile(opened) as file:
             return {f"{name}.npy" for name in _OWN} <= set(file.namelist())
     except (OSError, zipfile.BadZipFile):
         return False
@@ -42,7 +42,7 @@ def is_one(path: str) -> bool:
 
 def check(path: str) -> None:
     """ValueError for a file that would be replaced and is no checkpoint."""
-    if os.path.exists(path) and os.path.getsize(path) > 0 and not is_one(path):
+    if os.path.exists(encoded(path)) and os.path.getsize(encoded(path)) > 0 and not is_one(path):
         raise ValueError(f"{path}: this is no checkpoint and would be replaced: choose another name")
 
 
@@ -50,14 +50,14 @@ def load(path: str, driver: Driver) -> None:
     """Into a fresh driver of the same identity; LullError names what differs. Blocks that were closed by a limit or an
     interrupt are active again as far as the limits of this frame allow."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with open(encoded(path), "rb") as opened, np.load(opened, allow_pickle=False) as file:
             data = dict(file)
         saved, state = (data[name].tobytes() for name in _OWN)
     except OSError:
         raise
     except Exception as error:  # numpy and zipfile name the same damage by many kinds
         raise ValueError(f"{path}: not a checkpoint: {error}") from None
-    call("host_same_identity", saved, C.c_uint64(len(saved)), _identity(driver), os.fsencode(path))
+    call("host_same_identity", saved, C.c_uint64(len(saved)), _identity(driver), encoded(path))
     arrays = driver.frame.arrays()
     for name, to in arrays.items():
         if name not in data or data[name].shape != to.shape or data[name].dtype != to.dtype:

@@ -14,7 +14,8 @@ from typing import Callable, Iterator, Mapping, NamedTuple, NoReturn, Optional
 import numpy as np
 
 from . import abi, limits
-from .library import Info, LullError, call, find, library
+from .library import Info, LullError, call, encoded, find, library
+from .version import SOFTWARE
 
 PLANES = {"color": abi.COLOR, "weight": abi.WEIGHT, "spp": abi.SPP, "moment2": abi.MOMENT2, "half": abi.HALF,
           "albedo": abi.ALBEDO, "normal": abi.NORMAL, "depth": abi.DEPTH}
@@ -124,8 +125,8 @@ class Criterion:
         self.threads = limits.checked("threads", len(os.sched_getaffinity(0)) if threads is None else threads)
         log = self.log  # and not self, which would never be let go of
         log_fn = abi.LogFn(lambda _, level, text: log(level, text.decode(errors="replace")))
-        services = abi.sized(abi.HostServices, threads=self.threads, name=b"lull for Python 1.0", log=log_fn)
-        texts = [tuple(map(os.fsencode, pair)) for pair in self.parameters.items()]
+        services = abi.sized(abi.HostServices, threads=self.threads, name=SOFTWARE.encode(), log=log_fn)
+        texts = [tuple(map(encoded, pair)) for pair in self.parameters.items()]
         pairs = (abi.Pair * max(len(texts), 1))(*texts)
         handle = Handle("lull_host_close", log_fn)
         call("host_create", C.byref(services), C.c_void_p(info.table), pairs, len(self.parameters), C.byref(handle.pointer))

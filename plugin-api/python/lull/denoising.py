@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes as C
-import os
 from typing import Mapping, NamedTuple, Optional, Union
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from . import abi
 from .criterion import Criterion, Plane, load
 from .host import HostFrame
-from .library import LullError, call
+from .library import LullError, call, encoded
 
 KINDS = ("blend", "full")  # what is kept, as --denoise names it
 
@@ -34,7 +33,7 @@ class Denoised(NamedTuple):
 def check(library: str = "") -> None:
     """LullError, which says how to get one, if there is no Open Image Denoise. library: its file or folder; "": LULL_OIDN
     and the usual places."""
-    call("host_denoiser", os.fsencode(library) or None)
+    call("host_denoiser", encoded(library) or None)
 
 
 def criterion_of(kind: str) -> str:
@@ -62,7 +61,7 @@ def denoise(frame: HostFrame, planes: Optional[Mapping[str, Plane]] = None, *, f
     size = frame.view.height, frame.view.width
     picture, denoised, weight = (np.zeros((*size, *last), np.float32) for last in ((3,), (3,), ()))
     view = frame.view_of(frame.planes_now(as_shown=False) if planes is None else planes)
-    how = abi.sized(abi.HostDenoising, flags=abi.DENOISE_FULL * full, threads=threads, library=os.fsencode(library) or None)
+    how = abi.sized(abi.HostDenoising, flags=abi.DENOISE_FULL * full, threads=threads, library=encoded(library) or None)
     out = abi.sized(abi.HostPicture, rgb=picture.ctypes.data, denoised=denoised.ctypes.data, weight=weight.ctypes.data)
     call("host_denoise", frame.handle.pointer, C.byref(view), C.byref(how), C.byref(out))
     kept = {"picture": "denoised" if full else "blend", **({"library": library} if library else {})}

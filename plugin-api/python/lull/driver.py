@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import signal
 import time
-from typing import Callable, Iterable, Mapping, NamedTuple, Optional, Sequence
+from typing import Callable, Iterable, Mapping, NamedTuple, Optional, Sequence, Sized
 
 from . import abi, limits
 from .criterion import Rect
@@ -22,11 +22,13 @@ from .display import Display
 from .frame import Frame, Sample
 from .host import Block
 from .library import LullError
+from .program import say
 
 Render = Callable[[Sequence[Rect], int, int, bool], Iterable[Sample]]
 
 # Length of a call of the render function, about: short enough for progress, Ctrl-C and a time budget.
 CALL_S = 1.0
+_MISCOUNT = "the render function gave %s pictures for %d rectangles"
 
 
 def in_half(wave: int) -> bool:
@@ -57,7 +59,7 @@ class Driver:
 
     def __init__(self, frame: Frame, render: Optional[Render], *, threads: int = 1,
                  identity: Optional[Mapping[str, str]] = None, after_call: Optional[Callable[[Driver], None]] = None,
-                 suspend: Optional[Callable[[Driver], None]] = None, warn: Callable[[str], None] = print,
+                 suspend: Optional[Callable[[Driver], None]] = None, warn: Callable[[str], None] = say,
                  display_server: str = ""):
         self.frame, self.render, self.threads = frame, render, limits.checked("threads", threads)
         self.after_call, self.suspend, self.warn = after_call, suspend, warn
@@ -153,13 +155,18 @@ class Driver:
         half = in_half(first // self.frame.wave)
         start_s, pixels, done = time.monotonic(), sum(b.rect.pixels for b in blocks), 0
         try:
-            samples = iter(self.render([b.rect for b in blocks], first, count, half))
+            given, wanted = self.render([b.rect for b in blocks], first, count, half), len(blocks)
+            if isinstance(given, Sized) and len(given) > wanted:
+                raise ValueError(_MISCOUNT % (len(given), wanted))
+            samples = iter(given)
             for n, b in enumerate(blocks):
                 sample = next(samples, None)
                 if sample is None:
-                    raise ValueError(f"the render function gave {n} pictures for {len(blocks)} rectangles")
+                    raise ValueError(_MISCOUNT % (n, wanted))
                 self.frame.add(b, sample, count, half)
                 done += b.rect.pixels * count
+            if next(samples, None) is not None:
+                raise ValueError(_MISCOUNT % (f"more than {wanted}", wanted))
         finally:
             call_s = time.monotonic() - start_s
             self.totals.render_s += call_s

@@ -9,6 +9,7 @@ from typing import Mapping, Optional, Union
 import numpy as np
 
 from .files import replaced
+from .library import encoded
 
 _MAGIC, _LONG_NAMES = 20000630, 0x400
 _LINES = 16  # of a ZIP chunk
@@ -92,7 +93,7 @@ def write(path: str, channels: Mapping[str, np.ndarray], size: tuple[int, int], 
 
 def read(path: str) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
     """All channels by name, [h, w] float32, of an uncompressed or ZIP-compressed file; its data window's origin (x, y)."""
-    with open(path, "rb") as file:
+    with open(encoded(path), "rb") as file:
         data = file.read()
     try:
         return _decode(data)
@@ -102,7 +103,7 @@ def read(path: str) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
 
 def texts(path: str) -> dict[str, str]:
     """The attributes that are text."""
-    with open(path, "rb") as file:
+    with open(encoded(path), "rb") as file:
         return {name: value.decode(errors="replace") for name, kind, value in _head(file.read(1 << 16))[0] if kind == "string"}
 
 

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO, Callable, Iterable, Iterator, NamedTuple, Sequ
 import numpy as np
 
 from . import abi
-from .library import LullError, call, library
+from .library import LullError, call, encoded, library
 
 LUMINANCE = (0.2126729, 0.7151522, 0.0721750)  # Y of linear sRGB (IEC 61966-2-1), which criteria take pixels for
 
@@ -35,11 +35,11 @@ def file_call(name: str, *arguments: Any) -> None:
 def check_outputs(outputs: Iterable[Output], inputs: Iterable[str] = ()) -> None:
     """OSError or ValueError, one line, for the first one that cannot be written, is written twice, or is an input. Those
     whose path is empty are none."""
-    written, read = [o for o in outputs if o.path], [os.fsencode(path) for path in inputs if os.path.exists(path)]
+    written, read = [o for o in outputs if o.path], [encoded(path) for path in inputs if os.path.exists(encoded(path))]
     for o in written:
         if o.endings and not any(o.path.lower().endswith(e) and os.path.basename(o.path).lower() != e for e in o.endings):
             raise ValueError(f"{o.option} {o.path}: expected a name that ends in {' or '.join(o.endings)}")
-    pairs = [(o.option.lstrip("-").encode(), os.fsencode(o.path)) for o in written]
+    pairs = [(o.option.lstrip("-").encode(), encoded(o.path)) for o in written]
     file_call("host_check_outputs", (abi.HostOutput * max(len(pairs), 1))(*pairs), len(pairs),
                (C.c_char_p * max(len(read), 1))(*read), len(read))
 
@@ -49,7 +49,7 @@ def replaced(path: str) -> Iterator[BinaryIO]:
     """A file beside `path` that becomes it at the end, on the disk; an exception leaves what was there. OSError says which
     file could not be written."""
     made, descriptor = C.c_void_p(), C.c_int32()
-    file_call("host_file_begin", os.fsencode(path), C.byref(made), C.byref(descriptor))
+    file_call("host_file_begin", encoded(path), C.byref(made), C.byref(descriptor))
     try:
         with os.fdopen(os.dup(descriptor.value), "wb") as file:
             yield file
@@ -64,7 +64,7 @@ def replaced(path: str) -> Iterator[BinaryIO]:
 def write_png(path: str, rgb: np.ndarray) -> None:
     """rgb: [height, width, 3] uint8, rows from the top."""
     rgb = np.ascontiguousarray(rgb, np.uint8)
-    file_call("host_write_png", os.fsencode(path), rgb.shape[1], rgb.shape[0], C.c_void_p(rgb.ctypes.data))
+    file_call("host_write_png", encoded(path), rgb.shape[1], rgb.shape[0], C.c_void_p(rgb.ctypes.data))
 
 
 def srgb(linear: np.ndarray) -> np.ndarray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zlib
-from pathlib import Path
 from typing import Any, Callable, Mapping, Optional, Sequence, Union
 
 import numpy as np
@@ -13,7 +12,7 @@ from . import abi, exr, limits
 from .criterion import CHANNELS, Criterion, Plane, Rect, plane_names
 from .files import LUMINANCE, srgb_decoded
 from .host import Block, HostFrame
-from .library import LullError
+from .library import LullError, encoded
 
 COUNTS = {"spp", "weight"}  # planes that the library makes
 Sample = Union[np.ndarray, Mapping[str, np.ndarray]]
@@ -245,7 +244,8 @@ def _files_crc(criterion: Criterion) -> str:
     files = (criterion.parameters.get(p.name) for p in criterion.info.parameters if p.type == "file")
     crc = 0
     for path in (criterion.info.path, *filter(None, files)):
-        crc = zlib.crc32(Path(path).read_bytes(), crc)
+        with open(encoded(path), "rb") as file:
+            crc = zlib.crc32(file.read(), crc)
     return f"crc {crc:08x}"
 
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import contextlib
 import ctypes as C
 import functools
-import os
 import weakref
 from typing import Iterator, Mapping, Optional, Sequence, Union
 
@@ -14,7 +13,7 @@ import numpy as np
 
 from . import abi, limits
 from .criterion import PLANES, Criterion, Handle, Plane, Rect
-from .library import LullError, bytes_of, call, library
+from .library import Info, LullError, bytes_of, call, encoded, library
 
 TRANSFERS = {"linear": abi.TRANSFER_LINEAR, "srgb": abi.TRANSFER_SRGB, "gamma": abi.TRANSFER_GAMMA}
 MAX_PIXELS, MAX_BLOCKS = 1 << 28, 1 << 20  # a block is an object here: more would fill the memory
@@ -66,7 +65,7 @@ class HostFrame:
     time_budget_s seconds (0 = any); spp_min: nobody stops before. uniform: every block gets spp_max samples and the
     criterion is asked once at the end. max_check_overhead: share of the time that checks may take, 0 = any. max_seam: most
     ratio of samples of neighbouring blocks, 0 = any. check_step: checks stand at multiples of so many samples. mask:
-    [height, width] in [0, 1], black leaves the criterion's quality parameter (`visible`, else `threshold`) as it is, white
+    [height, width] in [0, 1], black leaves the criterion's quality parameter as it is, white
     takes a quarter of it, grey g 4^(-g), in steps of an eighth; the lightest pixel of a block counts. exposure: linear
     factor before the display transfer ("srgb", "linear", "gamma"). independent: a pixel's samples are not stratified.
     shared: neighbouring pixels share samples (a splatted filter). open_ended: checks stand where they would without
@@ -256,26 +255,16 @@ class HostFrame:
                  answers)
         return list(answers[:count])
 
-    def quote(self, threads: int, settings: Sequence[tuple[str, float]], own: tuple[str, float],
-              other: Optional[Criterion] = None) -> list[abi.HostQuoteRow]:
-        """What the frame costs by other settings of the quality parameter, (name, value), `own` being the criterion's: struct
-        lull_host_quote_row for each, without its blocks; also after close(). threads: of the renderer. other: has a row, too,
-        the last one, and is used up."""
+    def quote(self, threads: int, noisy: Optional[Info] = None) -> list[abi.HostQuoteRow]:
+        """What the frame costs by its own and other settings of the quality parameter: struct lull_host_quote_row for each,
+        without its blocks (lull_host_quote_usual); also after close(). threads: of the renderer. noisy: the criterion of
+        the noisy picture, where the frame's own is `denoised`."""
         threads = limits.checked("threads", threads)
         view, rows, count = self.view_of(None), C.POINTER(abi.HostQuoteRow)(), C.c_uint32()
         with self._asking() if self._is_open() else contextlib.nullcontext():
             quote = Handle("lull_host_quote_end", self.handle)
             call("host_quote_begin", self.handle.pointer, threads, C.byref(quote.pointer))
-            for name, value in settings:
-                if name == "error" and (name, value) != own:
-                    call("host_quote_add_error", quote.pointer, C.c_double(value))
-                else:
-                    call("host_quote_add", quote.pointer, C.byref(abi.Pair(name.encode(), repr(value).encode())), (name, value) == own)
-            if other:
-                with other.alone() as pointer:
-                    assert other.handle  # else alone() has raised
-                    other.handle.pointer, quote.kept = C.c_void_p(), (self.handle, other.handle)
-                    call("host_quote_add_other", quote.pointer, pointer)
+            call("host_quote_usual", quote.pointer, C.c_void_p(noisy.table if noisy else None))
             call("host_quote_finish", quote.pointer, C.byref(view), C.byref(rows), C.byref(count))
             return [abi.HostQuoteRow.from_buffer_copy(row) for row in rows[:count.value]]
 
@@ -296,7 +285,7 @@ class HostFrame:
         """Into a frame like the saved one, limits aside: blocks that a limit or an interrupt had closed are active again as
         far as the limits of this frame allow. name: of the file, for messages. Refused bytes (LullError) change nothing."""
         with self.judge.alone():
-            call("host_load", self.handle.pointer, data, C.c_uint64(len(data)), os.fsencode(name))
+            call("host_load", self.handle.pointer, data, C.c_uint64(len(data)), encoded(name))
             library().lull_host_extend(C.byref(self.layout))
 
     def close(self) -> None:

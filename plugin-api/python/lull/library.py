@@ -12,7 +12,7 @@ import sys
 import sysconfig
 import warnings
 from pathlib import Path
-from typing import Any, Iterable, NamedTuple, Optional
+from typing import Any, Iterable, NamedTuple, Optional, Union
 
 from . import abi
 
@@ -106,6 +106,15 @@ def _prepare_denoiser() -> None:
         os.environ.setdefault("LULL_OIDN", str(found[0]))
 
 
+def encoded(text: Union[str, os.PathLike[str]]) -> bytes:
+    """A name or another text as the library and the file system take it. A locale of ASCII, such as C, need not have its letters:
+    then they are UTF-8, as they would be everywhere else."""
+    try:
+        return os.fsencode(text)
+    except UnicodeEncodeError:
+        return os.fspath(text).encode("utf-8", "surrogateescape")
+
+
 def call(name: str, *arguments: Any) -> None:
     """lull_NAME(arguments, error); LullError for what it refuses. Pointers and numbers of 64 bits come as ctypes objects."""
     error = abi.sized(abi.Error)
@@ -131,7 +140,7 @@ def _warn(_context: object, level: int, text: bytes) -> None:
 
 def _search(folders: Optional[Iterable[str]] = None) -> abi.Search:
     """folders: None: the library's usual ones."""
-    dirs = None if folders is None else [os.fsencode(f) for f in folders]
+    dirs = None if folders is None else [encoded(f) for f in folders]
     listed = (C.c_char_p * max(len(dirs or ()), 1))(*(dirs or ()))
     search = abi.Search(dirs=None if dirs is None else C.addressof(listed), dir_count=len(dirs or ()), log=abi.LogFn(_warn))
     search.kept = listed
@@ -153,7 +162,7 @@ def criteria(folders: Optional[Iterable[str]] = None) -> list[Info]:
 def find(spec: str) -> Info:
     """The criterion that spec names: NAME, PATH.so (its first criterion) or PATH.so:ID."""
     found, search = abi.Found(), _search()
-    call("open", C.byref(search), os.fsencode(spec), C.byref(found))
+    call("open", C.byref(search), encoded(spec), C.byref(found))
     return _info(found)
 
 

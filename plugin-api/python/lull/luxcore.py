@@ -26,6 +26,7 @@ import numpy as np  # before pyluxcore, which else aborts
 
 from . import scenes
 from .criterion import Criterion, Rect
+from .program import open_closed
 from .scenes import Picture
 
 # LuxCore's outputs beside SAMPLECOUNT, by plane or layer, with their channels
@@ -41,6 +42,7 @@ _POLL_S = 0.001  # LuxCore looks whether it is done when it is asked
 
 def start() -> Any:
     """The module pyluxcore, ready and without its log. Call it once, before anything else of LuxCore."""
+    open_closed()  # LuxCore writes to descriptors by their numbers
     with open(os.devnull, "w", encoding="utf-8") as nowhere, contextlib.redirect_stdout(nowhere):
         import pyluxcore
         pyluxcore.Init()

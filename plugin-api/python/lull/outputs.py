@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import ctypes as C
 import math
-import os
 import sys
 import time
 from typing import Mapping, Optional, TextIO
@@ -18,10 +17,12 @@ from .driver import Driver
 from .files import file_call, srgb, srgb_encoded, write_png
 from .frame import Frame
 from .host import HostFrame, reasons
-from .library import bytes_of, library
+from .library import bytes_of, encoded, library
+from .program import say
+from .version import SOFTWARE
 
 
-def write_exr(path: str, driver: Driver, scene: str = "", software: str = "lull for Python 1.0",
+def write_exr(path: str, driver: Driver, scene: str = "", software: str = SOFTWARE,
               more: Optional[Mapping[str, Optional[np.ndarray]]] = None, denoised: Optional[Denoised] = None) -> None:
     """R, G, B and the layer lull, which image programs show as spp, p_noisy, error and reason, then those of the frame;
     cut to the crop. more: further channels over the frame's view, or instead of its layers; None leaves one out.
@@ -70,7 +71,7 @@ def is_ours(path: str) -> bool:
     """Is this a picture of Lull's, or none at all? What is another program's must not be replaced unless somebody says
     so."""
     try:
-        with open(path, "rb") as file:
+        with open(encoded(path), "rb") as file:
             begin = file.read(4096)
     except OSError:
         return True
@@ -90,14 +91,14 @@ def write_preview(path: str, driver: Driver, denoised: Optional[Denoised] = None
 def write_stop_map(path: str, frame: HostFrame, scene: str = "") -> None:
     """Each block in the colour of its samples, the count written into it; or with the ending .csv one line
     `name;spp;spp;…;` in the order of the blocks. scene: the file that gives the line its name."""
-    file_call("host_stop_map", C.byref(frame.layout), os.fsencode(path), os.fsencode(scene))
+    file_call("host_stop_map", C.byref(frame.layout), encoded(path), encoded(scene))
 
 
 def write_report(path: str, driver: Driver, scene: str = "", kernel: str = "", interrupted: bool = False,
                  mask: Optional[str] = None, denoised: Optional[Denoised] = None) -> None:
     """Everything about the run as JSON, as the path tracer's --report; null: not known. mask: its file."""
     file_call("host_report_write", driver.frame.handle.pointer,
-              C.byref(_report(driver, scene, kernel, interrupted, mask, denoised)), os.fsencode(path))
+              C.byref(_report(driver, scene, kernel, interrupted, mask, denoised)), encoded(path))
 
 
 def _report(driver: Driver, scene: str, kernel: str, interrupted: bool, mask: Optional[str],
@@ -108,7 +109,7 @@ def _report(driver: Driver, scene: str, kernel: str, interrupted: bool, mask: Op
     kept = {"noisy_weight": denoised.weight.mean(dtype=float), "noisy_error": denoised.noisy_error.ctypes.data} \
         if denoised else {}
     return abi.sized(
-        abi.HostReport, flags=flags, scene=os.fsencode(scene), mask=None if mask is None else os.fsencode(mask),
+        abi.HostReport, flags=flags, scene=encoded(scene), mask=None if mask is None else encoded(mask),
         kernel=kernel.encode(), threads=driver.threads, processes=1, film_pixels=frame.view.pixels, scene_bytes=math.nan,
         film_bytes=sum(a.nbytes for a in frame.arrays().values()), phases=C.cast(phases, C.c_void_p),
         phase_count=len(phases), **kept)
@@ -125,7 +126,7 @@ def write_page(path: str, driver: Driver, scene: str = "", kernel: str = "", int
                                                                                 denoised)))
     layers = (abi.HostLayer * len(pictures))(*((name.encode(), rgb.ctypes.data) for name, rgb in pictures.items()))
     height, width = pictures["picture"].shape[:2]
-    file_call("host_page", report, None, layers, len(layers), width, height, os.fsencode(path))
+    file_call("host_page", report, None, layers, len(layers), width, height, encoded(path))
 
 
 def progress_text(driver: Driver) -> str:
@@ -145,19 +146,17 @@ class Progress:
 
     def __init__(self, out: Optional[TextIO] = None):
         self.out = out or sys.stderr
-        self.live = self.out.isatty()
+        self.live = self.out is not None and self.out.isatty()
         self._next_s = time.monotonic() + (0.0 if self.live else 2.0)
 
     def show(self, driver: Driver) -> None:
         """Five times a second on a terminal, elsewhere every 10 s; the first after 2 s there."""
         now = time.monotonic()
         if now >= self._next_s:
-            self.out.write(f"\r{progress_text(driver)}\033[K" if self.live else progress_text(driver) + "\n")
-            self.out.flush()
+            say(f"\r{progress_text(driver)}\033[K" if self.live else progress_text(driver), self.out, "" if self.live else "\n")
             self._next_s = now + (0.2 if self.live else 10.0)
 
     def clear(self) -> None:
         """Removes the line from a terminal."""
         if self.live:
-            self.out.write("\r\033[K")
-            self.out.flush()
+            say("\r\033[K", self.out, "")

@@ -6,25 +6,26 @@ from __future__ import annotations
 
 from typing import Callable, NamedTuple, Optional, Sequence
 
-from .criterion import Criterion, load
 from .driver import Driver, Result, Watcher
-from .library import LullError, Parameter
-
-# Settings by name, as lull-render tells them: how many times what is just seen, coarse to fine, and shares of viewers.
-TIMES = {8.0: "rough", 4.0: "draft", 2.0: "good", 1.0: "just seen", 0.5: "strict"}
-SHARES = {0.5: "draft", 0.05: "strict"}
+from .library import LullError, find
 
 
 class Row(NamedTuple):
     """One setting. spp: of the least block, of the picture and of the most expensive block; time_s: of the whole render from
-    its start, wall seconds on free processors. at_most: the criterion did not predict every block, those count with the most
-    samples."""
+    its start, wall seconds on free processors; low, high: (spp, time_s) of the picture at the ends of the interval that 8 of
+    10 blocks stop in. at_most: the criterion did not predict every block, those count with the most samples. unmet: blocks
+    whose light most of their pixels have not met yet. told: False where that is too little: no number is to be believed.
+    parameter "": the criterion has none that is set."""
     parameter: str
     value: float
     name: str
     spp: tuple[float, float, float]
     time_s: float
+    low: tuple[float, float]
+    high: tuple[float, float]
     at_most: bool
+    unmet: int
+    told: bool
     chosen: bool
 
 
@@ -32,28 +33,6 @@ def pilot_done(driver: Driver, spp: int = 128, seconds: float = 30.0) -> bool:
     """Is enough known? Every active block was checked at `spp` samples or later, or once and `seconds` have passed."""
     asked = [b.asked_spp for b in driver.frame.blocks if b.active]
     return not asked or min(asked) >= spp or min(asked) > 0 and driver.totals.elapsed_s >= seconds
-
-
-def _quality_of(criterion: Criterion) -> tuple[Parameter, float]:
-    """What a mask scales and a quote varies; KeyError when the criterion has no such parameter, or no value for it."""
-    for parameter in filter(None, map(criterion.info.parameter, ("error", "visible", "threshold"))):
-        if (value := criterion.parameters.get(parameter.name, parameter.default)) is not None:
-            return parameter, float(value)
-    raise KeyError
-
-
-def _settings(criterion: Criterion, parameter: Parameter, value: float) -> list[tuple[str, float, str]]:
-    """(parameter, value, name), coarse to fine; of thresholds twice and four times the value."""
-    coarser = [("error", v, name) for v, name in TIMES.items() if v > 1] if criterion.info.parameter("error") else []
-    names = {"error": dict(TIMES), "visible": dict(SHARES)}.get(parameter.name, {4 * value: "rough", 2 * value: "draft"})
-    if parameter.name == "error":
-        coarser = []
-    elif coarser:
-        del names[0.5]
-    if parameter.name == "visible" and parameter.default is not None:
-        names.setdefault(float(parameter.default), "default")
-    names.setdefault(value, "chosen")
-    return coarser + [(parameter.name, v, names[v]) for v in sorted(names, reverse=True) if parameter.min <= v <= parameter.max]
 
 
 def _is_dear(driver: Driver) -> bool:
@@ -64,20 +43,15 @@ def _is_dear(driver: Driver) -> bool:
 def rows(driver: Driver) -> list[Row]:
     """Coarse to fine, or what the denoised and the noisy picture take; [] if the criterion has no quality parameter or cannot
     be asked. Every active block has been checked once at least."""
-    frame, noisy = driver.frame, None
+    frame = driver.frame
     try:
-        parameter, chosen = _quality_of(frame.criterion)
-        own = parameter.name, chosen
-        settings = _settings(frame.criterion, parameter, chosen)
-        if _is_dear(driver):
-            noisy = load("observer", threads=frame.criterion.threads, log=frame.criterion.log, **{parameter.name: chosen})
-            settings = [s for s in settings if s[0] == "error" and s[1] > 1 and s[:2] != own] + [(*own, "denoised")]
-            settings.sort(key=lambda s: -s[1] if s[0] == "error" else 0)
-        costs = frame.quote(driver.threads, [s[:2] for s in settings], own, noisy)
-    except (LullError, KeyError):
+        costs = frame.quote(driver.threads, find("observer") if _is_dear(driver) else None)
+    except LullError:
         return []
-    return [Row(name, value, text, (cost.spp_min, cost.spp_mean, cost.spp_max), cost.wall_s, cost.unknown > 0, bool(cost.asked))
-            for (name, value, text), cost in zip(settings + [(*own, "noisy")] * (noisy is not None), costs)]
+    rows = [Row((c.parameter or b"").decode(), c.value, c.name.decode(), (c.spp_min, c.spp_mean, c.spp_max), c.wall_s,
+                (c.spp_mean_low, c.wall_low_s), (c.spp_mean_high, c.wall_high_s), c.unknown > 0, c.unmet, bool(c.told),
+                bool(c.asked)) for c in costs]
+    return rows if any(r.parameter for r in rows) else []
 
 
 def once_quoted(tell: Callable[[str], None]) -> Watcher:
@@ -100,16 +74,31 @@ def time_text(seconds: float) -> str:
     return f"{seconds / 60:.1f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
+def _cost_text(row: Row) -> str:
+    """at most 5.8 min (4.0 min to 8.1 min)."""
+    if not row.told:
+        return "more than can be told yet: too little was met"
+    return f"{'at most' if row.at_most else 'about'} {time_text(row.time_s)} ({time_text(row.low[1])} to {time_text(row.high[1])})"
+
+
+def _unmet_text(driver: Driver, row: Row) -> str:
+    """"" where every block has met its light."""
+    return f"{row.unmet} of {len(driver.frame.blocks)} blocks have not met their light yet" if row.unmet else ""
+
+
 def table(driver: Driver) -> str:
     """The rows as a table, or one line that says why there is none."""
     found = rows(driver)
     if not found:
         return f"criterion {driver.frame.criterion.info.id} has no quality parameter whose cost could be told"
-    lines = ["  setting                   spp min / mean / max        time"]
+    lines = ["  setting                   spp min / mean / max        time (8 of 10 blocks)"]
     for r in found:
-        counts = " / ".join(f"{n:7,.0f}" for n in r.spp)
-        lines.append(f"{r.parameter:>9} {r.value:<5.4g}  {r.name:9} {counts}   {'at most ' if r.at_most else ''}{time_text(r.time_s)}"
-                     f"{'  <- chosen' if r.chosen else ''}")
+        setting = f"{r.parameter:>9} {r.value:<5.4g}" if r.parameter else " " * 15
+        counts = " / ".join(f"{n:7,.0f}" for n in r.spp) + f"   {_cost_text(r).removeprefix('about ')}"
+        cost = counts if r.told else "  not known: the pilot has met too little"
+        lines.append(f"{setting}  {r.name:9} {cost}{'  <- chosen' if r.chosen else ''}")
+    if text := next((_unmet_text(driver, r) for r in found if r.chosen), ""):
+        lines.append(f"{text}: a longer pilot says more")
     return "\n".join(lines)
 
 
@@ -129,16 +118,18 @@ def shot(costs: Sequence[tuple[int, Optional[Row]]], frames: int) -> str:
     known = [(at, row) for at, row in costs if row]
     if not known or len(known) < len(costs):
         return ""
-    time_s = spp = 0.0
-    for (at, row), (after, other) in zip(known, known[1:]):
+    numbers = [(r.spp[1], r.time_s, r.low[1], r.high[1]) for _, r in known]
+    sums = list(numbers[-1])
+    for k, ((at, _), (after, _)) in enumerate(zip(known, known[1:])):
         for frame in range(at, after):
             share = (frame - at) / (after - at)
-            time_s += (1 - share) * row.time_s + share * other.time_s
-            spp += (1 - share) * row.spp[1] + share * other.spp[1]
-    last = known[-1][1]
+            sums = [s + (1 - share) * a + share * b for s, a, b in zip(sums, numbers[k], numbers[k + 1])]
+    spp, time_s, low_s, high_s = sums
+    begin = f"{frames} frames, by {len(known)} pilots: "
+    if not all(row.told for _, row in known):
+        return f"{begin}not known, they have met too little"
     most = "at most" if any(row.at_most for _, row in known) else "about"
-    return (f"{frames} frames, by {len(known)} pilots: {most} {time_text(time_s + last.time_s)}, "
-            f"{(spp + last.spp[1]) / frames:,.0f} spp on average")
+    return (f"{begin}{most} {time_text(time_s)} ({time_text(low_s)} to {time_text(high_s)}), {spp / frames:,.0f} spp on average")
 
 
 def line(driver: Driver) -> str:
@@ -148,7 +139,7 @@ def line(driver: Driver) -> str:
     own = next((r for r in found if r.chosen), None)
     if own is None:
         return ""
-    parts = [f"{r.parameter} {r.value:g} would take {'at most ' if r.at_most else 'about '}{time_text(r.time_s)}"
-             for r in reversed(found[:found.index(own)])]
-    takes = f"takes {'at most' if own.at_most else 'about'} {time_text(own.time_s)}"
-    return "; ".join([f"{own.parameter} {own.value:g} {takes}, {own.spp[1]:,.0f} spp", *parts])
+    parts = [f"{r.parameter} {r.value:g} would take {_cost_text(r)}" for r in reversed(found[:found.index(own)]) if r.told]
+    spp = f", {own.spp[1]:,.0f} spp" if own.told else ""
+    setting = f"{own.parameter} {own.value:g}" if own.parameter else driver.frame.criterion.info.id
+    return "; ".join(filter(None, [f"{setting} takes {_cost_text(own)}{spp}", *parts, _unmet_text(driver, own)]))

@@ -25,6 +25,7 @@ import numpy as np
 from . import exr, limits
 from .criterion import CHANNELS, Rect
 from .files import LUMINANCE, replaced
+from .library import encoded
 
 MAGIC, FILE_HEADER, RECORD_HEADER, PLANE_HEADER, STAT = b"LULLSEQ1", 64, 64, 16, 32
 LOOK, REFERENCE, BEYOND = 1, 2, 3  # kinds of records
@@ -152,7 +153,7 @@ class _Found(NamedTuple):
 
 def _scan(path: str, width: int, height: int) -> Iterator[_Found]:
     """The records of a file, without their pixels; ValueError says what does not fit."""
-    with open(path, "rb") as file:
+    with open(encoded(path), "rb") as file:
         _need(FILE_HEADER <= os.fstat(file.fileno()).st_size <= MAX_FILE, f"{path}: not a look")
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
             try:
@@ -199,7 +200,7 @@ def _records(path: str, data: mmap.mmap, width: int, height: int) -> Iterator[_F
 
 
 def _plane(place: _Place, name: str, rect: Rect) -> np.ndarray:
-    with open(place.path, "rb") as file:
+    with open(encoded(place.path), "rb") as file:
         file.seek(place.payload)
         payload = file.read(place.size)
     _need(len(payload) == place.size and zlib.crc32(payload) == place.crc, f"{place.path}: an image is damaged (CRC)")
@@ -242,7 +243,7 @@ class Recording:
         stopped: set[int] = set()
         for f in m["files"]:
             path = os.path.join(folder, f["file"])
-            _need(os.path.getsize(path) == f["bytes"], f"{path}: not the file that the manifest lists (size)")
+            _need(os.path.getsize(encoded(path)) == f["bytes"], f"{path}: not the file that the manifest lists (size)")
             if f["part"] in ("looks", "beyond"):
                 self.looks.append([])
             for r in _scan(path, self.width, self.height):
@@ -369,7 +370,7 @@ def read(folder: str) -> Recording:
 def _manifest(folder: str) -> dict[str, Any]:
     path = os.path.join(folder, "manifest.json")
     try:
-        with open(path, encoding="utf-8") as file:
+        with open(encoded(path), encoding="utf-8") as file:
             m = json.load(file)
     except (ValueError, RecursionError):
         raise ValueError(f"{path}: not the manifest of a sequence") from None
@@ -465,8 +466,8 @@ def write(folder: str, looks: Sequence[Look], *, scene: str, block: int = 200, c
              "gamma": limits.checked("gamma", gamma), "exposure": limits.checked("exposure", exposure),
              "sample_clamp": limits.checked("sample_clamp", sample_clamp), "rgb_to_xyz": [0.0] * 9, "max_seam": 0,
              "spp_min": spps[0], "spp_max": spps[-1]}
-    os.makedirs(folder, exist_ok=True)
-    _need(not os.path.exists(os.path.join(folder, "manifest.json")), f"{folder}: it holds a recording")
+    os.makedirs(encoded(folder), exist_ok=True)
+    _need(not os.path.exists(encoded(os.path.join(folder, "manifest.json"))), f"{folder}: it holds a recording")
     height, width = shape[:2]
     rects = [Rect(x, y, min(x + block, width), min(y + block, height))
              for y in range(0, height, block) for x in range(0, width, block)]

@@ -6,7 +6,6 @@ import abc
 import contextlib
 import os
 import struct
-import sys
 import zlib
 from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Sequence, Union
 
@@ -20,7 +19,8 @@ from .denoising import Denoised
 from .driver import Driver, Result
 from .files import Output, check_outputs
 from .frame import Frame
-from .library import LullError
+from .library import LullError, encoded
+from .program import open_closed, say
 
 
 class Picture(NamedTuple):
@@ -73,7 +73,7 @@ def seed_of(seed: int, first: int, r: Rect) -> int:
 
 def print_line(line: str) -> None:
     """To stderr."""
-    print(f"lull: {line}", file=sys.stderr)
+    say(f"lull: {line}")
 
 
 def quote(render_scene: Callable[..., Picture], criterion: Union[str, Criterion], settings: Mapping[str, Any]) -> str:
@@ -107,6 +107,7 @@ def render(open_film: Callable[[], Film], criterion: Union[str, Criterion], *, s
     is not raised: see Picture.result. Raises LullError, ValueError, TypeError and OSError for bad input, before anything
     is rendered.
     """
+    open_closed()
     mask = os.fspath(mask) if isinstance(mask, os.PathLike) else mask
     if resume and not checkpoint:
         raise ValueError("resume: there is no checkpoint to go on from: name one with checkpoint=")
@@ -133,7 +134,7 @@ def render(open_film: Callable[[], Film], criterion: Union[str, Criterion], *, s
         if tell:
             driver.watchers.append(quotes.once_quoted(tell))
         kept = checkpoints.Keeper(checkpoint, driver, checkpoint_every_s) if checkpoint else None
-        if resume and os.path.exists(checkpoint):
+        if resume and os.path.exists(encoded(checkpoint)):
             checkpoints.load(checkpoint, driver)
         result = driver.run()
     picture = Picture(frame.cropped(frame.mean()), frame.cropped(frame.spp()), result, driver,

@@ -6,8 +6,6 @@ from __future__ import annotations
 import signal
 from typing import Any, Callable, Optional
 
-EXIT_STATUS = 130
-
 
 class Stopping:
     """Use as a context manager in the main thread. asked: a signal has come; then: called from its handler."""

@@ -20,8 +20,10 @@ if NEEDED:  # this is a program: one line, no traceback
 from .. import denoising, quote
 from ..criterion import Criterion, load
 from ..driver import Result
+from ..library import encoded
 from ..outputs import Progress
-from ..stopping import EXIT_STATUS, Stopping
+from ..program import INTERRUPTED, run
+from ..stopping import Stopping
 
 if TYPE_CHECKING:  # launch() does without bpy
     import bpy
@@ -104,9 +106,12 @@ def parser() -> argparse.ArgumentParser:
     return p
 
 
-def launch(argv: Optional[Sequence[str]] = None) -> int:
+def launch() -> int:
     """From a plain Python: with bpy if it can be imported, else by starting Blender."""
-    argv = list(sys.argv[1:] if argv is None else argv)
+    return run("lull", lambda: _launch(sys.argv[1:]))
+
+
+def _launch(argv: list[str]) -> int:
     options = parser().parse_args(argv)
     if not options.file or not os.path.isfile(options.file):
         print(f"lull: {options.file or 'FILE.blend'}: no such file", file=sys.stderr)
@@ -123,7 +128,7 @@ def launch(argv: Optional[Sequence[str]] = None) -> int:
         sys.stdout.flush()
         os.execv(program, [program, "-b", "--factory-startup", "-noaudio", "--python-exit-code", "2", "--python-expr", code,
                            "--", *argv])
-    return main(argv)
+    return _main(argv)
 
 
 def _frames(text: Optional[str], scene: bpy.types.Scene) -> list[Optional[int]]:
@@ -140,10 +145,14 @@ def _frames(text: Optional[str], scene: bpy.types.Scene) -> list[Optional[int]]:
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Inside Blender (options after `--`) or with bpy. Exit status: 0 done, 1 rendering failed, 2 bad input or an output
-    could not be written, 130 interrupted."""
-    from .session import REFUSED
+    could not be written, 130 interrupted, 141 nobody reads its output."""
     if argv is None:
         argv = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
+    return run("lull", lambda: _main(argv))
+
+
+def _main(argv: Sequence[str]) -> int:
+    from .session import REFUSED
     options = parser().parse_args(argv)
     try:
         with Stopping() as stopping:
@@ -161,7 +170,7 @@ def _scene(options: argparse.Namespace) -> bpy.types.Scene:
     from .cycles import choose_device
     engine.register()  # a file may name it
     if options.file:
-        bpy.ops.wm.open_mainfile(filepath=os.path.abspath(options.file))
+        bpy.ops.wm.open_mainfile(filepath=encoded(os.path.abspath(options.file)).decode("utf-8", "surrogateescape"))
     if options.scene and options.scene not in bpy.data.scenes:
         raise ValueError(f"--scene {options.scene}: the file has {', '.join(bpy.data.scenes.keys())}")
     scene = bpy.data.scenes[options.scene] if options.scene else bpy.context.scene
@@ -210,8 +219,8 @@ def _render(options: argparse.Namespace, stopping: Stopping) -> int:
             if frame is not None:
                 scene.frame_set(frame)
             status = max(status, _render_frame(options, scene, settings, criterion, stopping, costs))
-            if status in (1, EXIT_STATUS) or stopping.asked:
-                return EXIT_STATUS if stopping.asked and status in (0, EXIT_STATUS) else status
+            if status in (1, INTERRUPTED) or stopping.asked:
+                return INTERRUPTED if stopping.asked and status in (0, INTERRUPTED) else status
     if options.quote and len(frames) > 1:
         unknown = f"{len(frames)} frames: the criterion cannot tell what they cost"
         print(quote.shot(list(enumerate(costs)), len(frames)) or unknown, flush=True)
@@ -275,4 +284,4 @@ def _end(session: Session, result: Optional[Result], failed: Sequence[str]) -> i
         return 1
     if failed or session.unsaved:
         return 2
-    return EXIT_STATUS if result is not None and result.outcome == "interrupt" else 0
+    return INTERRUPTED if result is not None and result.outcome == "interrupt" else 0

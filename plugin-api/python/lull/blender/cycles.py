@@ -22,6 +22,7 @@ import numpy as np
 
 from .. import exr
 from ..criterion import Rect
+from ..program import open_closed
 from .passes import Passes
 from .view import unnamed_file
 
@@ -37,7 +38,9 @@ def _silence() -> Iterator[None]:
     if not bpy.app.background:
         yield
         return
-    sys.stdout.flush()
+    open_closed()
+    with contextlib.suppress(AttributeError, OSError):  # closed; full, or nobody reads it
+        sys.stdout.flush()
     kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
     os.close(nowhere)

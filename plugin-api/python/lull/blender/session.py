@@ -16,7 +16,8 @@ from ..criterion import Criterion, load
 from ..driver import Driver, Result
 from ..files import Output, check_outputs, write_each
 from ..frame import Frame
-from ..library import LullError
+from ..library import LullError, encoded
+from ..version import SOFTWARE
 from . import shown
 from .cycles import WAVE, Cycles, HostError
 from .view import display_of, is_plain, read_grey, view_text
@@ -102,7 +103,7 @@ def scene_inputs() -> list[str]:
     for image in filter(None, map(bpy.data.images.get, (shown.PICTURE, shown.STOP_MAP))):
         if (path := bpy.path.abspath(image.filepath)) in paths:
             paths.remove(path)  # once: another image may read the same file
-    return sorted({os.path.realpath(p) for p in paths if p and os.path.isfile(p)})
+    return sorted({os.path.realpath(p) for p in paths if p and os.path.isfile(encoded(p))})
 
 
 def check_files(frames: Sequence[Settings], criterion: Criterion) -> None:
@@ -119,7 +120,7 @@ def _identity(scene: bpy.types.Scene, host: Cycles) -> dict[str, str]:
     """What the samples depend on beside the frame's own settings, for the checkpoint."""
     crc = 0
     for path in scene_inputs():
-        with open(path, "rb") as file:
+        with open(encoded(path), "rb") as file:
             while data := file.read(1 << 20):
                 crc = zlib.crc32(data, crc)
     camera, view = scene.camera, zlib.crc32(np.array(scene.camera.matrix_world, "<f4").tobytes())
@@ -186,7 +187,7 @@ class Session:
     def begin(self, resume: bool = False, every_s: float = 60.0) -> None:
         """Goes on from the checkpoint, if it is there; keeps it from now on. every_s 0: after every step."""
         state = self.settings.checkpoint
-        if state and resume and os.path.exists(state):
+        if state and resume and os.path.exists(encoded(state)):
             checkpoint.load(state, self.driver)
             self.host.passes.remember(self.frame)
             self._before = (self.driver.totals.render_s, self.driver.totals.criterion_s)
@@ -232,7 +233,7 @@ class Session:
         interrupted = result.outcome in ("interrupt", "failed")
         kept = self.denoised
         written, unwritten = write_each((
-            (s.output, lambda p: outputs.write_exr(p, self.driver, scene, f"lull for Python 1.0; {kernel}",
+            (s.output, lambda p: outputs.write_exr(p, self.driver, scene, f"{SOFTWARE}; {kernel}",
                                                     self.host.passes.finished(self.frame, self._rgb()), kept)),
             (s.preview, lambda p: outputs.write_preview(p, self.driver, kept)),
             (s.stop_map, lambda p: outputs.write_stop_map(p, self.frame, scene)),

@@ -29,7 +29,7 @@ def _criteria(_self: object, _context: object) -> list[tuple[str, str, str]]:
         found = [c for c in criteria() if c.id != "null"]
         found.sort(key=lambda c: (c.id != "observer", c.id))
         _items.extend((c.id, c.name, c.description) for c in found)
-        _visible.update((c.id, float(p.default or 0)) for c in found if (p := c.parameter("visible")))
+        _visible.update((c.id, float(p.default or 0)) for c in found if (p := c.parameter("visible")) and p.type == "float")
         _by_error.update(c.id for c in found if c.parameter("error"))
         if not _items:
             _items.append(("none", "none found", f"No criteria in {', '.join(search_path())}: set LULL_PLUGIN_PATH"))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib
 import sys
 
-from ..study.options import finish, parse
+from ..program import run
+from ..study.options import parse
 
 NAMES = ("evaluate", "cost", "compare", "label")
 
@@ -18,12 +19,9 @@ def main() -> int:
         print("ggn-judge: ggn starts it", file=sys.stderr)
         return 2
 
-    def run() -> None:
+    def work() -> None:
         command = importlib.import_module(f".{part}", __package__)
         arguments, options = parse(command.COMMAND, words)
         command.run(program, arguments, options)
 
-    try:
-        return finish(name, run, "")
-    except KeyboardInterrupt:
-        return 130
+    return run(name, work)

@@ -203,18 +203,18 @@ class Replay:
     def from_files(self, paths: Sequence[str], split: str) -> list[Method]:
         """The thresholds of each file, which has to have all views of `split`."""
         files = ggn(self.program, self.command, "thresholds", *paths) if paths else []
-        return [self._from_file(path, {v["name"]: v["spp"] for v in views}, split) for path, views in zip(paths, files)]
+        return [self._from_file(path, views, split) for path, views in zip(paths, files)]
 
-    def _from_file(self, path: str, rows: dict[str, list[Optional[float]]], split: str) -> Method:
+    def _from_file(self, path: str, views: Sequence[dict[str, Any]], split: str) -> Method:
         stops = []
         for b in self.blocks:
-            row = rows.get(b.view, rows.get(b.view + "_part6"))  # as SIN3D's own names end
-            if row is None and b.split == split:
+            view = rules.of_view(views, b.view)
+            if not view and b.split == split:
                 raise Refused(f"{path}: not all views of the split '{split}' are in it")
-            if row is not None and len(row) != b.tiles:
+            if view and len(view["spp"]) != b.tiles:
                 folder = next(v["folder"] for v in self.views if v["name"] == b.view)
-                name = b.view if b.view in rows else b.view + "_part6"
-                raise Refused(f"{path}: '{name}' has {len(row)} thresholds, {folder} has {b.tiles} blocks")
-            known = row[b.id] if row is not None else None
-            stops.append(b.cap if known is None else min(rules.from_study(known) if b.split == "people" else known, b.cap))
+                raise Refused(f"{path}: '{view['name']}' has {len(view['spp'])} thresholds, {folder} has {b.tiles} blocks")
+            known = view["spp"][b.id] if view else None
+            converts = view and view["of_study"] and b.split == "people"
+            stops.append(b.cap if known is None else min(rules.from_study(known) if converts else known, b.cap))
         return self.fixed(os.path.basename(path)[:47], stops)

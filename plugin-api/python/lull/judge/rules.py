@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import bisect
 import math
-from typing import Optional, Sequence
+from typing import Any, Optional, Sequence
 
 GROWTH = 1.5  # largest ratio of samples between two checks of the criterion `observer`
 FIRST_SPP = 16.0  # of its checks
-STUDY_CAP, SIMULATED_CAP, STUDY_REFERENCE = 10000.0, 20000.0, 20000.0  # spp; ggn/observer/observer.h
+STUDY_CAP, SIMULATED_CAP, STUDY_REFERENCE = 10000.0, 20000.0, 20000.0  # spp; ggn/sight/observer.h
 
 
 def from_study(spp: float) -> float:
@@ -19,6 +19,15 @@ def from_study(spp: float) -> float:
 
 def to_study(spp: float) -> float:
     return min(1 / (1 / spp + 1 / STUDY_REFERENCE), STUDY_CAP)
+
+
+# --- names ---
+
+def of_view(views: Sequence[dict[str, Any]], name: str) -> Optional[dict[str, Any]]:
+    """The view of this name, or else of one that is the same: SIN3D's own files have the ending _part6, which others leave
+    out (ggn/data/thresholds.h)."""
+    return next((v for v in views if v["name"] == name), None) or next(
+        (v for v in views if v["name"].removesuffix("_part6") == name.removesuffix("_part6")), None)
 
 
 # --- scores ---

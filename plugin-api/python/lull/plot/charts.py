@@ -5,12 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple, Optional, Sequence
 
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
 from ..study.files import Refused, replaced  # noqa: F401 (what draw may raise)
+from .canvas import Axes, Figure, FigureCanvasAgg, FixedLocator, FuncFormatter, NullLocator
 
 Range = tuple[Optional[float], Optional[float]]  # None: as far as the series go
 COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2", "#bcbd22", "#7f7f7f")

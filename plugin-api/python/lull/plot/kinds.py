@@ -7,12 +7,9 @@ import statistics
 from typing import Any, Callable, Iterable, Sequence
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from ..study.files import Refused
+from .canvas import Figure, LogNorm, MaxNLocator, ScalarMappable
 from .charts import COLOURS, Chart, Rule, Series, figure_of, new_figure
 from .sources import Blocks, Cost, Evaluation, Table, Wanted
 

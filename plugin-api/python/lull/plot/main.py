@@ -6,8 +6,9 @@ import os
 import sys
 from typing import Any, Optional, Sequence
 
-from ..study.files import Refused, check_output
-from ..study.options import Command, Option, finish, parse, word
+from ..program import Refused, run
+from ..study.files import check_output
+from ..study.options import Command, Option, parse, word
 from .sources import Wanted, read
 
 NAMES = ("curves", "roc", "scatter", "histogram", "maps", "scores", "frontier")
@@ -52,4 +53,4 @@ def _run(arguments: Sequence[str]) -> None:
 def main(arguments: Optional[Sequence[str]] = None) -> int:
     """The exit status: 0 done, 1 out of memory, 2 bad usage, bad input, or the picture could not be written."""
     words = sys.argv[1:] if arguments is None else arguments
-    return finish("lull-plot", lambda: _run(words), "apt-get install python3-matplotlib, or pip install 'lull[plot]'")
+    return run("lull-plot", lambda: _run(words), "apt-get install python3-matplotlib, or pip install 'lull[plot]'")

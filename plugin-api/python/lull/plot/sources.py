@@ -7,7 +7,7 @@ import csv
 import math
 from typing import Any, NamedTuple, Optional, Sequence
 
-from ..study.files import Refused, loads, read_file
+from ..study.files import Refused, lines_of, loads, read_file
 
 MOST_BYTES = 1 << 30
 
@@ -53,8 +53,8 @@ class Table:
 
     def __init__(self, path: str, text: str):
         self.path = path
-        lines = text.splitlines()
-        self.rows = list(csv.DictReader(lines, delimiter=";" if lines and ";" in lines[0] else ","))
+        lines = lines_of(path, text)
+        self.rows = list(csv.DictReader(lines, delimiter=";" if ";" in lines[0] else ","))
         self.columns = set(self.rows[0]) if self.rows else set()
 
     def kinds(self) -> Sequence[str]:

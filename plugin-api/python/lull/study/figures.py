@@ -7,8 +7,8 @@ import os
 from typing import Iterator, Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 
+from ..plot.canvas import Figure
 from ..plot.charts import new_figure, save
 from .definition import TWO_INTERVAL, VALIDATION
 from .people import People
@@ -19,14 +19,17 @@ BLUE, RED, ACROSS, MOST_CURVES = "#3b6ea5", "#c0504d", 4, 48
 
 
 def thresholds_figure(people: People, thresholds: Sequence[Threshold]) -> Figure:
-    """Thresholds of all blocks, view after view, with their intervals."""
+    """Thresholds of all blocks, view after view, with their intervals; arrows where these have no end."""
     figure = new_figure(900, 420)
     axes = figure.add_subplot(xlabel="block, view after view", ylabel="samples per pixel")
     axes.set_xlim(-0.5, len(thresholds) - 0.5)
     axes.set_yscale("log", base=2)
     known = [(c, t) for c, t in enumerate(thresholds) if not math.isnan(t.t)]
-    spp = np.exp2([[t.t, t.t if math.isnan(t.lo) else t.lo, t.t if math.isnan(t.hi) else t.hi] for _, t in known]).T
+    spp = np.exp2([[t.t, t.lo if math.isfinite(t.lo) else t.t, t.hi if math.isfinite(t.hi) else t.t] for _, t in known]).T
     axes.errorbar([c for c, _ in known], spp[0], (spp[0] - spp[1], spp[2] - spp[0]), fmt="o", ms=4, lw=1, color=BLUE)
+    for side, arrow in (("below", "v"), ("above", "^")):
+        open_ended = [(c, 2.0 ** t.t) for c, t in known if side in t.censored()]
+        axes.plot([c for c, _ in open_ended], [y for _, y in open_ended], arrow, ms=8, mfc="none", color=BLUE)
     return figure
 
 

@@ -6,13 +6,10 @@ import contextlib
 import json
 import math
 import os
+import re
 from typing import Any, Iterator, TextIO
 
-VERSION = "1.0"
-
-
-class Refused(Exception):
-    """One line for people: bad usage, bad input, or an output that cannot be written. Exit status 2."""
+from ..program import Refused
 
 
 # --- JSON ---
@@ -66,6 +63,15 @@ def read_file(path: str, most: int) -> bytes:
     if len(data) > most:
         raise Refused(f"{path}: larger than {most} bytes")
     return data
+
+
+def lines_of(path: str, text: str) -> list[str]:
+    """As Lull's programs read tables (base/text.h): lines end in LF, CR LF or CR, each as it likes."""
+    lines = re.split("\r\n|\r|\n", text.removeprefix("\ufeff"))
+    bad = next((i for i, line in enumerate(lines, 1) if "\0" in line), 0)
+    if bad:
+        raise Refused(f"{path}:{bad}: has a byte 0 (expected a line of text, in UTF-8)")
+    return lines
 
 
 # --- writing ---

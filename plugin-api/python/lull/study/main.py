@@ -7,10 +7,11 @@ import os
 import sys
 from typing import Any, Callable, Sequence
 
+from ..program import run
 from . import prepare
 from .definition import MAX_VIEWS, read_study
 from .files import Refused, check_output, protect
-from .options import Command, Option, finish, parse
+from .options import Command, Option, parse
 from .store import Store
 
 Work = Callable[[Sequence[str], dict[str, Any]], None]  # arguments, options
@@ -133,5 +134,5 @@ def main() -> int:
     """The exit status: 0 done, 1 out of memory, 2 bad usage, bad input, or an output could not be written."""
     arguments = sys.argv[1:]
     verb = f" {arguments[0]}" if arguments and arguments[0] in VERBS else ""
-    return finish("lull-study" + verb, lambda: _run(arguments), "apt-get install python3-aiohttp python3-scipy python3-matplotlib, "
+    return run("lull-study" + verb, lambda: _run(arguments), "apt-get install python3-aiohttp python3-scipy python3-matplotlib, "
                   "or pip install 'lull[study]'")

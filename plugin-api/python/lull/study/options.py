@@ -10,7 +10,8 @@ import sys
 import textwrap
 from typing import Any, Callable, NamedTuple, Sequence
 
-from .files import VERSION, Refused
+from ..version import PRODUCT
+from .files import Refused
 
 
 class Option(NamedTuple):
@@ -49,6 +50,14 @@ def real(least: float, most: float) -> Callable[[str], float]:
     return take
 
 
+def block_size(most: int) -> Callable[[str], str]:
+    def take(text: str) -> str:
+        if not all(re.fullmatch("[0-9]{1,9}", side, re.ASCII) and 1 <= int(side) <= most for side in text.split("x", 1)):
+            raise ValueError(f"expected N or WxH, each from 1 to {most}")
+        return text
+    return take
+
+
 def word(*words: str) -> Callable[[str], str]:
     def take(text: str) -> str:
         if text not in words:
@@ -68,7 +77,7 @@ OWN = (Option("help", "", "Print this and exit", letter="?"), Option("usage", ""
 
 def _answer(command: Command, rows: Sequence[Option], what: str) -> str:
     if what == "version":
-        return f"{command.name.split()[0]} (Lull) {VERSION}"
+        return f"{command.name.split()[0]} (Lull) {PRODUCT}"
     said_margin = re.search(r"rmargin=(\d+)", os.environ.get("ARGP_HELP_FMT", ""))  # docs/man/write wants no line broken
     margin = int(said_margin[1]) if said_margin else 79
     forms = [f"--{o.name}" + (f"={o.value}" if o.value else "") for o in rows]
@@ -121,31 +130,3 @@ def parse(command: Command, arguments: Sequence[str]) -> tuple[list[str], dict[s
     if len(words) < command.least:
         raise Refused(f"expected {command.arguments} (--help says more)")
     return words, found
-
-
-def finish(command: str, run: Callable[[], None], packages: str) -> int:
-    """Runs a command, and says what stopped it, in one line that begins with `command`. packages: how to get what it imports.
-    The exit status: 0 done, 1 out of memory, 2 refused, or an output could not be written."""
-    status, why = 0, ""
-    try:
-        run()
-    except Refused as error:
-        status, why = 2, str(error)
-    except ImportError as error:
-        status, why = 2, f"{error.name} is needed: {packages}"
-    except MemoryError:
-        status, why = 1, "out of memory"
-    except SystemExit:  # --help was answered
-        pass
-    except OSError as error:
-        status, why = 2, f"{error.filename}: {error.strerror}" if error.filename else "cannot write standard output"
-    if status:
-        print(f"{command}: {why}", file=sys.stderr)
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more is tried at the end
-        if not status:
-            print(f"{command}: cannot write standard output", file=sys.stderr)
-        return status or 2
-    return status

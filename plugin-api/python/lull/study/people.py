@@ -25,6 +25,10 @@ class Cell(NamedTuple):
         """log2 of the highest level."""
         return math.log2(self.block.levels[-1])
 
+    def floor(self) -> float:
+        """Of the lowest."""
+        return math.log2(self.block.levels[0])
+
 
 class Judgement(NamedTuple):
     view: int
@@ -142,7 +146,7 @@ class People:
 
     def _estimate_settings(self, r: Result) -> None:
         """The mean of log2 of the settings; the interval from the scatter of all blocks around their own means, Student's
-        t."""
+        t. A setting at the highest or the lowest level is one that might have gone on."""
         from .psychometric import Estimate, t975
         of_cell: dict[int, list[float]] = {}
         for cell, x in sorted(r.set_to):
@@ -152,7 +156,9 @@ class People:
         for cell, x in of_cell.items():
             t, se = statistics.fmean(x), sd / math.sqrt(len(x))
             half = t975(df) * se if df else math.nan
-            r.estimates[cell] = Estimate(len(x), t, t - half, t + half, se, sd)
+            lo = -math.inf if self.cells[cell].floor() in x else t - half
+            hi = math.inf if self.cells[cell].cap() in x else t + half
+            r.estimates[cell] = Estimate(len(x), t, lo, hi, se, sd)
 
 
 # --- where a study stands ---

@@ -52,7 +52,7 @@ class Curve(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """Octaves; NaN where nothing is known."""
+    """Octaves; NaN where nothing is known. An end of the interval that is infinite is open."""
     trials: int
     t: float  # posterior median, central 95 %, standard deviation
     lo: float

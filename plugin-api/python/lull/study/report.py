@@ -16,8 +16,8 @@ from .definition import KINDS, VALIDATION
 from .files import make_folder, print_json, replaced, write_line
 from .people import People
 from .psychometric import Estimate
-from .summary import (Ceiling, Difference, Share, Threshold, against_noisy, ceiling, intraclass, people_needed, share,
-                      thresholds)
+from .summary import (Ceiling, Difference, Share, Threshold, against_noisy, ceiling, censored, intraclass, people_needed,
+                      share, thresholds)
 
 POWER_DIFFERENCE_PERCENT = 10
 
@@ -45,10 +45,11 @@ class _Report:
 
     def estimates_csv(self) -> None:
         head = "person;view;block;threshold;low;high;se_octaves;spread_octaves;spread_low;spread_high;trials"
+        rows = ((r.id, self.people.cells[c], censored(e, self.people.cells[c]))
+                for r in self.people.results for c, e in sorted(r.estimates.items()))
         self.table("estimates.csv", head, (
-            f"{r.id};{self.people.cells[c].view.name};{self.people.cells[c].block.id};{self._figures(e)};{e.se:.4f};"
-            f"{e.spread:.4f};{e.spread_lo:.4f};{e.spread_hi:.4f};{e.trials}"
-            for r in self.people.results for c, e in sorted(r.estimates.items())))
+            f"{person};{cell.view.name};{cell.block.id};{self._figures(e)};{e.se:.4f};"
+            f"{e.spread:.4f};{e.spread_lo:.4f};{e.spread_hi:.4f};{e.trials}" for person, cell, e in rows))
 
     def _cells(self, view: int) -> list[tuple[int, Threshold]]:
         """(id of the block, threshold) of a view."""
@@ -59,8 +60,8 @@ class _Report:
         return f"{spp(t.t):.2f};{spp(t.lo):.2f};{spp(t.hi):.2f}"
 
     def blocks_csv(self) -> None:
-        self.table("blocks.csv", "view;block;threshold;low;high;spread_octaves;people;trials;at_cap", (
-            f"{view.name};{id};{self._figures(t)};{t.spread:.4f};{t.people};{t.trials};{t.at_cap}"
+        self.table("blocks.csv", "view;block;threshold;low;high;spread_octaves;people;trials;at_cap;at_floor", (
+            f"{view.name};{id};{self._figures(t)};{t.spread:.4f};{t.people};{t.trials};{t.at_cap};{t.at_floor}"
             for v, view in enumerate(self.study.views) for id, t in self._cells(v)))
 
     def thresholds_csv(self) -> None:
@@ -73,7 +74,8 @@ class _Report:
 
     def view_json(self, v: int) -> None:
         view = self.study.views[v]
-        blocks = [{"id": b.id, "x0": b.x0, "y0": b.y0, "threshold": spp(t.t), "low": spp(t.lo), "high": spp(t.hi)}
+        blocks = [{"id": b.id, "x0": b.x0, "y0": b.y0, "threshold": spp(t.t), "low": spp(t.lo), "high": spp(t.hi),
+                   "censored": t.censored()}
                   for b, (_, t) in zip(view.blocks, self._cells(v)) if not math.isnan(t.t)]
         if blocks:
             write_line(os.path.join(self.folder, f"thresholds-{view.name}.json"),
@@ -123,6 +125,10 @@ class _Report:
 
     # --- the whole ---
 
+    def censored(self, side: str) -> int:
+        """Blocks."""
+        return sum(side in t.censored() for t in self.thresholds)
+
     def people_that_count(self) -> int:
         return sum(r.done > 0 for r in self.people.counting())
 
@@ -137,6 +143,7 @@ class _Report:
             root["dropped_answers"] = sum(r.dropped for r in results)
         root["excluded"] = [{"person": r.id, "why": r.excluded} for r in results if r.excluded]
         if s.task != VALIDATION:
+            root["censored_below"], root["censored_above"] = self.censored("below"), self.censored("above")
             root["noise_ceiling"] = asdict(agreement)
         else:
             root["conditions"] = []
@@ -163,6 +170,9 @@ class _Report:
             self._print_judgements()
             return
         print(f"{sum(not math.isnan(t.t) for t in self.thresholds)} of {len(self.thresholds)} blocks have a threshold")
+        for side, what in (("above", "noise at the highest level"), ("below", "none at the lowest level")):
+            if self.censored(side):
+                print(f"{self.censored(side)} of them censored {side}: somebody sees {what}, so that their intervals are open")
         for kind, d in self._pooled_kinds():
             print(f"{kind}: {spp(d.octaves):.2f} × the samples of the noisy picture [{spp(d.lo):.2f}, {spp(d.hi):.2f}], "
                   f"{d.people} people, up to {d.blocks} blocks")

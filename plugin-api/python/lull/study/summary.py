@@ -11,8 +11,8 @@ import numpy as np
 from scipy.special import ndtri
 from scipy.stats import rankdata
 
-from .people import People
-from .psychometric import t975, wilson
+from .people import Cell, People
+from .psychometric import Estimate, t975, wilson
 
 NAN = math.nan
 
@@ -20,19 +20,31 @@ NAN = math.nan
 @dataclass
 class Threshold:
     """Of a cell, octaves; NaN without people."""
-    t: float = NAN  # mean over people of their estimates, none beyond the highest level
-    lo: float = NAN  # 95 %: Student's t over people, or with one person their own interval
+    t: float = NAN  # mean over people of their estimates
+    lo: float = NAN  # 95 %: Student's t over people, or with one person their own interval; infinite where somebody's is
     hi: float = NAN
     spread: float = NAN  # geometric mean of theirs
     people: int = 0
     trials: int = 0
-    at_cap: int = 0  # so many did not reach their threshold at the highest level
+    at_cap: int = 0  # so many still see noise at the highest level
+    at_floor: int = 0  # so many see none at the lowest one
+
+    def censored(self) -> str:
+        """On which sides it may lie beyond the levels: "", "below", "above" or both."""
+        return " and ".join(side for side, end in (("below", self.lo), ("above", self.hi)) if math.isinf(end))
 
 
-def estimates(people: People) -> np.ndarray:
-    """[person that counts][cell], not beyond the highest level; NaN without one."""
-    return np.array([[min(r.estimates[c].t, cell.cap()) if c in r.estimates else NAN for c, cell in enumerate(people.cells)]
-                     for r in people.counting()]).reshape(-1, len(people.cells))
+def censored(e: Estimate, cell: Cell) -> Estimate:
+    """A threshold that is not known to lie between the levels is at the nearest one, and its interval has no end there."""
+    if e.t >= cell.cap():
+        return e._replace(t=cell.cap(), lo=min(e.lo, cell.cap()), hi=math.inf, se=NAN)
+    return e._replace(t=cell.floor(), lo=-math.inf, hi=max(e.hi, cell.floor()), se=NAN) if e.t <= cell.floor() else e
+
+
+def estimates(people: People, member: str = "t") -> np.ndarray:
+    """[person that counts][cell]; NaN without one."""
+    return np.array([[getattr(censored(r.estimates[c], cell), member) if c in r.estimates else NAN
+                      for c, cell in enumerate(people.cells)] for r in people.counting()]).reshape(-1, len(people.cells))
 
 
 def _student(values: np.ndarray) -> tuple[float, float, float]:
@@ -47,16 +59,21 @@ def _student(values: np.ndarray) -> tuple[float, float, float]:
 def thresholds(people: People) -> list[Threshold]:
     found = []
     for c, cell in enumerate(people.cells):
-        own = [r.estimates[c] for r in people.counting() if c in r.estimates]
+        own = [censored(r.estimates[c], cell) for r in people.counting() if c in r.estimates]
         if not own:
             found.append(Threshold())
             continue
-        t, lo, hi = _student(np.array([min(e.t, cell.cap()) for e in own]))
-        if len(own) == 1:
-            lo, hi = own[0].lo, own[0].hi
+        t, lo, hi = _student(np.array([e.t for e in own]))
+        lows, highs = ([end for end in ends if not math.isnan(end)] for ends in ([e.lo for e in own], [e.hi for e in own]))
+        at_cap, at_floor = (sum(e.t == end for e in own) for end in (cell.cap(), cell.floor()))
+        # Nobody's place among the levels is known where all are censored: then people do not scatter, but each might have.
+        if lows and (len(own) == 1 or at_cap == len(own) or -math.inf in lows):
+            lo = sum(lows) / len(lows)
+        if highs and (len(own) == 1 or at_floor == len(own) or math.inf in highs):
+            hi = sum(highs) / len(highs)
         with np.errstate(divide="ignore"):
             spread = float(np.exp2(np.mean(np.log2([e.spread for e in own]))))
-        found.append(Threshold(t, lo, hi, spread, len(own), sum(e.trials for e in own), sum(e.t >= cell.cap() for e in own)))
+        found.append(Threshold(t, lo, hi, spread, len(own), sum(e.trials for e in own), at_cap, at_floor))
     return found
 
 
@@ -65,7 +82,8 @@ def thresholds(people: People) -> list[Threshold]:
 @dataclass
 class Difference:
     """How many octaves of samples more one kind takes than the noisy picture of the same block and scene: each person's mean
-    over the blocks of which they have both, then the mean over people with Student's interval (NaN below two)."""
+    over the blocks of which they have both, then the mean over people with Student's interval (NaN below two; infinite where
+    one of the two thresholds is censored on that side)."""
     octaves: float
     lo: float
     hi: float
@@ -85,7 +103,12 @@ def against_noisy(people: People, kind: str, only: Optional[int] = None) -> Diff
     more = np.array([table[:, c] - table[:, n] for c, n in pairs]).reshape(len(pairs), len(table)).T
     blocks = (~np.isnan(more)).sum(1)
     own = np.nansum(more[blocks > 0], 1) / blocks[blocks > 0]
-    return Difference(*_student(own), people=len(own), blocks=int(blocks.max(initial=0)))
+    mean, lo, hi = _student(own)
+    low, high = estimates(people, "lo"), estimates(people, "hi")
+    for person, (c, n) in ((p, pair) for p, of_person in enumerate(more) for pair, x in zip(pairs, of_person) if x == x):
+        lo = -math.inf if math.isinf(low[person, c]) or math.isinf(high[person, n]) else lo
+        hi = math.inf if math.isinf(high[person, c]) or math.isinf(low[person, n]) else hi
+    return Difference(mean, lo, hi, people=len(own), blocks=int(blocks.max(initial=0)))
 
 
 # --- agreement ---

@@ -1,0 +1,3 @@
+#include "integ/run.h"
+
+PT_KERNEL_DEFINE(contact, PT_FX_SET_CONTACT)
