@@ -39,6 +39,9 @@ static int record(struct pt_open *o, int *status, struct base_err *err)
     config.scene_path = o->frame->paths[PT_SCENE];
     config.view = o->view;
     config.render = o->config;
+    config.criterion = !o->criterion ? NULL : o->cli->criterion ? o->cli->criterion : PT_OPEN_NOISY_CRITERION;
+    config.pairs = o->params.list;
+    config.pair_count = o->params.count;
     int rc = crc_of(o->frame->paths[PT_SCENE], &config.scene_crc, err);
     if (!rc)
         rc = base_inputs_crc32(&o->scene_files, &config.inputs_crc, err);
@@ -46,7 +49,8 @@ static int record(struct pt_open *o, int *status, struct base_err *err)
         rc = pt_watch_init(&watch, o, NULL, err);
     if (rc)
         return rc;
-    rc = pt_sequence_record(&config, o->scene, o->kernel, o->threads, o->criterion, &watch.hooks, &was_interrupted, err);
+    rc = (config.planes ? pt_sequence_record_frame : pt_sequence_record)(&config, o->scene, o->kernel, o->threads,
+                                                                         o->criterion, &watch.hooks, &was_interrupted, err);
     pt_watch_end(&watch);
     *status = was_interrupted ? PT_EXIT_INTERRUPTED : 0;
     return rc;

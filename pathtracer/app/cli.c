@@ -10,6 +10,7 @@
 #include "pbrt/xform.h"
 #include "render/checkpoint.h"
 #include "render/film.h"
+#include "sequence/planes.h"
 
 static int expected(struct base_err *err, const char *what) { return base_fail(err, BASE_EINVAL, "expected %s", what); }
 
@@ -157,6 +158,26 @@ static int set_aov(void *into, const char *value, struct base_err *err)
         if (i < 0)
             return expected(err, "a list of albedo, normal, depth");
         cli->render.planes |= (uint32_t)PT_FILM_ALBEDO << i;
+        if (value[n] == '\0')
+            return 0;
+    }
+}
+
+static int set_planes(void *into, const char *value, struct base_err *err)
+{
+    static const char *const names[] = {"color", "half", "moment2", "albedo", "normal", "depth", NULL};
+    static const int planes[] = {SEQ_PLANE_COLOR,  SEQ_PLANE_HALF,   SEQ_PLANE_MOMENT2,
+                                 SEQ_PLANE_ALBEDO, SEQ_PLANE_NORMAL, SEQ_PLANE_DEPTH};
+    struct pt_cli *cli = into;
+    char word[16];
+    for (size_t n;; value += n + 1) {
+        n = strcspn(value, ",");
+        for (size_t i = 0; i < sizeof word; i++)
+            word[i] = i < n ? (char)(value[i] >= 'A' && value[i] <= 'Z' ? value[i] - 'A' + 'a' : value[i]) : '\0';
+        const int i = n < sizeof word ? base_word_index(names, word, n) : -1;
+        if (i < 0)
+            return expected(err, "a list of color, half, moment2, albedo, normal, depth");
+        cli->sequence.planes |= 1u << planes[i];
         if (value[n] == '\0')
             return 0;
     }
@@ -388,14 +409,19 @@ const struct base_option pt_cli_options[] = {
     {"explain", 0, NULL, TO(action), PT_CLI_EXPLAIN,
      .help = "Print the scene's effects, why, and the kernel chosen, and exit"},
     {"debug-path", 0, "X,Y,SAMPLE", .set = set_debug_path, .help = "Print one path vertex by vertex, and exit"},
-    {.help = "Recording block sequences (for training and evaluation):"},
+    {.help = "Recording (for training and evaluation):"},
     {"sequence", 0, "DIR", TO(sequence.directory),
      .help = "Record blocks at rising sample counts into DIR; run again to go on"},
+    {"planes", 0, "LIST", .set = set_planes,
+     .help = "Record whole frames, with these planes as a criterion is shown them (color, half, moment2, albedo, normal, "
+             "depth; what the criterion reads always): all blocks at --levels, or without them each at the looks of the "
+             "criterion until it stops"},
+    {"past-stops", 0, NULL, TO(sequence.past_stops), .help = "Of whole frames: stopped blocks go on to --spp-max"},
     {"levels", 0, "KIND:FIRST:LAST:STEP", TO(sequence.levels),
      .help = "geometric:20:10000:1.15 (default) or linear:20:10000:20"},
     {"blocks", 0, "LIST", TO(sequence.blocks), .help = "Only these blocks, e.g. 0,3,8-11"},
     {"reference-spp", 0, "N", TO(sequence.reference_spp), 0, INT32_MAX,
-     .help = "Samples of the reference, which are independent (default 0: no reference)"},
+     .help = "Samples of the reference, or of a whole frame's two, which are independent (default 0: no reference)"},
     {"name", 0, "SCENE[/VIEW]", TO(sequence.name), .help = "Scene and view in the manifest (default: by the file's name)"},
     {"order-seed", 0, "N", TO(render.order_seed), 0, UINT32_MAX, .hidden = 1, .help = ""},
     {0}};

@@ -231,7 +231,7 @@ static int identify(struct pt_open *o, struct base_err *err)
 int pt_open_frame(struct pt_open *o, struct job *job, struct base_err *err)
 {
     const struct pt_cli *cli = o->cli;
-    const int records = cli->action == PT_CLI_SEQUENCE;
+    const int records = cli->action == PT_CLI_SEQUENCE, looks = cli->sequence.planes && !cli->sequence.levels;
     struct pt_render_config *c = &o->config;
     c->job = job_rank(job) == 0 ? job : NULL;
     if (c->crop[2] > c->width || c->crop[3] > c->height)
@@ -239,7 +239,7 @@ int pt_open_frame(struct pt_open *o, struct job *job, struct base_err *err)
                          c->crop[2], c->crop[3], c->width, c->height);
     o->params = cli->params;
     int rc = open_denoiser(o, err);
-    if (!rc && (cli->criterion || !(records || c->uniform)))
+    if (!rc && (cli->criterion || looks || !(records || c->uniform)))
         rc = open_criterion(o, err);
     if (!rc && cli->shot.table)
         rc = base_inputs_add(&o->judging, cli->shot.table, err);

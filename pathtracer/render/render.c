@@ -40,18 +40,23 @@ static int allocate_work(struct pt_render *r, struct base_err *err)
     return all ? 0 : base_fail_nomem(err, "work list");
 }
 
+uint32_t pt_render_flags(const struct pt_render_config *c)
+{
+    /* what hangs on the clock is decided otherwise the next time */
+    const int deterministic = c->time_budget_s <= 0.0 && c->max_check_overhead <= 0.0;
+    const int independent = c->integrator.sampler == PT_SAMPLER_INDEPENDENT;
+    return LULL_HOST_HALF_KNOWN | LULL_HOST_OPEN_ENDED | (c->uniform ? LULL_HOST_UNIFORM : 0) |
+           (deterministic ? LULL_FRAME_DETERMINISTIC : 0) | (independent ? LULL_FRAME_INDEPENDENT : 0);
+}
+
 /* film_planes: PT_FILM_* of its film. */
 static int begin_frame(struct pt_render *r, uint32_t film_planes, struct base_err *err)
 {
     const struct pt_render_config *c = &r->config;
     struct lull_error e = {.struct_size = sizeof e};
-    /* what hangs on the clock is decided otherwise the next time */
-    int deterministic = c->time_budget_s <= 0.0 && c->max_check_overhead <= 0.0;
-    int independent = c->integrator.sampler == PT_SAMPLER_INDEPENDENT;
     struct lull_host_config config = {
         .struct_size = sizeof config,
-        .flags = LULL_HOST_HALF_KNOWN | LULL_HOST_OPEN_ENDED | (c->uniform ? LULL_HOST_UNIFORM : 0) |
-                 (deterministic ? LULL_FRAME_DETERMINISTIC : 0) | (independent ? LULL_FRAME_INDEPENDENT : 0),
+        .flags = pt_render_flags(c),
         .width = (uint32_t)c->width,
         .height = (uint32_t)c->height,
         .block_width = (uint32_t)c->block_width,
@@ -330,16 +335,19 @@ static void ask(struct pt_render *r, uint32_t count, const struct pt_render_hook
 }
 
 /* All active blocks are at their next check. */
-static void check(struct pt_render *r, const struct pt_render_hooks *hooks)
+static int check(struct pt_render *r, const struct pt_render_hooks *hooks, struct base_err *err)
 {
     struct pt_render_work *w = &r->work;
     const uint32_t n = lull_host_due(r->frame, w->due, w->final);
     if (n == 0)
-        return;
+        return 0;
     ask(r, n, hooks);
     if (hooks->quote)
         lull_host_quote_ask(hooks->quote, &r->shown.view, w->due, n);
-    lull_host_apply(r->frame, w->due, n, w->decisions);
+    const int rc = hooks->looked ? hooks->looked(hooks->data, r, n, err) : 0;
+    if (!rc)
+        lull_host_apply(r->frame, w->due, n, w->decisions);
+    return rc;
 }
 
 static int suspend(struct pt_render *r, const struct pt_render_hooks *hooks, int reason, struct base_err *err)
@@ -390,15 +398,18 @@ static void keep(struct pt_render *r, const struct pt_render_hooks *hooks, enum 
 }
 
 /* The wave is sampled: asks about its blocks. */
-static void end_wave(struct pt_render *r, const struct pt_render_hooks *hooks, enum kept *kept, struct base_err *err)
+static int end_wave(struct pt_render *r, const struct pt_render_hooks *hooks, enum kept *kept, struct base_err *err)
 {
     if (is_whole(r))
         keep(r, hooks, kept, err);
-    check(r, hooks);
+    const int rc = check(r, hooks, err);
+    if (rc)
+        return rc;
     if (r->config.max_seam >= 1.0)
         lull_host_reopen(r->blocks, r->config.max_seam);
     if (lull_host_active(r->blocks) > 0 && *kept == KEPT)
         *kept = NOT_KEPT;
+    return 0;
 }
 
 int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
@@ -416,7 +427,8 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
                 *outcome = PT_RENDER_PILOT;
                 break;
             }
-            end_wave(r, hooks, &kept, err);
+            if ((rc = end_wave(r, hooks, &kept, err)) != 0)
+                break;
             continue;
         }
         if (given_up < 0) {
@@ -449,7 +461,7 @@ int pt_render_run(struct pt_render *r, const struct pt_render_hooks *hooks, enum
 int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_hooks *hooks, int *stopped,
                       struct base_err *err)
 {
-    for (uint32_t i = 0; i < r->blocks->count; i++)
+    for (uint32_t i = 0; i < r->blocks->count && spp > 0; i++)
         r->blocks->list[i].next_spp = spp;
     for (;;) {
         int more = 0, rc = slice(r, &more, err);
@@ -465,14 +477,19 @@ int pt_render_advance(struct pt_render *r, uint64_t spp, const struct pt_render_
     }
 }
 
-void pt_render_judge(struct pt_render *r, const struct pt_render_hooks *hooks)
+uint32_t pt_render_judge(struct pt_render *r, const struct pt_render_hooks *hooks)
 {
-    if (!r->criterion)
-        return;
+    uint32_t n = 0;
     for (uint32_t i = 0; i < r->blocks->count; i++) {
-        r->work.due[i] = i;
-        r->work.final[i] = 0;
+        const struct lull_host_block *b = &r->blocks->list[i];
+        if (b->asked && b->asked_spp == b->spp)
+            continue;
+        r->work.due[n] = i;
+        r->work.final[n++] = 0;
     }
-    ask(r, r->blocks->count, hooks);
-    lull_host_note(r->frame, r->work.due, r->blocks->count, r->work.decisions);
+    if (r->criterion && n > 0) {
+        ask(r, n, hooks);
+        lull_host_note(r->frame, r->work.due, n, r->work.decisions);
+    }
+    return n;
 }

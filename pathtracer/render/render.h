@@ -88,6 +88,9 @@ struct pt_render_hooks {
     int (*slice)(void *data, struct pt_render *render, struct base_err *err);
     /* Asked about the blocks of each check after the criterion, before they are stopped or scheduled. May be NULL. */
     struct lull_host_quote *quote;
+    /* Then told of the criterion's answers about blocks render->work.due[0 … count); a negative code ends pt_render_run with
+     * it. May be NULL. */
+    int (*looked)(void *data, struct pt_render *render, uint32_t count, struct base_err *err);
     /* Not 0: end after this slice. May be NULL. */
     const volatile sig_atomic_t *interrupted;
     /* Called before the blocks still active are closed for a limit or an interrupt, or when none is left, while everything
@@ -122,11 +125,16 @@ void pt_render_go_on(struct pt_render *render, unsigned others, uint64_t first_s
 int pt_render_run(struct pt_render *render, const struct pt_render_hooks *hooks, enum pt_render_outcome *outcome,
                   struct base_err *err);
 
-/* For recording: samples every block up to spp, without checks; *stopped is set when *interrupted was before. */
+/* For recording: samples every block up to spp (0: each to its own next_spp), without checks; *stopped is set when
+ * *interrupted was before. */
 int pt_render_advance(struct pt_render *render, uint64_t spp, const struct pt_render_hooks *hooks, int *stopped,
                       struct base_err *err);
-/* Asks the criterion, if there is one, about every block as it is and notes the answers; nothing is stopped. */
-void pt_render_judge(struct pt_render *render, const struct pt_render_hooks *hooks);
+/* Lists every block that has not been asked about with these samples in work.due, asks the criterion, if there is one, and
+ * notes the answers, which are in work.decisions; nothing is stopped. Returns how many. */
+uint32_t pt_render_judge(struct pt_render *render, const struct pt_render_hooks *hooks);
+
+/* LULL_HOST_ and LULL_FRAME_ of such a frame. */
+uint32_t pt_render_flags(const struct pt_render_config *config);
 
 int pt_render_threads(const struct pt_render *render); /* that sample, those of workers too */
 

@@ -16,9 +16,9 @@
 #include "sequence/tail.h"
 #include "scene/scene.h"
 
-/* Seeds of levels and reference differ in these bits: no sample is shared, and the reference of one seed is not the input of
- * the next. */
-static const uint32_t REFERENCE_SEED_BITS = 0x5bd1e995u;
+/* Seeds of levels and references differ in these bits: no sample is shared, and the reference of one seed is not the input
+ * of the next. */
+static const uint32_t REFERENCE_SEED_BITS[] = {0x5bd1e995u, 0x9e3779b1u};
 /* The one level whose pixels are kept as half floats, from which other sample counts can be simulated. */
 enum { FULL_LEVEL_SPP = 320 };
 
@@ -89,17 +89,17 @@ static void name_view(const struct pt_sequence_config *c, char *scene, char *vie
     }
 }
 
-static void describe(struct recorder *r)
+uint32_t pt_sequence_reference_seed(uint32_t seed, int index) { return seed ^ REFERENCE_SEED_BITS[index]; }
+
+void pt_sequence_describe(const struct pt_sequence_config *c, const struct pt_scene *scene, struct seq_manifest *m)
 {
-    const struct pt_sequence_config *c = r->config;
     const struct pt_integrator *i = &c->render.integrator;
-    struct seq_manifest *m = &r->manifest;
     name_view(c, m->scene, m->camera, sizeof m->scene);
     snprintf(m->source, sizeof m->source, "%s", c->scene_path);
     snprintf(m->renderer, sizeof m->renderer,
              "lull-render " BASE_VERSION ", %s sampler, %s, filter %s %g, max depth %d, clamp %g%s",
              pt_sampler_words[i->sampler], pt_strategy_words[i->strategy], pt_filter_words[i->filter], (double)i->filter_x,
-             i->max_depth, (double)i->max_component, r->scene->light_tree ? ", light hierarchy" : "");
+             i->max_depth, (double)i->max_component, scene->light_tree ? ", light hierarchy" : "");
     m->source_crc32 = c->scene_crc;
     m->inputs_crc32 = c->inputs_crc;
     m->has_look_at = c->view.has_look_at;
@@ -108,25 +108,31 @@ static void describe(struct recorder *r)
     m->fov_deg = fmax(c->view.fov_deg, 0.0);
     m->width = (uint32_t)c->render.width;
     m->height = (uint32_t)c->render.height;
-    m->block = (uint32_t)c->render.block_width;
     m->seed = i->seed;
-    m->reference_seed = i->seed ^ REFERENCE_SEED_BITS;
+    m->reference_seed = pt_sequence_reference_seed(i->seed, 0);
     m->reference_spp = (uint32_t)c->reference_spp;
     m->reference_independent = 1;
 }
 
-static int compare(const struct recorder *r, const char *path, const struct seq_manifest *old, struct base_err *err)
+int pt_sequence_same(const struct base_identity *ours, const struct base_identity *theirs, const char *path,
+                     struct base_err *err)
 {
     static const struct base_identity_words words = {": begun with", ": begun without", "this render"};
-    struct base_identity ours = {0}, theirs = {0};
     struct base_err why = {0};
+    int rc = base_identity_check(ours, err);
+    if (!rc)
+        rc = base_identity_check(theirs, err);
+    if (!rc && base_identity_compare(ours, theirs->text, theirs->size, path, &words, NULL, &why) != 0)
+        rc = base_fail(err, why.code, "%s; use another folder", why.text);
+    return rc;
+}
+
+static int compare(const struct recorder *r, const char *path, const struct seq_manifest *old, struct base_err *err)
+{
+    struct base_identity ours = {0}, theirs = {0};
     seq_manifest_identity(&r->manifest, &ours);
     seq_manifest_identity(old, &theirs);
-    int rc = base_identity_check(&ours, err);
-    if (!rc)
-        rc = base_identity_check(&theirs, err);
-    if (!rc && base_identity_compare(&ours, theirs.text, theirs.size, path, &words, NULL, &why) != 0)
-        rc = base_fail(err, why.code, "%s; use another folder", why.text);
+    const int rc = pt_sequence_same(&ours, &theirs, path, err);
     base_identity_release(&ours);
     base_identity_release(&theirs);
     return rc;
@@ -344,7 +350,8 @@ static int prepare(struct recorder *r, struct base_err *err)
         memset(r->chosen, 1, r->grid->count);
     else if ((rc = pt_sequence_choose(r->config->blocks, r->chosen, r->grid->count, err)) != 0)
         return rc;
-    describe(r);
+    pt_sequence_describe(r->config, r->scene, &r->manifest);
+    r->manifest.block = (uint32_t)c->block_width;
     rc = base_make_folder(r->config->directory, NULL, err);
     if (!rc)
         rc = base_lock_folder(&r->lock, r->config->directory, err);

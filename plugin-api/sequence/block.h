@@ -12,28 +12,9 @@
 #include <stdint.h>
 
 #include "base/err.h"
-#include "sequence/planes.h"
+#include "sequence/record.h"
 
-enum { SEQ_MAX_SIDE = 4096, SEQ_MAX_RECORDS = 4096, SEQ_MAX_PLANES = 16, SEQ_MAX_STATS = 64, SEQ_NAME = 24 };
-/* Bytes of the parts of a file. */
-enum { SEQ_FILE_HEADER = 64, SEQ_RECORD_HEADER = 32, SEQ_STAT_BYTES = SEQ_NAME + 8, SEQ_PLANE_HEADER = 16 };
-
-struct seq_stat {
-    char name[SEQ_NAME];
-    double value;
-};
-
-struct seq_plane { /* borrows from the block's bytes */
-    uint32_t plane, filter, raw_bytes, stored_bytes;
-    const uint8_t *stored;
-};
-
-struct seq_record { /* a level, or the reference */
-    uint32_t spp, half_spp;
-    uint32_t n_planes, n_stats;
-    struct seq_plane planes[SEQ_MAX_PLANES];
-    const uint8_t *stats; /* borrows, as planes do; seq_stat reads them */
-};
+enum { SEQ_MAX_SIDE = 4096, SEQ_MAX_RECORDS = 4096 };
 
 struct seq_block {
     uint32_t width, height, id;
@@ -61,22 +42,12 @@ int seq_mean_luminance(const struct seq_block *b, const struct seq_record *r, fl
 /* Linear half-buffer difference D: luminance from HALF_F16 or HALF_LOG; all channels from HALF_F16 only. */
 int seq_half_luminance(const struct seq_block *b, const struct seq_record *r, float *y /* [P] */, struct base_err *err);
 int seq_half(const struct seq_block *b, const struct seq_record *r, float *rgb /* [3][P] */, struct base_err *err);
-int seq_has(const struct seq_record *r, enum seq_plane_number plane);
 /* Is the half-buffer difference there, of all channels or of the luminance alone? */
 int seq_has_halves(const struct seq_record *r);
 /* The level whose half-buffer difference is of all channels; NULL: none. */
 const struct seq_record *seq_full_level(const struct seq_block *b);
-/* NaN when the record does not have the statistic. */
-double seq_stat(const struct seq_record *r, const char *name);
 /* The level with this spp, or NULL. */
 const struct seq_record *seq_level(const struct seq_block *b, uint32_t spp);
-
-/* A block that is written: built in memory, and then written whole. Not thread-safe per object. */
-struct seq_builder {
-    uint32_t width, height, n_records, has_reference;
-    uint8_t *bytes; /* owns */
-    size_t size, room;
-};
 
 struct seq_frame { /* what to add; NULL planes are left out; all borrowed during the call */
     uint32_t spp, half_spp;
@@ -91,8 +62,5 @@ int seq_builder_init(struct seq_builder *w, uint32_t width, uint32_t height, int
                      uint64_t seed, struct base_err *err);
 /* Levels in rising spp, the reference last. */
 int seq_builder_add(struct seq_builder *w, const struct seq_frame *frame, struct base_err *err);
-/* Writes the file atomically; *crc gets the CRC of the whole file. */
-int seq_builder_write(struct seq_builder *w, const char *path, uint32_t *crc, struct base_err *err);
-void seq_builder_release(struct seq_builder *w);
 
 #endif

@@ -12,6 +12,7 @@
 #include "base/files.h"
 #include "base/json.h"
 #include "base/list.h"
+#include "sequence/manifest_json.h"
 
 enum { MAX_TEXT = 1 << 26, MAX_BLOCKS = 1 << 20, MAX_SPP = INT32_MAX };
 
@@ -22,14 +23,13 @@ void seq_manifest_release(struct seq_manifest *m)
     *m = (struct seq_manifest){0};
 }
 
-/* Whether it is there and has room; else it is cut. */
-static int get_text(const cJSON *o, const char *name, char *out, size_t room)
+int seq_json_get_text(const cJSON *o, const char *name, char *out, size_t room)
 {
     const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
     return cJSON_IsString(v) && snprintf(out, room, "%s", v->valuestring) < (int)room;
 }
 
-static int get_u32(const cJSON *o, const char *name, double lo, double hi, uint32_t *out)
+int seq_json_get_u32(const cJSON *o, const char *name, double lo, double hi, uint32_t *out)
 {
     uint64_t value;
     if (!base_json_get_whole(o, name, lo, hi, &value))
@@ -38,8 +38,7 @@ static int get_u32(const cJSON *o, const char *name, double lo, double hi, uint3
     return 1;
 }
 
-/* Eight hex digits. */
-static int get_crc(const cJSON *o, const char *name, uint32_t *crc)
+int seq_json_get_crc(const cJSON *o, const char *name, uint32_t *crc)
 {
     const cJSON *v = cJSON_GetObjectItemCaseSensitive(o, name);
     unsigned value;
@@ -50,13 +49,14 @@ static int get_crc(const cJSON *o, const char *name, uint32_t *crc)
     return 1;
 }
 
-static int get_levels(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
+/* fewest: how many there are at least */
+static int get_levels(const char *path, const cJSON *root, int fewest, struct seq_manifest *m, struct base_err *err)
 {
     const cJSON *levels = cJSON_GetObjectItemCaseSensitive(root, "levels"), *v;
     int n = cJSON_GetArraySize(levels);
-    if (!cJSON_IsArray(levels) || n < 1 || n > SEQ_MAX_RECORDS)
+    if (!cJSON_IsArray(levels) || n < fewest || n > SEQ_MAX_RECORDS)
         return base_fail(err, BASE_EINVAL, "%s: no list of levels", path);
-    m->levels = malloc((size_t)n * sizeof *m->levels);
+    m->levels = malloc((n > 0 ? (size_t)n : 1) * sizeof *m->levels);
     if (!m->levels)
         return base_fail_nomem(err, path);
     cJSON_ArrayForEach (v, levels) {
@@ -72,12 +72,13 @@ static int get_block(const cJSON *o, const struct seq_manifest *m, struct seq_ma
 {
     *b = (struct seq_manifest_block){0};
     base_json_get(o, "seconds", -HUGE_VAL, HUGE_VAL, &b->seconds);
-    return get_u32(o, "id", 0, UINT32_MAX, &b->id) && get_u32(o, "x0", 0, m->width - 1.0, &b->x0) &&
-           get_u32(o, "y0", 0, m->height - 1.0, &b->y0) && get_u32(o, "x1", b->x0 + 1, m->width, &b->x1) &&
-           get_u32(o, "y1", b->y0 + 1, m->height, &b->y1) && base_json_get_whole(o, "bytes", 1, 1 << 30, &b->bytes) &&
+    return seq_json_get_u32(o, "id", 0, UINT32_MAX, &b->id) && seq_json_get_u32(o, "x0", 0, m->width - 1.0, &b->x0) &&
+           seq_json_get_u32(o, "y0", 0, m->height - 1.0, &b->y0) && seq_json_get_u32(o, "x1", b->x0 + 1, m->width, &b->x1) &&
+           seq_json_get_u32(o, "y1", b->y0 + 1, m->height, &b->y1) &&
+           base_json_get_whole(o, "bytes", 1, 1 << 30, &b->bytes) &&
            (!cJSON_HasObjectItem(o, "dropped") || base_json_get_whole(o, "dropped", 0, 1e15, &b->dropped)) &&
-           get_crc(o, "crc32", &b->crc32) && get_text(o, "file", b->file, sizeof b->file) && b->file[0] != '\0' &&
-           b->file[0] != '.' && !strchr(b->file, '/');
+           seq_json_get_crc(o, "crc32", &b->crc32) && seq_json_get_text(o, "file", b->file, sizeof b->file) &&
+           b->file[0] != '\0' && b->file[0] != '.' && !strchr(b->file, '/');
 }
 
 static int get_blocks(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
@@ -120,37 +121,46 @@ static int get_view(const char *path, const cJSON *root, struct seq_manifest *m,
 
 static int get_sizes(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
 {
-    if (!get_u32(root, "width", 1, 1 << 20, &m->width) || !get_u32(root, "height", 1, 1 << 20, &m->height) ||
-        !get_u32(root, "block", 1, SEQ_MAX_SIDE, &m->block))
+    if (!seq_json_get_u32(root, "width", 1, 1 << 20, &m->width) || !seq_json_get_u32(root, "height", 1, 1 << 20, &m->height))
         return base_fail(err, BASE_EINVAL, "%s: width, height or block is missing or out of range", path);
-    get_u32(root, "reference_spp", 0, MAX_SPP, &m->reference_spp);
+    seq_json_get_u32(root, "reference_spp", 0, MAX_SPP, &m->reference_spp);
     base_json_get_whole(root, "seed", 0, 0x1p64, &m->seed); /* seeds of other programs reach 2^64 */
     base_json_get_whole(root, "reference_seed", 0, 0x1p64, &m->reference_seed);
     m->reference_independent = !cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(root, "reference_independent"));
     return 0;
 }
 
-static int get_all(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
+int seq_json_get_head(const char *path, const cJSON *root, unsigned version, struct seq_manifest *m, struct base_err *err)
 {
+    static const char *const is[] = {"", "blocks alone", "looks at a whole frame"};
     const cJSON *format = cJSON_GetObjectItemCaseSensitive(root, "format");
-    uint64_t version;
+    uint64_t found;
     if (!cJSON_IsString(format) || strcmp(format->valuestring, "lull-sequence") != 0)
         return base_fail(err, BASE_EINVAL, "%s: not the manifest of a sequence", path);
-    if (!base_json_get_whole(root, "version", 1, 1, &version))
+    if (!base_json_get_whole(root, "version", 1, 2, &found))
         return base_fail(err, BASE_EINVAL, "%s: this version of the format is not known", path);
-    get_text(root, "scene", m->scene, sizeof m->scene);
-    get_text(root, "source", m->source, sizeof m->source);
-    get_text(root, "camera", m->camera, sizeof m->camera);
-    get_text(root, "renderer", m->renderer, sizeof m->renderer);
-    get_crc(root, "source_crc32", &m->source_crc32);
-    get_crc(root, "inputs_crc32", &m->inputs_crc32);
+    if (found != version)
+        return base_fail(err, BASE_EINVAL, "%s: %s (version %d of the format), expected %s (version %u)", path, is[found],
+                         (int)found, is[version], version);
+    seq_json_get_text(root, "scene", m->scene, sizeof m->scene);
+    seq_json_get_text(root, "source", m->source, sizeof m->source);
+    seq_json_get_text(root, "camera", m->camera, sizeof m->camera);
+    seq_json_get_text(root, "renderer", m->renderer, sizeof m->renderer);
+    seq_json_get_crc(root, "source_crc32", &m->source_crc32);
+    seq_json_get_crc(root, "inputs_crc32", &m->inputs_crc32);
     if (m->scene[0] == '\0')
         return base_fail(err, BASE_EINVAL, "%s: the scene has no name", path);
     int rc = get_sizes(path, root, m, err);
     if (!rc)
         rc = get_view(path, root, m, err);
-    if (!rc)
-        rc = get_levels(path, root, m, err);
+    return rc ? rc : get_levels(path, root, version == 1, m, err);
+}
+
+static int get_all(const char *path, const cJSON *root, struct seq_manifest *m, struct base_err *err)
+{
+    int rc = seq_json_get_head(path, root, 1, m, err);
+    if (!rc && !seq_json_get_u32(root, "block", 1, SEQ_MAX_SIDE, &m->block))
+        rc = base_fail(err, BASE_EINVAL, "%s: width, height or block is missing or out of range", path);
     return !rc ? get_blocks(path, root, m, err) : rc;
 }
 
@@ -181,7 +191,7 @@ int seq_manifest_read(const char *dir, struct seq_manifest *m, struct base_err *
     return rc;
 }
 
-static void put_crc(cJSON *to, const char *name, uint32_t crc, int *failed)
+void seq_json_put_crc(cJSON *to, const char *name, uint32_t crc, int *failed)
 {
     char text[16];
     snprintf(text, sizeof text, "%08x", crc);
@@ -198,23 +208,23 @@ static void put_block(cJSON *blocks, const struct seq_manifest_block *b, int *fa
     base_json_number(o, "y1", b->y1, failed);
     base_json_text(o, "file", b->file, failed);
     base_json_number(o, "bytes", (double)b->bytes, failed);
-    put_crc(o, "crc32", b->crc32, failed);
+    seq_json_put_crc(o, "crc32", b->crc32, failed);
     if (b->seconds > 0)
         base_json_number(o, "seconds", b->seconds, failed);
     if (b->dropped > 0)
         base_json_number(o, "dropped", (double)b->dropped, failed);
 }
 
-static void put_all(cJSON *root, const struct seq_manifest *m, int *failed)
+void seq_json_put_head(cJSON *root, int version, const struct seq_manifest *m, int *failed)
 {
     base_json_text(root, "format", "lull-sequence", failed);
-    base_json_number(root, "version", 1, failed);
+    base_json_number(root, "version", version, failed);
     base_json_text(root, "scene", m->scene, failed);
     base_json_text(root, "source", m->source, failed);
     if (m->source_crc32)
-        put_crc(root, "source_crc32", m->source_crc32, failed);
+        seq_json_put_crc(root, "source_crc32", m->source_crc32, failed);
     if (m->inputs_crc32)
-        put_crc(root, "inputs_crc32", m->inputs_crc32, failed);
+        seq_json_put_crc(root, "inputs_crc32", m->inputs_crc32, failed);
     base_json_text(root, "camera", m->camera, failed);
     if (m->has_look_at)
         base_json_numbers(root, "look_at", m->look_at, 9, failed);
@@ -223,7 +233,8 @@ static void put_all(cJSON *root, const struct seq_manifest *m, int *failed)
     base_json_text(root, "renderer", m->renderer, failed);
     base_json_number(root, "width", m->width, failed);
     base_json_number(root, "height", m->height, failed);
-    base_json_number(root, "block", m->block, failed);
+    if (m->block > 0)
+        base_json_number(root, "block", m->block, failed);
     base_json_number(root, "seed", (double)m->seed, failed);
     base_json_number(root, "reference_seed", (double)m->reference_seed, failed);
     base_json_number(root, "reference_spp", m->reference_spp, failed);
@@ -232,6 +243,11 @@ static void put_all(cJSON *root, const struct seq_manifest *m, int *failed)
     cJSON *levels = base_json_array(root, "levels", failed);
     for (uint32_t i = 0; i < m->n_levels; i++)
         base_json_number(levels, NULL, m->levels[i], failed);
+}
+
+static void put_all(cJSON *root, const struct seq_manifest *m, int *failed)
+{
+    seq_json_put_head(root, 1, m, failed);
     cJSON *blocks = base_json_array(root, "blocks", failed);
     for (uint32_t i = 0; i < m->n_blocks; i++)
         put_block(blocks, &m->blocks[i], failed);

@@ -16,8 +16,27 @@ static const struct {
     [SEQ_PLANE_HALF_LOG] = {1, 0},
     [SEQ_PLANE_MEAN_F16] = {6, SEQ_FILTER_SHUFFLE},
     [SEQ_PLANE_HALF_F16] = {6, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_COLOR] = {12, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_WEIGHT] = {4, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_SPP] = {4, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_MOMENT2] = {4, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_HALF] = {12, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_ALBEDO] = {12, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_NORMAL] = {12, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_DEPTH] = {4, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_DROPPED] = {4, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_DROPPED_HALF] = {4, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_REST] = {12, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_DENOISED] = {12, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_DENOISED_HALF] = {12, SEQ_FILTER_SHUFFLE},
+    [SEQ_PLANE_DENOISED_REST] = {12, SEQ_FILTER_SHUFFLE},
 };
 enum { PLANES = sizeof planes / sizeof *planes };
+
+uint32_t seq_plane_channels(uint32_t plane)
+{
+    return plane < PLANES && plane >= SEQ_PLANE_COLOR ? planes[plane].bytes / (uint32_t)sizeof(float) : 0;
+}
 
 size_t seq_plane_raw_bytes(uint32_t plane, uint32_t width, uint32_t height)
 {
@@ -26,20 +45,20 @@ size_t seq_plane_raw_bytes(uint32_t plane, uint32_t width, uint32_t height)
 
 uint32_t seq_plane_filters(uint32_t plane) { return plane < PLANES ? planes[plane].filters : 0; }
 
-/* Little-endian 16-bit values <-> all low bytes, then all high bytes. */
-static int shuffle(uint8_t *data, size_t bytes, int undo, struct base_err *err)
+/* Little-endian values of `size` bytes <-> all lowest bytes first, all highest last. */
+static int shuffle(uint8_t *data, size_t bytes, size_t size, int undo, struct base_err *err)
 {
     uint8_t *copy = malloc(bytes);
     if (!copy)
         return base_fail_nomem(err, "plane");
     memcpy(copy, data, bytes);
-    size_t n = bytes / 2;
-    for (size_t i = 0; i < n; i++)
-        for (size_t k = 0; k < 2; k++) {
+    const size_t n = bytes / size;
+    for (size_t k = 0; k < size; k++)
+        for (size_t i = 0; i < n; i++) {
             if (undo)
-                data[2 * i + k] = copy[k * n + i];
+                data[size * i + k] = copy[k * n + i];
             else
-                data[k * n + i] = copy[2 * i + k];
+                data[k * n + i] = copy[size * i + k];
         }
     free(copy);
     return 0;
@@ -78,7 +97,8 @@ int seq_plane_filter(uint32_t plane, uint32_t filter, uint8_t *data, uint32_t wi
     if ((filter & ~seq_plane_filters(plane)) != 0)
         return base_fail(err, BASE_EINVAL, "filter %u does not fit plane %u", filter, plane);
     if (filter & SEQ_FILTER_SHUFFLE)
-        return shuffle(data, seq_plane_raw_bytes(plane, width, height), undo, err);
+        return shuffle(data, seq_plane_raw_bytes(plane, width, height),
+                       seq_plane_channels(plane) ? sizeof(float) : sizeof(uint16_t), undo, err);
     if ((filter & SEQ_FILTER_GREEN) && !undo)
         green(data, pixels, 0);
     for (size_t c = 0; c < 3 && (filter & SEQ_FILTER_AVERAGE); c++)

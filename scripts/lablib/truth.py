@@ -1,15 +1,12 @@
 """Holds what criteria believe against references: how many of the blocks that they stop are truly off.
 
-Each scene is rendered with default settings, its planes kept look by look (tests/abi/plugins/planes.c), with several seeds, and twice
-more with other seeds as references. The criteria themselves are then asked about these looks, in blocks of several sizes, as a
-renderer asks them; a block that was stopped keeps its samples. True errors are those of the model observer against both references,
+Each scene is recorded with default settings as a whole frame (lull-render --sequence DIR --planes), with several seeds, the first one with
+two references. The criteria themselves are then asked about these looks, in blocks of several sizes, as a renderer asks them
+(lull.replay); a block that was stopped keeps its samples. True errors are those of the model observer against both references,
 whose own noise is taken out (scripts/lablib/law.py). Interrupted, the same command goes on. Needs numpy (python3-numpy)."""
 import functools
-import glob
 import math
 import os
-import shutil
-import struct
 import sys
 
 from lablib import tool
@@ -19,13 +16,12 @@ SOURCES = PICTURES + OBSERVER + NETWORK + EXAMPLES
 SCENES = ("chess glossy soft-shadow cornell-box office museum judge/rare-lamps brick-yard gallery candles kitchen judge/rare-beads "
           "garage bathroom gems night-street judge/rare-foil panes corridor glass-shelf").split()
 RARE = ("rare-", "candles", "gems", "night-street", "glass-shelf")  # scenes whose noise is made by few bright paths
-REFERENCES = (101, 102)
 SIZES = (200, 100, 32)
 CRITERIA = ("observer", "ggn", "halfbuf", "variance")
 OFF = (1.05, 1.12, 1.5)
 ENOUGH = 0.93  # true error at which a block could have been stopped
-PLANES = (("color", 3), ("half", 3), ("albedo", 3), ("normal", 3), ("moment2", 1))
-KEEPER = os.path.join(tool.BUILD, "tests", "abi", "plugins", "planes.so")
+PLANES = "color,half,albedo,normal,moment2"
+LEVELS = "geometric:16:%d:1.19"
 
 
 def options(parser):
@@ -52,48 +48,30 @@ def name_of(scene):
     return os.path.splitext(os.path.basename(scene))[0]
 
 
-def record(o, scene, seed, spp, *uniform):
-    """The folder of one render's looks; None: it is not there and must not be made."""
-    folder = os.path.join(o.work, "%s-%d" % (name_of(scene), o.size), "%d-%d" % (seed, spp))
-    if os.path.exists(folder):
-        return folder
-    if o.recorded:
+def record(o, scene, seed):
+    """The recording of one seed; None: it is not whole and must not be made."""
+    import lull.recording
+    folder = os.path.join(o.work, "%s-%d" % (name_of(scene), o.size), "%d-%d" % (seed, o.spp))
+    references = ["--reference-spp", o.reference_spp] if seed == 1 else []
+    if not o.recorded:
+        file = scene if scene.endswith(".pbrt") else os.path.join(tool.ROOT, "scenes", scene + ".pbrt")
+        os.makedirs(folder, exist_ok=True)
+        tool.run(tool.RENDER, "-q", file, "--size", "%dx%d" % (o.size, o.size), "--block", o.size, "-t", o.threads, "--seed", seed,
+                 "--levels", LEVELS % o.spp, "--planes", PLANES, "--sequence", folder, *references)
+    elif not os.path.exists(os.path.join(folder, "manifest.json")):
         return None
-    file = scene if scene.endswith(".pbrt") else os.path.join(tool.ROOT, "scenes", scene + ".pbrt")
-    part = folder + ".part"
-    shutil.rmtree(part, ignore_errors=True)
-    os.makedirs(part)
-    tool.run(tool.RENDER, "-q", file, "--size", "%dx%d" % (o.size, o.size), "--block", o.size, "-c", KEEPER, "-t", o.threads, "--seed", seed,
-             *(uniform or ("--spp-max",)), spp, "--report", os.path.join(part, "report.json"), env={"LULL_PLANES": part})
-    os.replace(part, folder)
-    print("%s: seed %d, %d samples" % (name_of(scene), seed, spp), file=sys.stderr, flush=True)
-    return folder
-
-
-def looks_of(folder):
-    """Each look of a recording: samples, samples in the half, planes by name."""
-    import numpy as np
-    for path in sorted(glob.glob(os.path.join(folder, "0-*.planes"))):
-        with open(path, "rb") as file:
-            data = file.read()
-        if data[:8] != b"LULLPLN1":
-            raise tool.Refused("%s: not a look" % path)
-        width, height, spp, half_spp = struct.unpack("<4I", data[8:24])
-        values, at, planes = np.frombuffer(data, "<f4", offset=24).reshape(-1, height, width), 0, {}
-        for name, channels in PLANES:
-            planes[name] = np.ascontiguousarray(values[at:at + channels].transpose(1, 2, 0))
-            at += channels
-        yield spp, half_spp, planes
+    recording = lull.recording.read(folder)
+    return recording if recording.finished and len(recording.references) == (2 if seed == 1 else 0) else None
 
 
 # --- judging --------------------------------------------------------------------------------------------------------------
 
 
 class Reference:
-    def __init__(self, *folders):
+    def __init__(self, pictures):
         from lablib import law
         self.law = law
-        self.pictures = [law.lightness(list(looks_of(folder))[-1][2]["color"]) for folder in folders]
+        self.pictures = [law.lightness(picture) for picture in pictures]
 
     def error(self, lightness, rect):
         """True error of a block, in units of what is just seen."""
@@ -101,52 +79,37 @@ class Reference:
         return self.law.true(*cut, self.law.texture(*cut[1:])) / tool.observer()["level"]
 
 
-def replay(lull, name, looks, size, block, errors):
-    """[(samples at its stop or 0, true error there, samples from which it was low enough or 0)] of each block. errors(rect): of each
-    look, [(samples, true error)]."""
-    import numpy as np
+def replay(lull, name, recording, block, errors):
+    """[(samples at its stop or 0, true error there, samples from which it was low enough or 0)] of each block, but narrow ones at the
+    edges. errors(rect): of each look, [(samples, true error)]."""
+    import lull.replay
     criterion, _, parameter = name.partition(":")
     pairs = dict([parameter.split("=")]) if parameter else {}
-    size -= size % block  # no narrow blocks at the edges
-    frame = lull.HostFrame(lull.load(criterion, threads=1, log=lambda *_: None, **pairs), size, size, [p for p, _ in PLANES], block=block,
-                           spp_max=1 << 30)
-    shown = {p: np.zeros((size, size, c), np.float32) for p, c in PLANES}
-    next_spp, stopped = [0] * len(frame.blocks), {}
-    for spp, half_spp, planes in looks:
-        for i, b in enumerate(frame.blocks):
-            if i not in stopped:
-                b.spp, b.half_spp = spp, half_spp
-                for p in shown:
-                    shown[p][b.y0:b.y1, b.x0:b.x1] = planes[p][b.y0:b.y1, b.x0:b.x1]
-        due = [i for i in range(len(frame.blocks)) if i not in stopped and spp >= next_spp[i]]
-        for i, d in zip(due, frame.evaluate(due, {p: lull.Plane(a) for p, a in shown.items()})):
-            next_spp[i] = d.next_spp
-            if d.action == 1:
-                stopped[i] = spp
+    asked = lull.replay.Replay(recording, lull.load(criterion, threads=1, log=lambda *_: None, **pairs), block=block)
+    rects = [b.rect for b in asked.frame.blocks]
     found = []
-    for i, b in enumerate(frame.blocks):
-        of = errors(b.rect)
-        low = [k for k in range(len(of)) if all(e <= ENOUGH for _, e in of[k:])]
-        found.append((stopped.get(i, 0), dict(of).get(stopped.get(i), math.nan), of[low[0]][0] if low else 0))
+    for rect, stop in zip(rects, asked.run().stops):
+        if rect.width == rect.height == block:
+            of = errors(rect)
+            low = [k for k in range(len(of)) if all(e <= ENOUGH for _, e in of[k:])]
+            found.append((stop, dict(of).get(stop, math.nan), of[low[0]][0] if low else 0))
     return found
 
 
 def judge(o, scene):
     """{"criterion size": [[stop, error, enough] of each block and seed]}; None: not recorded."""
-    folders = [record(o, scene, seed, o.spp) for seed in range(1, o.seeds + 1)]
-    references = [record(o, scene, seed, o.reference_spp, "--spp") for seed in REFERENCES]
-    if not all(folders + references):
+    recordings = [record(o, scene, seed) for seed in range(1, o.seeds + 1)]
+    if not all(recordings):
         return None
     import lull
-    reference, found = Reference(*references), {}
-    for folder in folders:
-        looks = list(looks_of(folder))
-        light = [(spp, reference.law.lightness(planes["color"])) for spp, _, planes in looks]
+    reference, found = Reference(recordings[0].references), {}
+    for recording in recordings:
+        light = [(spp, reference.law.lightness(recording.planes(0, spp, ["color"])["color"])) for spp in recording.levels(0)]
         errors = functools.lru_cache(maxsize=None)(lambda rect: [(spp, reference.error(of, rect)) for spp, of in light])
         for name in o.criteria:
             for size in o.sizes:
                 try:
-                    found.setdefault("%s %d" % (name, size), []).extend(replay(lull, name, looks, o.size, size, errors))
+                    found.setdefault("%s %d" % (name, size), []).extend(replay(lull, name, recording, size, errors))
                 except lull.LullError as why:
                     raise tool.Refused(why) from why
     print("%s: judged" % name_of(scene), file=sys.stderr, flush=True)

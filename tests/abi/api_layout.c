@@ -117,6 +117,10 @@ LAYOUT(lull_host_report, F(lull_host_report, struct_size), F(lull_host_report, f
        F(lull_host_report, software), F(lull_host_report, processor), F(lull_host_report, command),
        F(lull_host_report, command_count), F(lull_host_report, phases), F(lull_host_report, phase_count));
 LAYOUT(lull_host_phase, F(lull_host_phase, name), F(lull_host_phase, seconds));
+LAYOUT(lull_host_simulation, F(lull_host_simulation, struct_size), F(lull_host_simulation, zero),
+       F(lull_host_simulation, pixels), F(lull_host_simulation, spp), F(lull_host_simulation, half_spp),
+       F(lull_host_simulation, to_spp), F(lull_host_simulation, rgb_to_xyz), F(lull_host_simulation, color),
+       F(lull_host_simulation, half), F(lull_host_simulation, moment2));
 LAYOUT(lull_host_layer, F(lull_host_layer, name), F(lull_host_layer, rgb));
 LAYOUT(lull_host_denoising, F(lull_host_denoising, struct_size), F(lull_host_denoising, flags),
        F(lull_host_denoising, threads), F(lull_host_denoising, zero), F(lull_host_denoising, library),
@@ -148,7 +152,7 @@ static const struct layout layouts[] = {
     ENTRY(lull_host_stop_at),   ENTRY(lull_host_forecast),  ENTRY(lull_host_sample),
     ENTRY(lull_host_report),    ENTRY(lull_host_denoising), ENTRY(lull_host_layer),
     ENTRY(lull_host_picture),   ENTRY(lull_host_output),    ENTRY(lull_host_quote_block),
-    ENTRY(lull_host_quote_row), ENTRY(lull_host_phase),
+    ENTRY(lull_host_quote_row), ENTRY(lull_host_phase),     ENTRY(lull_host_simulation),
 };
 enum { LAYOUTS = sizeof layouts / sizeof *layouts, OF_THE_ABI = 15 };
 

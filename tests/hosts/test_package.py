@@ -688,7 +688,7 @@ def test_mask():
 
 
 def test_exr():
-    """EXR files are read by others as written; uncompressed ones, of floats and halves, are read"""
+    """EXR files are read by others as written; uncompressed ones and those by ZIP, of floats and halves, are read"""
     rng = np.random.default_rng(3)
     channels = {name: rng.random((37, 23)).astype(np.float32) for name in ("R", "G", "B", "lull.spp.V")}
     channels["lull.spp.V"][:] = 64
@@ -702,11 +702,18 @@ def test_exr():
     assert origin == (5, 6) and all((stored[name] == plane).all() for name, plane in channels.items())
     subprocess.run(["oiiotool", tmp("b.exr"), "-d", "half", "-o", tmp("h.exr")], check=True)
     assert (exr.read(tmp("h.exr"))[0]["G"] == channels["G"].astype(np.float16)).all()
-    raises(ValueError, "it is compressed", exr.read, tmp("a.exr"))
-    data = Path(tmp("b.exr")).read_bytes()
-    for cut in (0, 3, 9, 100, 700, len(data) - 1):
-        Path(tmp("c.exr")).write_bytes(data[:cut])
-        raises(ValueError, "c.exr", exr.read, tmp("c.exr"))
+    assert all((exr.read(tmp("a.exr"))[0][name] == plane).all() for name, plane in channels.items())
+    for by in ("zip", "zips"):
+        subprocess.run(["oiiotool", tmp("h.exr"), "--compression", by, "-d", "half", "-o", tmp("z.exr")], check=True)
+        stored, origin = exr.read(tmp("z.exr"))
+        assert origin == (5, 6) and all((stored[n] == plane.astype(np.float16)).all() for n, plane in channels.items())
+    subprocess.run(["oiiotool", tmp("a.exr"), "--compression", "piz", "-o", tmp("p.exr")], check=True)
+    raises(ValueError, "another compression", exr.read, tmp("p.exr"))
+    for whole in ("b.exr", "z.exr"):
+        data = Path(tmp(whole)).read_bytes()
+        for cut in (0, 3, 9, 100, 700, len(data) - 1):
+            Path(tmp("c.exr")).write_bytes(data[:cut])
+            raises(ValueError, "c.exr", exr.read, tmp("c.exr"))
 
 
 def test_outputs():

@@ -40,7 +40,7 @@ t "a run from recording to table" sh -c "$truth --criteria fixed:spp=20 observer
 t "  …asks the criteria about whole blocks, as a renderer does" sh -c "grep -q '^| fixed:spp=20 | 16 px | other scenes | 4 of 4 | ' $tmp/table &&
     grep -q '^| null | 40 px | other scenes | 0 of 1 | ' $tmp/table && grep -q '^| observer | 40 px ' $tmp/table"
 t "  …at the samples that they have named" sh -c "mkdir $tmp/docs && $truth --recorded --criteria fixed:spp=33 --write $tmp/docs >/dev/null &&
-    python3 -c 'import json; f = json.load(open(\"$tmp/docs/results/truth.json\")); assert {b[0] for s in f[\"scenes\"].values() for k in s.values() for b in k} == {36}'"
+    python3 -c 'import json; f = json.load(open(\"$tmp/docs/results/truth.json\")); assert {b[0] for s in f[\"scenes\"].values() for k in s.values() for b in k} == {38}'"
 t "  …goes on from what is recorded" sh -c "$truth --recorded --criteria null 2>$tmp/err | grep -q '^| null | 16 px ' && ! grep -q seed $tmp/err"
 t "  …and says what is missing" sh -c "! $truth --recorded --scenes chess 2>$tmp/err && grep -q '^lab truth: no scene is recorded in ' $tmp/err"
 echo "1..$n"

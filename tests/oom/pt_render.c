@@ -15,6 +15,7 @@
 #include "render/output.h"
 #include "render/quote.h"
 #include "render/sequence.h"
+#include "sequence/recording.h"
 #include "scene/scene.h"
 #include "support/fail_alloc.h"
 #include "support/pt_fake.h"
@@ -258,6 +259,53 @@ static void recording(void **state)
     assert_int_equal(system(command), 0);
 }
 
+/* A frame whose every allocation in turn failed once while it was recorded is whole in the end, and is read or refused. */
+static void recording_frames(void **state)
+{
+    struct pt_sequence_config config = {.directory = in_folder("looks"),
+                                        .levels = "linear:2:4:2",
+                                        .planes = 1u << SEQ_PLANE_HALF | 1u << SEQ_PLANE_MOMENT2,
+                                        .reference_spp = 2,
+                                        .scene_path = "a.pbrt",
+                                        .render = pt_fake_config()};
+    static const struct pt_render_hooks no_hooks;
+    static const struct pt_scene empty;
+    static struct seq_recording m;
+    char directory[128], command[192];
+    (void)state;
+    snprintf(directory, sizeof directory, "%s", config.directory);
+    config.directory = directory;
+    config.render.width = config.render.height = config.render.crop[2] = config.render.crop[3] = 16;
+    for (int recording = 1; recording >= 0; recording--)
+        for (long k = 1;; k++) {
+            struct base_err err = {0};
+            struct seq_look look;
+            int stopped, rc;
+            snprintf(command, sizeof command, "rm -rf %s", directory);
+            if (recording)
+                assert_int_equal(system(command), 0);
+            fail_arm(k);
+            if (recording)
+                rc = pt_sequence_record_frame(&config, &empty, pt_fake_noise, pool, NULL, &no_hooks, &stopped, &err);
+            else if ((rc = seq_recording_read(directory, &m, &err)) == 0) {
+                float out[3 * 16 * 16];
+                if ((rc = seq_recording_read_look(directory, &m, 0, &look, &err)) == 0) {
+                    rc = seq_shown(&look.records[0], SEQ_PLANE_HALF, out, &err);
+                    seq_look_release(&look);
+                }
+                seq_recording_release(&m);
+            }
+            if (!fail_disarm()) {
+                assert_int_equal(rc, 0);
+                break;
+            }
+            assert_true(!rc || rc == BASE_ENOMEM || rc == BASE_EIO || rc == BASE_EINVAL);
+            assert_true(k < 5000);
+            snprintf(command, sizeof command, "! ls -A %s 2>/dev/null | grep -q tmp", directory);
+            assert_int_equal(system(command), 0);
+        }
+}
+
 /* The k-th allocation of opening (finishing 0) or of finishing a quote fails; *happened: there were as many. */
 static int quote(struct pt_render *render, int finishing, long k, int *happened, struct base_err *err)
 {
@@ -307,8 +355,8 @@ static void quoting(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(creating), cmocka_unit_test(checking),
-                                       cmocka_unit_test(writing_and_reading), cmocka_unit_test(recording),
-                                       cmocka_unit_test(quoting)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(creating),  cmocka_unit_test(checking),         cmocka_unit_test(writing_and_reading),
+        cmocka_unit_test(recording), cmocka_unit_test(recording_frames), cmocka_unit_test(quoting)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

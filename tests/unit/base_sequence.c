@@ -188,7 +188,8 @@ static void limits_of_blocks(void **state)
         const char *words;
     } cases[] = {
         {0, 0, "not a block sequence"},
-        {8, 2, "version 2 of the format is not known"},
+        {8, 2, "a look at a whole frame (version 2 of the format), expected a block alone"},
+        {8, 3, "version 3 of the format is not known"},
         {12, 63, "version 1 of the format is not known"},
         {16, 0, "a block of 0x21 pixels with 4 images"},
         {16, 4097, "a block of 4097x21 pixels with 4 images"},

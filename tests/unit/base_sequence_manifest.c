@@ -189,7 +189,9 @@ static void limits_of_manifests(void **state)
         const char *from, *to, *words;
     } cases[] = {
         {"lull-sequence", "other", "not the manifest of a sequence"},
-        {"\"version\":1", "\"version\":2", "this version of the format is not known"},
+        {"\"version\":1", "\"version\":2",
+         "looks at a whole frame (version 2 of the format), expected blocks alone (version 1)"},
+        {"\"version\":1", "\"version\":3", "this version of the format is not known"},
         {"\"scene\":\"s\"", "\"scene\":7", "the scene has no name"},
         {"\"width\":1048576", "\"width\":1048577", "width, height or block is missing or out of range"},
         {"\"width\":1048576", "\"width\":0", "width, height or block is missing or out of range"},

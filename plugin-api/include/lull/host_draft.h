@@ -255,6 +255,23 @@ LULL_EXPORT int32_t lull_host_load_blocks(struct lull_host_frame *frame, const v
 LULL_EXPORT int32_t lull_host_save_history(const struct lull_host_criterion *criterion, const struct lull_writer *writer,
                                            struct lull_error *err);
 
+/* --- replay --------------------------------------------------------------------------------------------------------- */
+
+/* Since 1.2: pixels of a block that were recorded at `spp` samples, as they would be shown at to_spp > spp. The mean stays,
+ * its noise falls: HALF differs from it by less, as 1/sqrt(samples), and is of to_spp / 2 samples; MOMENT2 is of the same
+ * variance of a sample. For criteria that read no other planes. Light that no sample has met is not in them. */
+struct lull_host_simulation {
+    uint32_t struct_size;
+    uint32_t zero;
+    uint64_t pixels, spp, half_spp, to_spp;
+    double rgb_to_xyz[9]; /* all 0: linear sRGB */
+    const double *color;  /* [pixels][3] */
+    double *half;         /* [pixels][3], replaced; NULL: not there */
+    double *moment2;      /* [pixels], likewise */
+};
+
+LULL_EXPORT int32_t lull_host_simulate(const struct lull_host_simulation *simulation, struct lull_error *err);
+
 #ifdef __cplusplus
 }
 #endif

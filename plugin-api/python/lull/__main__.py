@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """python3 -m lull: what it finds, one line each. Exit status 2 without the library or any criterion. python3 -m lull watch:
-watch.py; python3 -m lull plot: plot/main.py."""
+watch.py; python3 -m lull plot: plot/main.py; python3 -m lull replay: replay.py."""
 import importlib.util
 import os
 import shutil
@@ -15,6 +15,9 @@ if sys.argv[1:2] == ["watch"]:
 if sys.argv[1:2] == ["plot"]:
     from .plot.main import main as plot
     sys.exit(plot(sys.argv[2:]))
+if sys.argv[1:2] == ["replay"]:
+    from .replay import main as replay
+    sys.exit(replay(sys.argv[2:]))
 
 from . import __version__, abi, criteria  # noqa: E402 (needs numpy)
 from .criterion import load  # noqa: E402

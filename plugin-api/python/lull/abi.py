@@ -14,7 +14,7 @@ NORM_ONE, NORM_SPP, NORM_HALF_SPP, NORM_WEIGHT = range(4)
 TRANSFER_UNKNOWN, TRANSFER_LINEAR, TRANSFER_SRGB, TRANSFER_GAMMA = range(4)
 FRAME_DETERMINISTIC, FRAME_INDEPENDENT, FRAME_SHARED = 2, 4, 8
 CONTINUE, STOP = 0, 1
-HOST_UNIFORM = 0x100
+HOST_UNIFORM, HOST_OPEN_ENDED = 0x100, 0x400
 REPORT_INTERRUPTED, REPORT_NO_RAYS, REPORT_DENOISED = 1, 4, 8
 DENOISE_FULL = 1
 REASON_NONE, REASON_CRITERION, REASON_SPP_MAX, REASON_UNIFORM, REASON_TIME, REASON_INTERRUPT, REASON_DROPPED, \
@@ -76,6 +76,8 @@ HostQuoteRow: Any = _struct("HostQuoteRow", "ptr blocks; f64 spp_min spp_mean sp
                                             "text name; i64 told")
 HostDenoising: Any = _struct("HostDenoising", "u32 struct_size flags threads zero; text library; ptr context cancelled")
 HostPicture: Any = _struct("HostPicture", "u32 struct_size zero; ptr rgb denoised weight")
+HostSimulation: Any = _struct("HostSimulation", "u32 struct_size zero; u64 pixels spp half_spp to_spp; matrix rgb_to_xyz; "
+                                                "ptr color half moment2")
 HostLayer: Any = _struct("HostLayer", "text name; ptr rgb")
 HostOutput: Any = _struct("HostOutput", "text option path")
 

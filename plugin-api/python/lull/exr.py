@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""OpenEXR scan-line files of float channels: ZIP-compressed ones are written, uncompressed ones are read."""
+"""OpenEXR scan-line files of float channels: ZIP-compressed ones are written, those and uncompressed ones are read."""
 from __future__ import annotations
 
 import os
@@ -35,6 +35,28 @@ def _zip(data: bytes) -> bytes:
     split[1:] = split[1:] - split[:-1] + 128
     packed = zlib.compress(split.astype(np.uint8).tobytes(), 4)
     return packed if len(packed) < len(data) else data
+
+
+def _unzipped(data: bytes, at: int, y0: int, y1: int, lines: int, line: np.dtype) -> bytes:
+    """What lies in the chunks of a file that is ZIP-compressed, `lines` in each."""
+    parts = []
+    for i, y in enumerate(range(y0, y1 + 1, lines)):
+        begin, = struct.unpack_from("<Q", data, at + 8 * i)
+        top, size = struct.unpack_from("<iI", data, begin)
+        packed, wanted = data[begin + 8:begin + 8 + size], line.itemsize * min(lines, y1 + 1 - y)
+        if top != y or len(packed) != size:
+            raise ValueError("its lines are not in order")
+        if size < wanted:
+            split = np.frombuffer(zlib.decompressobj().decompress(packed, wanted + 1), np.uint8).astype(np.int64)
+            split[1:] -= 128
+            raw, half = np.empty(len(split), np.uint8), -(-len(split) // 2)
+            whole = np.cumsum(split).astype(np.uint8)
+            raw[::2], raw[1::2] = whole[:half], whole[half:]
+            packed = raw.tobytes()
+        if len(packed) != wanted:
+            raise ValueError("a chunk has another size")
+        parts.append(packed)
+    return b"".join(parts)
 
 
 def write(path: str, channels: Mapping[str, np.ndarray], size: tuple[int, int], origin: tuple[int, int] = (0, 0),
@@ -78,12 +100,12 @@ def _bytes(path: str, most: int = -1) -> bytes:
 
 
 def read(path: str) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
-    """All channels by name, [h, w] float32, of an uncompressed file; its data window's origin (x, y)."""
+    """All channels by name, [h, w] float32, of an uncompressed or ZIP-compressed file; its data window's origin (x, y)."""
     data = _bytes(path)
     try:
         return _decode(data)
-    except (ValueError, struct.error, KeyError, IndexError) as error:
-        raise ValueError(f"{path}: not an uncompressed scan-line EXR: {error}") from None
+    except (ValueError, struct.error, zlib.error, KeyError, IndexError) as error:
+        raise ValueError(f"{path}: not a scan-line EXR, uncompressed or by ZIP: {error}") from None
 
 
 def texts(path: str) -> dict[str, str]:
@@ -108,14 +130,18 @@ def _decode(data: bytes) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
         raise ValueError("another kind of file")
     listed, at = _head(data)
     head = {name: value for name, _, value in listed}
-    if head["compression"] != b"\0":
-        raise ValueError("it is compressed")
+    kind = head["compression"][0]
+    if kind not in (0, 2, 3):
+        raise ValueError("another compression")
     x0, y0, x1, y1 = struct.unpack("<4i", head["dataWindow"])
     channels, fields = head["channels"], []
     while channels[:1] != b"\0":
         name, _, rest = channels.partition(b"\0")
         fields.append((name.decode(), _TYPES[struct.unpack_from("<i", rest)[0]], (x1 - x0 + 1,)))
         channels = rest[16:]
+    if kind:
+        lines = np.frombuffer(_unzipped(data, at, y0, y1, _LINES if kind == 3 else 1, np.dtype(fields)), np.dtype(fields))
+        return {name: lines[name].astype(np.float32) for name, *_ in fields}, (x0, y0)
     line = np.dtype([("#y", "<i4"), ("#bytes", "<u4"), *fields])  # its channels one after the other
     lines = np.frombuffer(data, line, y1 - y0 + 1, at + 8 * (y1 - y0 + 1))
     if (lines["#y"] != np.arange(y0, y1 + 1)).any() or (lines["#bytes"] != line.itemsize - 8).any():

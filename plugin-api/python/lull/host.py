@@ -68,7 +68,8 @@ class HostFrame:
     [height, width] in [0, 1], black leaves the criterion's quality parameter as it is, white
     takes a quarter of it, grey g 4^(-g), in steps of an eighth; the lightest pixel of a block counts. exposure: linear
     factor before the display transfer ("srgb", "linear", "gamma"). independent: a pixel's samples are not stratified.
-    shared: neighbouring pixels share samples (a splatted filter).
+    shared: neighbouring pixels share samples (a splatted filter). open_ended: checks stand where they would without
+    spp_max. rgb_to_xyz: nine numbers, row by row; all 0: linear sRGB.
     view: the rectangle of pixels that planes hold, all blocks among them. first_spp: samples at the first check, at least.
     """
 
@@ -78,7 +79,7 @@ class HostFrame:
                  max_check_overhead: float = 0.0, max_seam: float = 0.0, check_step: int = 1,
                  mask: Optional[np.ndarray] = None, seed: int = 0, exposure: float = 1.0, transfer: str = "srgb",
                  gamma: float = 2.2, sample_clamp: float = 0.0, independent: bool = False, shared: bool = False,
-                 deterministic: bool = True):
+                 deterministic: bool = True, open_ended: bool = False, rgb_to_xyz: Sequence[float] = (0.0,) * 9):
         self.criterion, self.planes = criterion, tuple(planes)
         self.width, self.height = limits.checked("width", width), limits.checked("height", height)
         if self.width * self.height > MAX_PIXELS:
@@ -94,13 +95,14 @@ class HostFrame:
             ("max_check_overhead", max_check_overhead), ("max_seam", max_seam), ("exposure", exposure), ("gamma", gamma),
             ("sample_clamp", sample_clamp))}
         self.spp_min, self.spp_max, self.seed, self.time_budget_s = list(given.values())[:4]
-        uniform, deterministic, independent, shared = (limits.flag(name, value) for name, value in (
-            ("uniform", uniform), ("deterministic", deterministic), ("independent", independent), ("shared", shared)))
+        uniform, deterministic, independent, shared, open_ended = (limits.flag(name, value) for name, value in (
+            ("uniform", uniform), ("deterministic", deterministic), ("independent", independent), ("shared", shared),
+            ("open_ended", open_ended)))
         self.max_seam, self.check_step, self.uniform = given["max_seam"], limits.checked("check_step", check_step), uniform
         self.shown = {"exposure": given["exposure"], "transfer": transfer, "gamma": given["gamma"],
                       "sample_clamp": given["sample_clamp"], "independent": independent, "shared": shared}
         flags = (abi.HOST_UNIFORM * uniform | abi.FRAME_DETERMINISTIC * deterministic | abi.FRAME_INDEPENDENT * independent |
-                 abi.FRAME_SHARED * shared)
+                 abi.FRAME_SHARED * shared | abi.HOST_OPEN_ENDED * open_ended)
         try:
             placed = [abi.Rect(*limits.rectangle(f"layout[{i}]", r)) for i, r in enumerate(layout)]
         except TypeError as error:
@@ -111,7 +113,8 @@ class HostFrame:
             abi.HostConfig, flags=flags, width=self.width, height=self.height, block_width=size[0], block_height=size[1],
             crop=tuple(self.crop), layout=C.addressof(rects) if placed else None, layout_count=len(placed),
             layout_stride=C.sizeof(abi.Rect), planes=sum(1 << PLANES[name] for name in set(planes)),
-            transfer=TRANSFERS[transfer], check_step=check_step, mask=C.addressof(painted) if painted else None, **given))
+            transfer=TRANSFERS[transfer], check_step=check_step,
+            rgb_to_xyz=tuple(rgb_to_xyz), mask=C.addressof(painted) if painted else None, **given))
 
     def _block_size(self, block: Union[int, tuple[int, int], None]) -> tuple[int, int]:
         """(width, height), 0 = the library's choice."""
@@ -208,6 +211,30 @@ class HostFrame:
         view = self.view_of(planes)
         with self._asking():
             call("host_check", self.handle.pointer, C.byref(view))
+
+    def due(self) -> tuple[list[int], list[bool]]:
+        """The blocks to be asked about, rising, and which of them get no more samples; none: there is no question."""
+        room = len(self.blocks)
+        due, final = (C.c_uint32 * room)(), (C.c_uint8 * room)()
+        count = library().lull_host_due(self.handle.pointer, due, final)
+        return due[:count], [bool(value) for value in final[:count]]
+
+    def ask(self, due: Sequence[int], final: Sequence[bool],
+            planes: Optional[Mapping[str, Plane]] = None) -> list[abi.Decision]:
+        """The criterion's answers about the blocks that are due; nothing is noted."""
+        view, count = self.view_of(planes), len(due)
+        answers = (abi.Decision * max(count, 1))()
+        with self._asking():
+            call("host_ask", self.handle.pointer, C.byref(view), (C.c_uint32 * max(count, 1))(*due),
+                 (C.c_uint8 * max(count, 1))(*final), count, answers)
+        return list(answers[:count])
+
+    def apply(self, due: Sequence[int], answers: Sequence[abi.Decision]) -> None:
+        """Notes the answers, stops or schedules each block, and re-opens some if max_seam says so."""
+        count = len(due)
+        library().lull_host_apply(self.handle.pointer, (C.c_uint32 * max(count, 1))(*due), count,
+                                  (abi.Decision * max(count, 1))(*answers))
+        library().lull_host_reopen(C.byref(self.layout), C.c_double(self.max_seam))
 
     def stop(self, reason: int, planes: Optional[Mapping[str, Plane]] = None) -> None:
         """Closes the active blocks (reason: abi.REASON_TIME or REASON_INTERRUPT); the criterion is asked once more about

@@ -84,7 +84,7 @@ def library() -> C.CDLL:
     for name in ("mask_factor", "elapsed_s"):
         getattr(loaded, f"lull_host_{name}").restype = C.c_double
     loaded.lull_host_reason.restype = C.c_char_p
-    for name in ("progress", "end", "close", "file_abort", "quote_end"):
+    for name in ("progress", "end", "close", "file_abort", "quote_end", "apply"):
         getattr(loaded, f"lull_host_{name}").restype = None
     return loaded
 

@@ -11,7 +11,7 @@ _SPP, _FINITE, _ABOVE_0 = (1, (1 << 31) - 1), float(np.finfo(float).max), 5e-324
 # Whole numbers where the ends are
 _RANGES: dict[str, tuple[float, float]] = {
     "width": (1, 32768), "height": (1, 32768), "crop": (-32768, 32768), "block": (1, 4096), "wave": _SPP, "spp_min": _SPP,
-    "spp_max": _SPP, "spp": _SPP, "count": (0, _SPP[1]), "reason": (1, _SPP[1]), "seed": (0, (1 << 64) - 1),
+    "spp_max": _SPP, "spp": _SPP, "simulate_to": _SPP, "count": (0, _SPP[1]), "reason": (1, _SPP[1]), "seed": (0, (1 << 64) - 1),
     "threads": (1, 1 << 20), "time_budget_s": (0.0, 1e9), "max_seam": (0.0, 1e6), "max_check_overhead": (0.0, 1.0),
     "exposure": (_ABOVE_0, _FINITE), "gamma": (_ABOVE_0, _FINITE), "sample_clamp": (0.0, _FINITE), "checkpoint_every_s": (0.0, _FINITE), "check_step": (1, 1 << 32)}
 

@@ -5,7 +5,7 @@
     levels = [sequence.Level(spp, mean, first_half) for spp, mean, first_half in my_renders]      # rising in spp
     sequence.write("data/chess", levels, scene="chess")
 
-`ggn import` makes the same of pictures in files.
+`ggn import` makes the same of pictures in files. Whole frames, as criteria are shown them: lull.recording.
 """
 from __future__ import annotations
 
