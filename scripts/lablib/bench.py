@@ -18,7 +18,7 @@ import time
 
 from lablib import reading, tables, tool
 from lablib.sources import PICTURES
-from lablib.tool import BUILD, GGN, RENDER, ROOT, THREADS
+from lablib.tool import BUILD, RENDER, ROOT, THREADS
 
 SOURCES = PICTURES + ("ggn/nn/*.[ch]", "pathtracer/render/*.[ch]")
 RAYS = os.path.join(BUILD, "bench", "pt_rays")

@@ -55,10 +55,16 @@ def render(o, scene, name, *how, layers=None):
     return {layer: channels(path) for layer, path in paths.items()}
 
 
+def lightness(rgb):
+    """CIE L* of what a display sends for linear RGB [h, w, 3]."""
+    import numpy as np
+    y = np.clip(rgb, 0, 1) @ np.array([0.2126729, 0.7151522, 0.0721750], np.float32)
+    return np.where(y > 216 / 24389, 116 * np.cbrt(y) - 16, y * (24389 / 27)).astype(np.float64)
+
+
 def errors(picture, references):
     """Root mean square of L* of each block of 100x100."""
-    from lablib import law
-    shown = law.lightness(picture)
+    shown = lightness(picture)
     square = (shown - references[0]) * (shown - references[1])
     side = square.shape[0]
     return [math.sqrt(max(float(square[y:y + 100, x:x + 100].mean()), 1e-6)) for y in range(0, side, 100) for x in range(0, side, 100)]
@@ -66,8 +72,7 @@ def errors(picture, references):
 
 def measure(o, scene):
     """{samples: [{layer: error} of each block]}"""
-    from lablib import law
-    references = [law.lightness(render(o, scene, "%s-%d-%d" % (scene, o.size, seed), "--seed", seed, "--spp", o.reference_spp)["kept"])
+    references = [lightness(render(o, scene, "%s-%d-%d" % (scene, o.size, seed), "--seed", seed, "--spp", o.reference_spp)["kept"])
                   for seed in REFERENCES]
     found = {}
     for spp in SPP:

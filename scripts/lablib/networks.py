@@ -9,7 +9,6 @@ import statistics
 import sys
 
 from lablib import tool
-from lablib.tool import ggn
 
 # What the libraries of both sides look at when they are loaded.
 HELD = {"avx2": {"LULL_ISA": "avx2", "ATEN_CPU_CAPABILITY": "avx2", "ONEDNN_MAX_CPU_ISA": "AVX2", "OPENBLAS_CORETYPE": "Haswell"}}

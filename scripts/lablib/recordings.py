@@ -1,9 +1,68 @@
-"""Recordings that jobs may label: copies of views whose blocks are links, so that nothing is written where the recordings lie."""
+"""Recordings: whole frames with references, as scripts/recordings.plan names them; and copies of views whose blocks are links, which jobs may
+label without writing where the recordings lie."""
 import json
 import os
 import shutil
+from typing import NamedTuple
 
-from lablib.tool import ggn, load
+from lablib.tool import RENDER, ROOT, ggn, load, run
+
+PLANES, STEP = "color,half,moment2,albedo,normal", 1.19  # a look's samples over those of the last
+
+
+class Wanted(NamedTuple):
+    """A frame to be recorded. reference_spp: of each of two references; 0: none. options: more words for lull-render."""
+    set: str
+    kind: str
+    scene: str
+    film: str
+    block: int
+    seed: int
+    spp: int
+    reference_spp: int
+    options: tuple = ()
+
+    @property
+    def file(self):
+        return os.path.join(ROOT, self.scene if self.scene.endswith(".pbrt") else "scenes/%s.pbrt" % self.scene)
+
+    @property
+    def name(self):
+        """The scene's; of a file by another hand its folder's and its own."""
+        stem = os.path.splitext(self.scene)[0].split("/")
+        return stem[-1] if not self.scene.endswith(".pbrt") else "%s--%s" % (stem[-2], stem[-1])
+
+    @property
+    def folder(self):
+        return "%s/%s/%d" % (self.set, self.name, self.seed)
+
+    @property
+    def samples(self):
+        width, height = map(int, self.film.split("x"))
+        return width * height * (self.spp + 2 * self.reference_spp)
+
+
+def read(root, wanted):
+    """The recording, or None: it is not there or not whole."""
+    import lull.recording
+    folder = os.path.join(root, wanted.folder)
+    if not os.path.exists(os.path.join(folder, "manifest.json")):
+        return None
+    recording = lull.recording.read(folder)
+    return recording if recording.finished and len(recording.references) == (2 if wanted.reference_spp else 0) else None
+
+
+def whole(root, wanted):
+    return read(root, wanted) is not None
+
+
+def record(root, wanted, threads):
+    """Records it, or goes on with it."""
+    folder = os.path.join(root, wanted.folder)
+    os.makedirs(folder, exist_ok=True)
+    run(RENDER, "-q", wanted.file, "--size", wanted.film, "--block", wanted.block, "-t", threads, "--seed", wanted.seed, "--planes", PLANES,
+        "--levels", "geometric:16:%d:%g" % (wanted.spp, STEP), "--sequence", folder,
+        *(["--reference-spp", wanted.reference_spp] if wanted.reference_spp else []), *wanted.options)
 
 
 def manifest_of(view):

@@ -1,87 +1,83 @@
 """Holds what criteria believe against references: how many of the blocks that they stop are truly off.
 
-Each scene is recorded with default settings as a whole frame (lull-render --sequence DIR --planes), with several seeds, the first one with
-two references. The criteria themselves are then asked about these looks, in blocks of several sizes, as a renderer asks them
+The recordings are those of the set `truth` of scripts/recordings.plan (scripts/lab record): whole frames at default settings, several seeds of
+each scene, the first one with two references. Criteria are asked about these looks, in blocks of several sizes, as a renderer asks them
 (lull.replay); a block that was stopped keeps its samples. True errors are those of the model observer against both references,
-whose own noise is taken out (scripts/lablib/law.py). Interrupted, the same command goes on. Needs numpy (python3-numpy)."""
-import functools
+whose own noise is taken out (ggn visible --second). Needs numpy (python3-numpy)."""
+import csv
+import json
 import math
 import os
+import random
+import statistics
 import sys
+import tempfile
 
-from lablib import tool
+from lablib import record, recordings, tool
 from lablib.sources import EXAMPLES, NETWORK, OBSERVER, PICTURES
 
 SOURCES = PICTURES + OBSERVER + NETWORK + EXAMPLES
-SCENES = ("chess glossy soft-shadow cornell-box office museum judge/rare-lamps brick-yard gallery candles kitchen judge/rare-beads "
-          "garage bathroom gems night-street judge/rare-foil panes corridor glass-shelf").split()
-RARE = ("rare-", "candles", "gems", "night-street", "glass-shelf")  # scenes whose noise is made by few bright paths
 SIZES = (200, 100, 32)
 CRITERIA = ("observer", "ggn", "halfbuf", "variance")
 OFF = (1.05, 1.12, 1.5)
 ENOUGH = 0.93  # true error at which a block could have been stopped
-PLANES = "color,half,albedo,normal,moment2"
-LEVELS = "geometric:16:%d:1.19"
+KINDS = {"rare": "rare light", "hands": "other hands", "ordinary": "ours"}
+PEOPLE = ("living-room-v4/living-room.pbrt", "p3d_staircase2-view0.pbrt", "volume-caustic-v3/caustic.pbrt")  # which the observer was fitted to
+DRAWS = 1000  # of scenes, for the range of a share
 
 
 def options(parser):
-    parser.add_argument("--scenes", nargs="+", default=SCENES, metavar="SCENE",
-                        help="names of scenes/, or files (%s)" % " ".join(SCENES))
+    parser.add_argument("dir", nargs="?", type=tool.path, default=os.path.join(tool.ROOT, "..", "recordings"), help="recordings (../recordings)")
+    parser.add_argument("--plan", type=tool.path, default=record.PLAN, help="scripts/recordings.plan")
     parser.add_argument("--criteria", nargs="+", default=CRITERIA, metavar="NAME[:KEY=VALUE]",
                         help="whom to ask (%s)" % " ".join(CRITERIA))
     parser.add_argument("--sizes", nargs="+", type=int, default=SIZES, metavar="PIXELS", help="sides of blocks (%s)" % " ".join(map(str, SIZES)))
-    parser.add_argument("--size", type=int, default=200, help="side of the pictures (200)")
-    parser.add_argument("--spp", type=int, default=512, help="samples of the last look (512)")
-    parser.add_argument("--reference-spp", type=int, default=2048, metavar="N", help="of each of the two references (2048)")
-    parser.add_argument("--seeds", type=int, default=2, help="renders of each scene (2)")
-    parser.add_argument("--threads", type=int, default=tool.THREADS, help="of the renderer (all processors)")
-    parser.add_argument("--recorded", action="store_true", help="render nothing: judge the scenes whose recordings are there")
-    parser.add_argument("--work", type=tool.path, default=os.path.join(tool.BUILD, "truth"), metavar="DIR",
-                        help="recordings; what is there is not made again (build/truth)")
     tool.writes(parser)
 
 
-# --- recordings -----------------------------------------------------------------------------------------------------------
+# --- what ships knows ---
 
 
-def name_of(scene):
-    return os.path.splitext(os.path.basename(scene))[0]
-
-
-def record(o, scene, seed):
-    """The recording of one seed; None: it is not whole and must not be made."""
-    import lull.recording
-    folder = os.path.join(o.work, "%s-%d" % (name_of(scene), o.size), "%d-%d" % (seed, o.spp))
-    references = ["--reference-spp", o.reference_spp] if seed == 1 else []
-    if not o.recorded:
-        file = scene if scene.endswith(".pbrt") else os.path.join(tool.ROOT, "scenes", scene + ".pbrt")
-        os.makedirs(folder, exist_ok=True)
-        tool.run(tool.RENDER, "-q", file, "--size", "%dx%d" % (o.size, o.size), "--block", o.size, "-t", o.threads, "--seed", seed,
-                 "--levels", LEVELS % o.spp, "--planes", PLANES, "--sequence", folder, *references)
-    elif not os.path.exists(os.path.join(folder, "manifest.json")):
-        return None
-    recording = lull.recording.read(folder)
-    return recording if recording.finished and len(recording.references) == (2 if seed == 1 else 0) else None
+def trained_on():
+    """Files of the scenes that the shipped network learned from or was chosen by."""
+    with open(os.path.join(tool.ROOT, "ggn", "models", "lull-3.data.csv"), encoding="utf-8") as file:
+        names = {row["scene"] for row in csv.DictReader(file, delimiter=";") if row["split"] != "test"}
+    with open(os.path.join(tool.ROOT, "scripts", "dataset.plan"), encoding="utf-8") as file:
+        lines = [line.split() for line in file if line.strip() and not line.startswith(("#", "film"))]
+    return {os.path.realpath(os.path.join(tool.ROOT, file)) for _, name, file, *_ in lines if name.split("/")[0] in names}
 
 
 # --- judging --------------------------------------------------------------------------------------------------------------
 
 
-class Reference:
-    def __init__(self, pictures):
-        from lablib import law
-        self.law = law
-        self.pictures = [law.lightness(picture) for picture in pictures]
+def write_picture(path, picture):
+    import lull.exr
+    height, width = picture.shape[:2]
+    lull.exr.write(path, {c: picture[..., i] for i, c in enumerate("RGB")}, (width, height))
+    return path
 
-    def error(self, lightness, rect):
-        """True error of a block, in units of what is just seen."""
-        cut = tuple(p[rect.y0:rect.y1, rect.x0:rect.x1] for p in (lightness, *self.pictures))
-        return self.law.true(*cut, self.law.texture(*cut[1:])) / tool.observer()["level"]
+
+def true_errors(references, recording, sizes):
+    """{(x, y, side): [(samples, true error) of each look]}"""
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        def written(name, picture):
+            path = os.path.join(folder, name + ".exr")
+            return write_picture(path, picture)
+        first, second = (written("reference-%d" % i, picture) for i, picture in enumerate(references))
+        levels = recording.levels(0)
+        looks = [written("%d" % spp, recording.planes(0, spp, ["color"])["color"]) for spp in levels]
+        judged = json.loads(tool.ggn("visible", first, *looks, "--second", second, "--json", "--block", ",".join(map(str, sizes))))
+    for of in judged if isinstance(judged, list) else [dict(judged, image=0, block=sizes[0])]:
+        for block in of["blocks"]:
+            if block["width"] == block["height"] == of["block"]:
+                found.setdefault((block["x"], block["y"], of["block"]), []).append((levels[of["image"]], block["error"]))
+    return found
 
 
 def replay(lull, name, recording, block, errors):
     """[(samples at its stop or 0, true error there, samples from which it was low enough or 0)] of each block, but narrow ones at the
-    edges. errors(rect): of each look, [(samples, true error)]."""
+    edges."""
     import lull.replay
     criterion, _, parameter = name.partition(":")
     pairs = dict([parameter.split("=")]) if parameter else {}
@@ -89,30 +85,38 @@ def replay(lull, name, recording, block, errors):
     rects = [b.rect for b in asked.frame.blocks]
     found = []
     for rect, stop in zip(rects, asked.run().stops):
-        if rect.width == rect.height == block:
-            of = errors(rect)
+        of = errors.get((rect.x0, rect.y0, block))
+        if of and rect.width == rect.height == block:
             low = [k for k in range(len(of)) if all(e <= ENOUGH for _, e in of[k:])]
             found.append((stop, dict(of).get(stop, math.nan), of[low[0]][0] if low else 0))
     return found
 
 
-def judge(o, scene):
-    """{"criterion size": [[stop, error, enough] of each block and seed]}; None: not recorded."""
-    recordings = [record(o, scene, seed) for seed in range(1, o.seeds + 1)]
-    if not all(recordings):
-        return None
+def noise_of(references, size):
+    """The worst block's error of one reference against the other, over √2: each has the noise of its own samples."""
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [os.path.join(folder, "%d.exr" % i) for i in range(2)]
+        for path, picture in zip(paths, references):
+            write_picture(path, picture)
+        return json.loads(tool.ggn("visible", *paths, "--block", size, "--json"))["worst"] / math.sqrt(2)
+
+
+def judge(o, wanted):
+    """{"noise": …, "criterion size": [[stop, error, enough] of each block and seed]} of the recordings of one scene."""
     import lull
-    reference, found = Reference(recordings[0].references), {}
-    for recording in recordings:
-        light = [(spp, reference.law.lightness(recording.planes(0, spp, ["color"])["color"])) for spp in recording.levels(0)]
-        errors = functools.lru_cache(maxsize=None)(lambda rect: [(spp, reference.error(of, rect)) for spp, of in light])
+    read = [recordings.read(o.dir, w) for w in wanted]
+    references = read[0].references
+    found = {"kind": wanted[0].kind, "noise": noise_of(references, max(o.sizes)),
+             "trained": os.path.realpath(wanted[0].file) in trained_on() or wanted[0].file.endswith(PEOPLE)}
+    for recording in read:
+        errors = true_errors(references, recording, o.sizes)
         for name in o.criteria:
             for size in o.sizes:
                 try:
                     found.setdefault("%s %d" % (name, size), []).extend(replay(lull, name, recording, size, errors))
                 except lull.LullError as why:
                     raise tool.Refused(why) from why
-    print("%s: judged" % name_of(scene), file=sys.stderr, flush=True)
+    print("%s: judged" % wanted[0].name, file=sys.stderr, flush=True)
     return found
 
 
@@ -131,18 +135,28 @@ def row(blocks, usual):
                              max(1, sum(1 for b, u in zip(blocks, usual) if b[0] and u[0]))) if usual else math.nan}
 
 
+def spread(by_scene):
+    """The range of 90 % of the share that is off at the first limit, by scenes drawn anew."""
+    draw, shares = random.Random(1), []
+    for _ in range(DRAWS):
+        stops = [b for blocks in draw.choices(by_scene, k=len(by_scene)) for b in blocks if b[0]]
+        if stops:
+            shares.append(sum(b[1] > OFF[0] for b in stops) / len(stops))
+    return statistics.quantiles(shares, n=20)[::18] if len(shares) > 1 else [math.nan, math.nan]
+
+
 def rows(results):
-    """[(criterion, size, kind, row)]"""
+    """[(criterion, size, kind, row)]: of scenes that nothing which ships was trained on."""
     found = []
-    scenes = results["scenes"]
-    keys = [(name, size) for size in results["sizes"] for name in results["criteria"]]
-    for kind, wanted in (("rare light", True), ("other scenes", False)):
-        of = [s for s in scenes if s.startswith(RARE) is wanted]
-        for name, size in keys:
-            blocks = [b for s in of for b in scenes[s]["%s %d" % (name, size)]]
-            usual = [b for s in of for b in scenes[s]["%s %d" % (results["criteria"][0], size)]]
-            if blocks:
-                found.append((name, size, kind, row(blocks, usual)))
+    scenes = {name: of for name, of in results["scenes"].items() if not of["trained"]}
+    for kind in KINDS:
+        of = [scene for scene in scenes.values() if scene["kind"] == kind]
+        for size in results["sizes"]:
+            for name in results["criteria"]:
+                by_scene = [scene["%s %d" % (name, size)] for scene in of]
+                blocks, usual = sum(by_scene, []), sum((scene["%s %d" % (results["criteria"][0], size)] for scene in of), [])
+                if blocks:
+                    found.append((name, size, KINDS[kind], {**row(blocks, usual), "range": spread(by_scene)}))
     return found
 
 
@@ -150,7 +164,7 @@ def wrong(results):
     """Which scenes hold the stops of the first criterion that are off, by size of block: a list of the page."""
     lines, name = [], results["criteria"][0]
     for size in results["sizes"]:
-        by_scene = {s: row(of["%s %d" % (name, size)], None) for s, of in results["scenes"].items()}
+        by_scene = {s: row(of["%s %d" % (name, size)], None) for s, of in results["scenes"].items() if not of["trained"]}
         stopped = sum(r["stopped"] for r in by_scene.values())
         off = sorted(((round(r["off"][0] * r["stopped"]), s, r) for s, r in by_scene.items() if r["off"][0]), key=lambda x: (-x[0], x[1]))
         lines.append("- %d px: %d of %d stops off at %g%s." % (
@@ -160,34 +174,43 @@ def wrong(results):
     return "\n".join(lines) + "\n"
 
 
+def marked(results):
+    """Scenes, each with its references' noise; those that something which ships was trained on with an asterisk."""
+    return ", ".join("%s%s%s" % (name, "\\*" if of["trained"] else "", "" if of["noise"] is None else " %.2f" % of["noise"])
+                     for name, of in results["scenes"].items())
+
+
 def page(results):
     """The table of the page."""
     number = lambda v, form: "" if math.isnan(v) else form % v
-    lines = ["| criterion | block | scenes | stopped | off at 1.05 | at 1.12 | at 1.5 | worst | octaves after enough | samples |",
+    lines = ["| criterion | block | scenes | stopped | off at 1.05 (90 % of draws of scenes) | at 1.12 | at 1.5 | worst | octaves after enough | samples |",
              "|---|---|---|---|---|---|---|---|---|---|"]
     for name, size, kind, r in rows(results):
-        lines.append("| %s | %d px | %s | %d of %d | %s | %s | %s | %s |" % (
-            name, size, kind, r["stopped"], r["blocks"], " | ".join("%.1f %%" % (100 * share) for share in r["off"]),
-            number(r["worst"], "%.2f"), number(r["cost"], "%+.2f"), number(r["samples"], "%.2f")))
+        low, high = r["range"]
+        lines.append("| %s | %d px | %s | %d of %d | %.1f %%%s | %.1f %% | %.1f %% | %s | %s | %s |" % (
+            name, size, kind, r["stopped"], r["blocks"], 100 * r["off"][0], "" if math.isnan(low) else " (%.1f–%.1f)" % (100 * low, 100 * high),
+            100 * r["off"][1], 100 * r["off"][2], number(r["worst"], "%.2f"), number(r["cost"], "%+.2f"), number(r["samples"], "%.2f")))
     measured = results["measured"]
-    lines.append("\n%d scenes, %d seeds; `%s`, %s, %s." % (len(results["scenes"]), results["seeds"], measured["command"], measured["date"],
-                                                          measured["commit"]))
+    lines.append("\n%d scenes, %d seeds; `%s`, %s, %s. Shares leave out what the shipped network learned from and what the observer was fitted to (\\*).\n"
+                 "Noise of a reference's worst block, as told by the other: %s." % (
+                     len(results["scenes"]), results["seeds"], measured["command"], measured["date"], measured["commit"], marked(results)))
     return "\n".join(lines) + "\n"
 
 
 def main(o):
-    found = {}
-    for scene in o.scenes:
-        try:
-            judged = judge(o, scene)
-            if judged:
-                found[name_of(scene)] = judged
-        except tool.Refused as why:
-            print("lab truth: %s" % why, file=sys.stderr, flush=True)
+    found, by_name = {}, {}
+    plan = [w for w in record.read_plan(o.plan) if w.set == "truth"]
+    for w in plan:
+        by_name.setdefault(w.name, []).append(w)
+    for name, wanted in by_name.items():
+        if not all(recordings.whole(o.dir, w) for w in wanted):
+            print("lab truth: %s is not recorded (scripts/lab record --only truth)" % name, file=sys.stderr, flush=True)
+            continue
+        found[name] = judge(o, wanted)
     if not found:
-        raise tool.Refused("no scene is recorded in %s: run it without --recorded" % o.work)
-    results = {"measured": tool.measured(), "criteria": list(o.criteria), "sizes": list(o.sizes), "seeds": o.seeds, "spp": o.spp,
-               "reference_spp": o.reference_spp, "scenes": found}
+        raise tool.Refused("no scene is recorded in %s: scripts/lab record --only truth" % o.dir)
+    results = {"measured": tool.measured(), "criteria": list(o.criteria), "sizes": list(o.sizes), "seeds": max(w.seed for w in plan),
+               "spp": plan[0].spp, "reference_spp": plan[0].reference_spp, "scenes": found}
     print(page(results))
     if o.write:
         tool.store(o.write, "truth", results, indent=None)

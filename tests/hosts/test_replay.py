@@ -15,6 +15,7 @@ from lull import exr, recording, replay
 from lull.recording import Look, Record
 from tap import raises
 
+ROOT = os.getcwd()
 BUILD = os.path.abspath(os.environ.get("BUILD", "build"))
 SCENE = os.path.abspath("scenes/cornell-box.pbrt")
 TMP = tempfile.TemporaryDirectory()
@@ -83,6 +84,11 @@ def test_variance():
 def test_plugin():
     """somebody's own library, a plug-in of tests/abi: likewise"""
     records_itself(f"{BUILD}/tests/abi/plugins/puppet.so")
+
+
+def test_python():
+    """a criterion in Python: likewise"""
+    records_itself(f"{ROOT}/plugin-api/examples/dammertz.py")
 
 
 

@@ -25,7 +25,7 @@ says() { # says LINE: the last check of the copy ended with status 1 and said th
     [ $? -eq 1 ] && [ "$(wc -l <"$tmp/err")" -eq 1 ] && grep -qE -e "$1" "$tmp/err"
 }
 helps() { for job in $(scripts/lab --help | sed -n 's/^  \([a-z-]*\)  .*/\1/p'); do scripts/lab "$job" --help | grep -q "^usage: scripts/lab $job" || exit 1; done; }
-t "--help names twenty-one jobs" test "$(scripts/lab --help | grep -c '^  [a-z-]*  ')" -eq 21
+t "--help names twenty-two jobs" test "$(scripts/lab --help | grep -c '^  [a-z-]*  ')" -eq 22
 t "  …each with its own" helps
 t "no such job: one line" refuses "expected data-set, cost, " nonsense
 t "no such option: one line" refuses "lab pages: unrecognized arguments: --what" pages --what
