@@ -399,7 +399,7 @@ static void textures(void **state)
     const struct pt_texture *t = &s->textures[s->materials[1].reflectance.texture - 1];
     assert_true(t->kind == PT_TEXTURE_CHECKERBOARD && t->su == 8 && !t->in[0].texture && t->in[0].value.x == 0.1f);
     assert_true(s->shapes[1].has_alpha && !s->shapes[0].has_alpha);
-    assert_int_equal(s->effects, PT_FX_TEXTURE | PT_FX_ALPHA | PT_FX_QUADRIC);
+    assert_int_equal(s->effects, PT_FX_TEXTURE | PT_FX_ALPHA | PT_FX_QUADRIC | PT_FX_CONTACT);
     pt_scene_destroy(s);
 }
 
