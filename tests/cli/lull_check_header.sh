@@ -52,7 +52,7 @@ CXX
 t "a criterion in C++" sh -c "\${CXX:-c++} -std=c++11 -Wall -Wextra -Werror -shared -fPIC -fvisibility=hidden -Iplugin-api/include \
     $tmp/cxx.cc -o $tmp/cxx.so && ${BUILD:-build}/bin/lull-check -q -o entry -o table -o symbols $tmp/cxx.so"
 # the README's recipe, as it stands there
-sed -n '/^#include <lull.criterion_kit.h>/,/^```$/p' plugin-api/README.md | sed '$d' >"$tmp/recipe.c"
+awk '/^```c$/ { c = 1; next } c && /^```$/ { exit } c' plugin-api/README.md >"$tmp/recipe.c"
 t "the README's recipe keeps the contract" sh -c "\${CC:-cc} -std=c99 -Wall -Wextra -Werror -shared -fPIC -fvisibility=hidden \
     -Wl,--version-script=plugin-api/plugin.map -Iplugin-api/include $tmp/recipe.c -o $tmp/recipe.so -lm && ${BUILD:-build}/bin/lull-check -q $tmp/recipe.so"
 # and a criterion of the kit in C++
