@@ -198,7 +198,7 @@ $(BIN)/lull-render: $(call o,$(PT_MAIN)) $(PT_CORE_OBJ) $(LOADER_OBJ) | $(IMAGES
 $(BIN)/ggn: $(call o,$(GGN_CLI)) $(GGN_CORE_OBJ) | $(IMAGES)
 	$(link) $^ $(LDFLAGS_ALL) $(GGN_LIBS) -o $@
 # Their packages are found beside them where they are installed, else in the source tree.
-$(BIN)/lull-study $(BIN)/lull-plot $(JUDGE): plugin-api/python/program | $(BIN)/ggn
+$(BIN)/lull-study $(BIN)/lull-plot $(JUDGE): plugin-api/python/program | $(HOST_LIB) $(IMAGES)
 	@install -D -m 755 $< $@
 # Of what both programs stand on the checker takes what it names.
 $(OBJ)/base.a: $(BASE_OBJ)
@@ -414,7 +414,7 @@ INSTALLED = $(call put,$(PREFIX)/bin,755,$(PROGRAMS) scripts/packages/lull-denoi
     $(call put,$(share)/man/man1,644,$(wildcard docs/man/*.1)) $(call put,$(share)/man/man7,644,$(wildcard docs/man/*.7)) \
     $(call put,$(share)/bash-completion/completions,644,$(wildcard scripts/packages/completions/*)) \
     $(call put,$(share)/lull,644,$(wildcard ggn/models/*.ggn) plugin-api/base/version.h \
-        $(addprefix plugin-api/python/lull/,program.py version.py)) \
+        $(addsuffix .py,$(addprefix plugin-api/python/lull/,abi files library limits program script sequence version))) \
     $(foreach p,judge plot,$(call put,$(share)/lull/$(p),644,$(wildcard plugin-api/python/lull/$(p)/*.py))) \
     $(call put,$(share)/lull/study,644,$(wildcard $(STUDY)/*.py)) \
     $(call put,$(share)/lull/study/page,644,$(wildcard $(STUDY)/page/*.*)) \

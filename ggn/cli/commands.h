@@ -33,8 +33,7 @@
     X(replay, "what models answer on recorded sequences, as JSON") \
     X(evaluate, "figures of models and baselines on recorded sequences") \
     X(cost, "what accuracy costs each criterion on recorded sequences") \
-    X(reconstruct, "the picture with each block at its threshold") \
-    X(stimuli, "the pictures of recordings and renders that people are shown")
+    X(reconstruct, "the picture with each block at its threshold")
 
 #define GGN_DECLARE_COMMAND(name, help) int ggn_cmd_##name(int argc, char **argv, struct base_err *err);
 GGN_COMMANDS(GGN_DECLARE_COMMAND)

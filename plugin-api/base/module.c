@@ -1,4 +1,4 @@
-#define _GNU_SOURCE /* ST_NOEXEC */
+#define _GNU_SOURCE /* ST_NOEXEC, dladdr */
 #include "base/module.h"
 
 #include <dlfcn.h>
@@ -81,14 +81,28 @@ void *base_module_open(const char *path, int flags, struct base_err *err)
     return module;
 }
 
+/* Beside the shared object that this is part of, as the host library is, if the file is there; else by the program. */
+static void find_module(const char *file, char path[PATH_MAX + 64])
+{
+    static const char here;
+    Dl_info object;
+    char program[PATH_MAX];
+    const char *slash = dladdr(&here, &object) != 0 && object.dli_fname ? strrchr(object.dli_fname, '/') : NULL;
+    if (slash) {
+        snprintf(path, PATH_MAX + 64, "%.*s/lull/modules/%s", (int)(slash - object.dli_fname), object.dli_fname, file);
+        if (access(path, F_OK) == 0)
+            return;
+    }
+    const ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
+    program[n > 0 ? n : 0] = '\0';
+    slash = strrchr(program, '/');
+    snprintf(path, PATH_MAX + 64, "%.*s../lib/lull/modules/%s", slash ? (int)(slash + 1 - program) : 0, program, file);
+}
+
 void *base_module_symbol(const char *file, const char *symbol, int share, struct base_err *err)
 {
-    char program[PATH_MAX], path[PATH_MAX + 64];
-    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
-    program[n > 0 ? n : 0] = '\0';
-    char *slash = strrchr(program, '/');
-    int folder = slash ? (int)(slash + 1 - program) : 0;
-    snprintf(path, sizeof path, "%.*s../lib/lull/modules/%s", folder, program, file);
+    char path[PATH_MAX + 64];
+    find_module(file, path);
     void *module = base_module_open(path, share ? RTLD_NOW | RTLD_GLOBAL : RTLD_LAZY | RTLD_LOCAL, err);
     void *found = module ? dlsym(module, symbol) : NULL;
     if (module && !found)

@@ -12,7 +12,7 @@ t "networks that find their models" "$at/bin/lull-render" $room -c ggn -o "$tmp/
 t "modules that the programs find" sh -c "$at/bin/ggn flip scenes/demo-reference.png scenes/demo-reference.png && [ -x $at/lib/lull/modules/lull-denoiser ]"
 t "  …criteria that are Python files among them" sh -c "python3 -c 'import numpy' || exit 0
     cd $tmp && $at/bin/lull-render $room -c $repo/plugin-api/examples/dammertz.py -o d.exr"
-t "a study, with the pictures of ggn and the words of its page" sh -c "$at/bin/lull-study init $tmp/study --task thresholds --views \
+t "a study, with its pictures and the words of its page" sh -c "$at/bin/lull-study init $tmp/study --task thresholds --views \
     tests/data/recorded/train/one-view0 --asked-by Ada --contact here && [ -s $tmp/study/texts.json ] && [ -s $tmp/study/stimuli/v0/b0-8.png ]"
 t "a picture of numbers" sh -c "printf 'view;block;threshold;censored;stop;score\\na;0;100;0;110;\\na;1;200;0;190;\\n' >$tmp/stops.csv && $at/bin/lull-plot $tmp/stops.csv -o $tmp/stops.png && [ -s $tmp/stops.png ]"
 t "a man page of each program" sh -c "for p in $at/bin/*; do [ -s $at/share/man/man1/\${p##*/}.1 ] || exit 1; done"

@@ -94,6 +94,8 @@ t "one version everywhere" sh -c "$python -c 'import lull; print(lull.__version_
     unzip -p $wheel '*/METADATA' | grep -qxF \"Version: \$($python -c 'import lull; print(lull.__version__)')\""
 t "the programs' and the packages'" sh -c "head -n 1 debian/changelog | grep -qF \"(\$($python -c 'import lull; print(lull.__version__)'))\""
 t "lull-study, a program" sh -c "$tmp/venv/bin/lull-study --version | grep -qx 'lull-study (Lull) .*' && unzip -l $wheel | grep -q study/page/vendor/jspsych.js"
+t "  …which shows people a recording, without any other program" run "$tmp/venv/bin/lull-study" init shown --task thresholds --views \
+    "$PWD/tests/data/recorded/train/one-view0" --asked-by Ada --contact here
 t "lull-plot, a program" sh -c "$tmp/venv/bin/lull-plot --version | grep -qx 'lull-plot (Lull) .*'"
 t "pip uninstall" "$tmp/venv/bin/pip" uninstall -q -y lull
 t "  …leaves nothing" sh -c "! find $site -iname '*lull*' | grep ."

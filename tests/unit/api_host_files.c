@@ -43,6 +43,42 @@ static void outputs_are_looked_at_first(void **state)
     assert_int_equal(rmdir(folder), 0);
 }
 
+static int32_t take(const struct lull_writer *writer, const void *data, uint64_t size)
+{
+    if (size > 6)
+        return LULL_E_MEMORY;
+    memcpy(writer->context, data, (size_t)size);
+    return LULL_OK;
+}
+
+/* What a display shows of a file comes as it was written; a file without what is needed, or too large for the caller, not. */
+static void pictures_are_read_as_they_are_shown(void **state)
+{
+    (void)state;
+    char folder[] = "/tmp/lull-host-XXXXXX", path[64];
+    assert_non_null(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/a.png", folder);
+    const uint8_t rgb[9] = {1, 2, 3, 4, 5, 6, 7, 8, 9};
+    uint8_t got[6] = {0};
+    uint32_t width = 77, height = 78;
+    struct lull_error e = {.struct_size = sizeof e};
+    const struct lull_writer writer = {.struct_size = sizeof writer, .context = got, .write = take};
+    assert_int_equal(lull_host_write_png(path, 3, 1, rgb, &e), LULL_OK);
+    assert_int_equal(lull_host_read_shown(path, NULL, NULL, &width, &height, &writer, &e), LULL_E_MEMORY);
+    assert_true(width == 77 && height == 78 && strstr(e.message, "did not take"));
+    assert_int_equal(lull_host_write_png(path, 1, 2, rgb, &e), LULL_OK);
+    assert_int_equal(lull_host_read_shown(path, NULL, "B", &width, &height, &writer, &e), LULL_OK);
+    assert_true(width == 1 && height == 2 && memcmp(got, rgb, 6) == 0);
+    assert_int_equal(lull_host_read_shown(path, NULL, "lull.weight.V", &width, &height, &writer, &e), LULL_E_INVALID);
+    assert_non_null(strstr(e.message, "a.png: has no channel 'lull.weight.V'"));
+    assert_int_equal(lull_host_read_shown(path, "noisy", NULL, &width, &height, &writer, &e), LULL_E_INVALID);
+    assert_non_null(strstr(e.message, "'noisy.R'"));
+    assert_int_equal(lull_host_read_shown(folder, NULL, NULL, &width, &height, NULL, &e), LULL_E_INVALID);
+    unlink(path);
+    assert_int_equal(lull_host_read_shown(path, NULL, NULL, &width, &height, &writer, &e), LULL_E_IO);
+    assert_int_equal(rmdir(folder), 0);
+}
+
 /* What was there before stays until the file is complete. */
 static void files_appear_when_they_are_whole(void **state)
 {
@@ -84,6 +120,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(outputs_are_looked_at_first),
+        cmocka_unit_test(pictures_are_read_as_they_are_shown),
         cmocka_unit_test(files_appear_when_they_are_whole),
         cmocka_unit_test(codes_of_light),
     };

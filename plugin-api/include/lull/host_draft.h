@@ -245,6 +245,11 @@ LULL_EXPORT void lull_host_srgb(const double *linear, uint64_t count, uint8_t *c
 /* Writes such codes, rgb[height][width][3], as a PNG, which is replaced as a whole or not at all. */
 LULL_EXPORT int32_t lull_host_write_png(const char *path, uint32_t width, uint32_t height, const uint8_t *rgb,
                                         struct lull_error *err);
+/* What a display shows of an image file of any format that Lull's programs read, as such codes, all at once: of its picture
+ * (layer NULL), or of the light in the channels LAYER.R, LAYER.G and LAYER.B. needed: a channel without which the file is
+ * refused, or NULL. LULL_E_IO where neither the library nor the program has lull/modules/lull-images.so beside it. */
+LULL_EXPORT int32_t lull_host_read_shown(const char *path, const char *layer, const char *needed, uint32_t *width,
+                                         uint32_t *height, const struct lull_writer *rgb, struct lull_error *err);
 
 /* --- parts of a state ------------------------------------------------------------------------------------------------ */
 

@@ -25,10 +25,12 @@ class Output(NamedTuple):
 
 
 def file_call(name: str, *arguments: Any) -> None:
-    """As a file's own functions in Python fail: OSError, or ValueError for a name that makes no sense."""
+    """As a file's own functions in Python fail: OSError, MemoryError, or ValueError for a name that makes no sense."""
     try:
         call(name, *arguments)
     except LullError as error:
+        if error.code == abi.E_MEMORY:
+            raise MemoryError(str(error)) from None
         raise (OSError if error.code == abi.E_IO else ValueError)(str(error)) from None
 
 
@@ -65,6 +67,21 @@ def write_png(path: str, rgb: np.ndarray) -> None:
     """rgb: [height, width, 3] uint8, rows from the top."""
     rgb = np.ascontiguousarray(rgb, np.uint8)
     file_call("host_write_png", encoded(path), rgb.shape[1], rgb.shape[0], C.c_void_p(rgb.ctypes.data))
+
+
+def read_shown(path: str, layer: str = "", needed: str = "") -> np.ndarray:
+    """8-bit sRGB codes [height, width, 3] that a display shows of an image file, of any format that Lull's programs read: of its
+    picture, or of the channels LAYER.R, LAYER.G and LAYER.B. needed: a channel without which the file is refused. ValueError, or
+    OSError where it cannot be opened or the library has no lull/modules/lull-images.so beside it, as in wheels."""
+    width, height, pixels = C.c_uint32(), C.c_uint32(), bytearray()
+
+    def take(_writer: int, data: int, size: int) -> int:
+        pixels.extend(C.string_at(data, size))
+        return abi.OK
+    names = (encoded(name) if name else None for name in (path, layer, needed))
+    file_call("host_read_shown", *names, C.byref(width), C.byref(height),
+              C.byref(abi.sized(abi.Writer, write=abi.WriteFn(take))))
+    return np.frombuffer(pixels, np.uint8).reshape(height.value, width.value, 3)
 
 
 def srgb(linear: np.ndarray) -> np.ndarray:

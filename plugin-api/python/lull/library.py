@@ -58,9 +58,10 @@ class Info(NamedTuple):
 
 def search_path() -> list[str]:
     """Where the library is looked for: above the folders of LULL_PLUGIN_PATH, in the package itself (a wheel has it there),
-    in the prefix of a `lull-render` on PATH, in the build tree that this package lies in, in the usual prefixes."""
+    in the prefix whose share/lull this is, in that of a `lull-render` on PATH, in the build tree that this package lies in, in the usual
+    prefixes."""
     folders = [Path(f).resolve().parent for f in os.environ.get("LULL_PLUGIN_PATH", "").split(os.pathsep) if f]
-    folders += [CARRIED]
+    folders += [CARRIED, (Path(__file__).resolve().parents[2] / "lib" / "lull").resolve().parent]  # a link where LIBDIR is elsewhere
     program = shutil.which("lull-render")
     libdirs = ["lib", "lib64", *(f"lib/{triplet}" for triplet in [sysconfig.get_config_var("MULTIARCH")] if triplet)]
     folders += [Path(program).resolve().parents[1] / libdir for libdir in libdirs] if program else []

@@ -12,6 +12,8 @@ from __future__ import annotations
 import functools
 import json
 import os
+import re
+import stat
 import struct
 import zlib
 from dataclasses import dataclass, field, replace
@@ -20,13 +22,16 @@ from typing import Any, Sequence
 import numpy as np
 
 from . import limits
-from .files import LUMINANCE, replaced, srgb
+from .files import LUMINANCE, replaced, srgb, srgb_decoded
+from .library import encoded
 
 MAGIC, FILE_HEADER, RECORD_HEADER, PLANE_HEADER = b"LULLSEQ1", 64, 32, 16
 LEVEL, REFERENCE = 1, 2
 DISPLAY, FINE, HALF_LOG, MEAN_F16, HALF_F16 = 1, 2, 3, 4, 5
 SHUFFLE, AVERAGE, GREEN = 1, 2, 4
 MAX_RECORDS, FULL_SPP = 4096, 320
+MAX_SIDE, MAX_FILE, MAX_SPP = 4096, 1 << 30, 2**31 - 1
+BYTES = {DISPLAY: 3, FINE: 3, HALF_LOG: 1, MEAN_F16: 6, HALF_F16: 6}  # of a pixel
 
 
 @dataclass
@@ -57,7 +62,15 @@ class Block:
     y0: int
     id: int
     seed: int
-    records: list[Record]
+    records: list[Record]  # levels, rising; the reference last
+
+    @property
+    def levels(self) -> list[Record]:
+        return [r for r in self.records if r.kind == LEVEL]
+
+    @property
+    def reference(self) -> Record | None:
+        return self.records[-1] if self.records[-1].kind == REFERENCE else None
 
 
 # --- planes -----------------------------------------------------------------------------------------------------------
@@ -65,6 +78,11 @@ class Block:
 
 def _filter_of(plane: int) -> int:
     return {DISPLAY: AVERAGE | GREEN, MEAN_F16: SHUFFLE, HALF_F16: SHUFFLE}.get(plane, 0)
+
+
+def _filters_of(plane: int) -> int:
+    """Those that may be on it."""
+    return _filter_of(DISPLAY if plane == FINE else plane)
 
 
 def _predicted(channels: np.ndarray) -> np.ndarray:
@@ -94,13 +112,16 @@ def _unfiltered(data: bytes, number: int, width: int, height: int) -> bytes:
     if not number:
         return data
     codes = np.frombuffer(data, np.uint8).reshape(3, height, width).copy()
-    if number & AVERAGE:  # a pixel needs its neighbours: one diagonal after the other
-        y, x = np.indices((height, width))
+    if number & AVERAGE:  # a pixel needs its neighbours: one diagonal after the other, which is a stride of the padded picture
+        padded = np.zeros((3, height + 1, width + 1), np.uint8)
+        padded[:, 1:, 1:] = codes
+        flat = padded.reshape(3, -1)
         for d in range(width + height - 1):
-            at = (slice(None), y[x + y == d], x[x + y == d])
-            left = np.where(at[2] > 0, codes[:, at[1], at[2] - 1], 0).astype(np.uint16)
-            up = np.where(at[1] > 0, codes[:, at[1] - 1, at[2]], 0)
-            codes[at] += ((left + up) // 2).astype(np.uint8)
+            top, bottom = max(0, d - width + 1), min(d, height - 1)
+            first, last = ((y + 1) * (width + 1) + d - y + 1 for y in (top, bottom))
+            left, up = flat[:, first - 1:last:width], flat[:, first - width - 1:last - width:width]
+            flat[:, first:last + 1:width] += ((left.astype(np.uint16) + up) // 2).astype(np.uint8)
+        codes = padded[:, 1:, 1:].copy()
     if number & GREEN:
         codes[0::2] += codes[1]
     return codes.tobytes()
@@ -182,6 +203,8 @@ def _unpacked(data: bytes) -> Block:
     _need(len(data) >= FILE_HEADER and data[:8] == MAGIC, "not a block sequence")
     version, _, width, height, x0, y0, number, count, seed, *_, crc = struct.unpack_from("<4I2i2IQ3II", data, 8)
     _need(version == 1 and crc == zlib.crc32(data[:60]), "a damaged header")
+    _need(0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE and 0 < count <= MAX_RECORDS,
+          f"a block of {width}x{height} pixels with {count} images")
     block, at = Block(width, height, x0, y0, number, seed, []), FILE_HEADER
     for _ in range(count):
         _need(at + RECORD_HEADER <= len(data), "truncated")
@@ -189,19 +212,130 @@ def _unpacked(data: bytes) -> Block:
         payload = data[at + RECORD_HEADER:at + RECORD_HEADER + size]
         _need(own == zlib.crc32(data[at:at + 28]) and len(payload) == size and crc == zlib.crc32(payload),
               f"a damaged record at byte {at}")
+        _need(kind == LEVEL or (kind == REFERENCE and 0 < len(block.records) == count - 1), "an image of no known kind, or no level")
+        _need(half_spp <= spp and spp > (block.records[-1].spp if block.records and kind == LEVEL else 0), f"{spp} spp: levels rise")
         record, used = Record(kind, spp, half_spp), 32 * n_stats
         for i in range(n_stats):
             name, value = struct.unpack_from("<24sd", payload, 32 * i)
             record.stats.append((name.rstrip(b"\0").decode(), value))
         for _ in range(n_planes):
             plane, by, raw_bytes, stored = struct.unpack_from("<4I", payload, used)
-            raw = zlib.decompress(payload[used + PLANE_HEADER:used + PLANE_HEADER + stored])
-            _need(len(raw) == raw_bytes, f"plane {plane} has another size")
-            record.planes[plane] = _unfiltered(raw, by, width, height)
             used += PLANE_HEADER + stored
+            if plane in BYTES:
+                _need(raw_bytes == BYTES[plane] * width * height and not by & ~_filters_of(plane) and plane not in record.planes,
+                      f"{spp} spp: plane {plane} has another size, filter or number")
+                raw = zlib.decompressobj().decompress(payload[used - stored:used], raw_bytes + 1)
+                _need(len(raw) == raw_bytes, f"{spp} spp: plane {plane} has another size")
+                record.planes[plane] = _unfiltered(raw, by, width, height)
+        _need(used == size and DISPLAY in record.planes, f"{spp} spp: bytes behind the last plane, or no codes")
         block.records.append(record)
         at += RECORD_HEADER + size
     _need(at == len(data), "bytes behind the last record")
+    return block
+
+
+# --- pixels of a record: [3, height, width] ---------------------------------------------------------------------------
+
+
+def display(block: Block, record: Record) -> np.ndarray:
+    """8-bit sRGB codes."""
+    return np.frombuffer(record.planes[DISPLAY], np.uint8).reshape(3, block.height, block.width)
+
+
+def _light(block: Block, record: Record, plane: int) -> np.ndarray:
+    values = np.frombuffer(record.planes[plane], "<f2").astype(np.float32).reshape(3, block.height, block.width)
+    _need(bool(np.isfinite(values).all()), f"block {block.id} at {record.spp} spp: a pixel is not finite")
+    return values
+
+
+def mean(block: Block, record: Record) -> np.ndarray:
+    """Linear light, float32: from halves of floats, else codes and steps between them, else codes alone (then at most 1)."""
+    if MEAN_F16 in record.planes:
+        return _light(block, record, MEAN_F16)
+    codes = display(block, record)
+    if FINE not in record.planes:
+        return srgb_decoded(np.arange(256) / 255).astype(np.float32)[codes]
+    steps, limit = np.arange(256), np.append(_limits(), 0.0)
+    table = limit[:-1, None] + (steps + 0.5) / 8 * (limit[1:] - limit[:-1])[:, None]
+    table[255] = limit[255] * np.exp2(steps / 16)
+    return table.astype(np.float32)[codes, np.frombuffer(record.planes[FINE], np.uint8).reshape(codes.shape)]
+
+
+def half(block: Block, record: Record) -> np.ndarray:
+    """The half-buffer difference of all channels, float32, of a record that has HALF_F16."""
+    return _light(block, record, HALF_F16)
+
+
+# --- folders that are read --------------------------------------------------------------------------------------------
+
+
+def _whole(o: Any, name: str, low: float, high: float) -> bool:
+    value = o.get(name)
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and low <= value <= high and value == int(value)
+
+
+def _usable(entry: Any, width: int, height: int) -> bool:
+    return (isinstance(entry, dict) and _whole(entry, "id", 0, 2**32 - 1) and _whole(entry, "bytes", 1, MAX_FILE) and
+            all(_whole(entry, f"{a}0", 0, size - 1) and _whole(entry, f"{a}1", entry[f"{a}0"] + 1, size)
+                for a, size in (("x", width), ("y", height))) and
+            all(isinstance(entry.get(name), str) for name in ("crc32", "file")) and
+            re.fullmatch("[0-9a-fA-F]{1,8}", entry["crc32"]) is not None and
+            re.fullmatch(r"[^./\0][^/\0]{0,62}", entry["file"]) is not None)
+
+
+def _bytes(path: str, most: int) -> bytes:
+    try:  # it waits for nothing, as a FIFO that nobody writes to would
+        with open(encoded(path), "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
+            _need(stat.S_ISREG(os.fstat(file.fileno()).st_mode), f"{path}: not a regular file")
+            data = file.read(most + 1)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, path) from None
+    _need(len(data) <= most, f"{path}: larger than {most} bytes")
+    return data
+
+
+def read_manifest(folder: str) -> dict[str, Any]:
+    """manifest.json of a recorded sequence, checked. ValueError and OSError, one line."""
+    path = os.path.join(folder, "manifest.json")
+    data = _bytes(path, 1 << 26)
+    try:
+        m = json.loads(data)
+    except (ValueError, RecursionError):
+        m = None
+    _need(isinstance(m, dict) and m.get("format") == "lull-sequence", f"{path}: not the manifest of a sequence")
+    _need(_whole(m, "version", 1, 1), f"{path}: this version of the format is not known")
+    _need(isinstance(m.get("scene"), str) and m["scene"] != "", f"{path}: the scene has no name")
+    _need(_whole(m, "width", 1, 1 << 20) and _whole(m, "height", 1, 1 << 20), f"{path}: width or height is missing or out of range")
+    levels, blocks = m.get("levels"), m.get("blocks")
+    _need(isinstance(levels, list) and 0 < len(levels) <= MAX_RECORDS, f"{path}: no list of levels")
+    for i, level in enumerate(levels):
+        _need(_whole({"level": level}, "level", levels[i - 1] + 1 if i else 1, MAX_SPP), f"{path}: level {i} does not rise")
+    _need(isinstance(blocks, list), f"{path}: no list of blocks")
+    for i, entry in enumerate(blocks):
+        _need(_usable(entry, m["width"], m["height"]), f"{path}: entry {i} of blocks is not usable")
+        entry.update({name: int(entry[name]) for name in ("id", "x0", "y0", "x1", "y1", "bytes")})
+    ids = sorted(entry["id"] for entry in blocks)
+    twice = next((a for a, b in zip(ids, ids[1:]) if a == b), None)
+    _need(twice is None, f"{path}: block {twice} is listed twice")
+    return {"reference_spp": 0, **m, "width": int(m["width"]), "height": int(m["height"])}
+
+
+def read_block(folder: str, manifest: dict[str, Any], entry: dict[str, Any]) -> Block:
+    """The block of an entry of the manifest's "blocks", held against it. ValueError and OSError, one line."""
+    path = os.path.join(folder, entry["file"])
+    data = _bytes(path, MAX_FILE)
+    _need(len(data) == entry["bytes"] and zlib.crc32(data) == int(entry["crc32"], 16),
+          f"{path}: not the file that the manifest lists (size or CRC)")
+    try:
+        block = unpack(data)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    _need((block.id, block.x0, block.y0, block.x0 + block.width, block.y0 + block.height) ==
+          tuple(entry[name] for name in ("id", "x0", "y0", "x1", "y1")),
+          f"{path}: block {block.id} is {block.width}x{block.height} at {block.x0},{block.y0}, the manifest says otherwise")
+    _need(not manifest["reference_spp"] or block.reference is not None, f"{path}: the reference is missing")
+    missing = set(manifest["levels"]) - {r.spp for r in block.levels}
+    _need(not missing, f"{path}: the level at {min(missing, default=0):.0f} spp is missing")
     return block
 
 

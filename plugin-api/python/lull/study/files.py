@@ -149,11 +149,17 @@ def make_folder(path: str) -> None:
 OWN = ("study.json", "texts.json", "token", "study.db", "study.db-wal", "study.db-shm")
 
 
+def is_inside(path: str, folder: str) -> bool:
+    """By whatever name."""
+    folder = os.path.realpath(folder)
+    return os.path.commonpath([os.path.realpath(path), folder]) == folder
+
+
 def protect(folder: str, output: str) -> None:
     """Refuses an output that would replace a file of the study in `folder`, by whatever name, or take the name of one that
     is made later. Reports and exports may lie beside them."""
-    target, stimuli = os.path.realpath(output), os.path.realpath(os.path.join(folder, "stimuli"))
-    if os.path.commonpath([target, stimuli]) == stimuli:
+    target = os.path.realpath(output)
+    if is_inside(output, os.path.join(folder, "stimuli")):
         raise Refused(f"{output}: lies among the pictures that the study shows")
     for name in OWN:
         own = os.path.realpath(os.path.join(folder, name))

@@ -1,20 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Makes a study: `ggn stimuli` chooses blocks and levels and writes every picture that is shown; then come texts.json and
-study.json, which is written last. What was made is gone unless all went well."""
+"""Makes a study: every picture that is shown (shown.py), then texts.json and study.json, which is written last. What was made is
+gone unless all went well."""
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import os
 import secrets
 import shutil
-import subprocess
-import sys
 from typing import Any, Iterator
 
-from .definition import (ADJUSTMENT, KINDS, MAX_FPS, MAX_LINE, MAX_TRIALS, MIN_MS, TWO_INTERVAL, VALIDATION, Block, Study,
-                         View, fit_intervals, is_plain_line, write_study)
+from .definition import (ADJUSTMENT, KINDS, MAX_FPS, MAX_LINE, MAX_TRIALS, MIN_MS, TWO_INTERVAL, VALIDATION, Study, fit_intervals,
+                         is_plain_line, write_study)
 from .files import Refused, make_folder, read_file, write_line
 from .options import Option, integer, real, text_shown, word
 from .people import MIN_TRIALS
@@ -77,28 +74,6 @@ def _define(o: dict[str, Any]) -> Study:
                     "min_ms": MIN_MS[task], "max_fast": 0.1, **given})
 
 
-def _find_ggn() -> str:
-    beside = os.path.join(os.path.dirname(os.path.realpath(sys.argv[0])), "ggn")
-    found = beside if os.access(beside, os.X_OK) else shutil.which("ggn")
-    if not found:
-        raise Refused("the program ggn makes the pictures, and is neither beside lull-study nor on PATH")
-    return found
-
-
-def _make_stimuli(folder: str, study: Study, o: dict[str, Any]) -> dict[str, Any]:
-    """The pictures, and what study.json says of them."""
-    names = [name for name in ("kinds", "block", "spacing", "spp_min", "spp_max") if name in o]
-    arguments = [f"--task={study.task}", *(f"--{name.replace('_', '-')}={o[name]}" for name in names)]
-    ran = subprocess.run([_find_ggn(), "stimuli", "-o", os.path.join(folder, "stimuli"), *arguments, "--", *o["views"]],
-                         stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    lines = ran.stderr.decode("utf-8", "surrogateescape").splitlines()
-    if ran.returncode == 1:
-        raise MemoryError
-    if ran.returncode:
-        raise Refused(lines[-1].removeprefix("ggn stimuli: ") if lines else f"ggn stimuli ended with {ran.returncode}")
-    return json.loads(ran.stdout)
-
-
 @contextlib.contextmanager
 def _made(folder: str) -> Iterator[None]:
     """A folder; one that was not there before goes again with all that is in it when what follows fails."""
@@ -128,16 +103,16 @@ def _fill(folder: str, page: str, study: Study, o: dict[str, Any]) -> None:
     if os.path.exists(texts):
         raise Refused(f"{texts}: is there and would be replaced; move it away, and back after init")
     with _made(os.path.join(folder, "stimuli")):
-        _show(study, _make_stimuli(folder, study, o))
+        _show(study, os.path.join(folder, "stimuli"), o)
         write_line(texts, read_file(os.path.join(page, "texts.en.json"), 1 << 20).decode().removesuffix("\n"))
         write_study(folder, study)
 
 
-def _show(study: Study, shown: dict[str, Any]) -> None:
-    """What is shown, and whether people can be asked so much."""
-    for view in shown["views"]:
-        study.views.append(View(**{**view, "blocks": [Block(**block) for block in view.get("blocks", [])]}))
-    study.conditions = shown.get("conditions", [])
+def _show(study: Study, stimuli: str, o: dict[str, Any]) -> None:
+    """Makes the pictures; whether people can be asked so much."""
+    from .shown import show  # takes numpy
+    names = "block", "spacing", "spp_min", "spp_max"
+    show(study, o["views"], o.get("kinds", "").split(","), stimuli, {name: o[name] for name in names if name in o})
     fit_intervals(study)
     if plan_count(study) > MAX_TRIALS:
         raise Refused(f"more than {MAX_TRIALS} trials for one person: take fewer views, trials or repeats")
