@@ -66,10 +66,12 @@ class Block:
 
     @property
     def levels(self) -> list[Record]:
+        """Those that are levels."""
         return [r for r in self.records if r.kind == LEVEL]
 
     @property
     def reference(self) -> Record | None:
+        """None: it has none."""
         return self.records[-1] if self.records[-1].kind == REFERENCE else None
 
 
