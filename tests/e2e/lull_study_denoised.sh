@@ -51,7 +51,7 @@ for person in range(4):
     own = draw.gauss(0, 0.4)  # of everything that this participant sees
     for i, slot in enumerate(ask(f"api/people/{me['key']}")["slots"]):
         view = study["views"][slot["view"]]
-        t = math.log2(150) + own + {"noisy": 0, "denoised": 1, "blend": -1}[view["kind"]]
+        t = math.log2(130) + own + {"noisy": 0, "denoised": 0.7, "blend": -0.7}[view["kind"]]
         level = 0 if slot["catch"] else draw.choice(view["blocks"][slot["block"]]["levels"])
         seen = 1 if slot["catch"] else 0.5 + 0.25 * math.erfc((math.log2(level) - t) / 0.4 / math.sqrt(2))
         answer = slot["side"] + 1 if draw.random() < seen else 2 - slot["side"]
@@ -67,8 +67,8 @@ more() {
     awk -F';' -v kind="$1" -v truth="$2" '$1 == "(all)" && $2 == kind { ok = $7 - truth < 0.3 && truth - $7 < 0.3 && $8 < truth && truth < $9 &&
         $9 - $8 < 1 && $10 == 4 } END { exit !ok }' "$tmp/study/report/kinds.csv"
 }
-more denoised 1; check "report: denoised takes an octave more, though people differ" $?
-more blend -1; check "report: the blend an octave less" $?
+more denoised 0.7; check "report: denoised takes 0.7 octaves more, though people differ" $?
+more blend -0.7; check "report: the blend as much less" $?
 grep -q '^denoised: [12].[0-9]* × the samples of the noisy picture' "$tmp/said" && grep -q '^blend: 0.[0-9]* ×' "$tmp/said"
 check "report: says so" $?
 cut -d';' -f1 "$tmp/study/report/thresholds.csv" >"$tmp/names"
