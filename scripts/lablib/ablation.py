@@ -33,13 +33,11 @@ def options(parser):
 
 def read_plan(path):
     common, lines = [], []
-    with open(path, encoding="utf-8") as f:
-        for line in f:
-            words = line.split("#")[0].split()
-            if words and words[0] == "common":
-                common = words[1:]
-            elif words:
-                lines.append((words[0], words[1:]))
+    for _, words in tool.plan_lines(path):
+        if words[0] == "common":
+            common = words[1:]
+        else:
+            lines.append((words[0], words[1:]))
     return common, lines
 
 
