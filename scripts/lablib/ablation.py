@@ -73,7 +73,7 @@ def train(options, data, model):
 
 def row(name, options, model):
     card, half = tool.load(model + ".card.json"), model + ".f16"
-    ms = json.loads(ggn("bench", "--model", model, "--threads", 1, "--rounds", 9, "--batch", 4, "--json"))
+    ms = json.loads(tool.bench("ggn_networks", "--model", model, "--threads", 1, "--rounds", 9, "--batch", 4, "--json"))
     window = json.loads(ggn("inspect", "--json", model))["window"]
     ggn("convert", model, half)
     size = os.path.getsize(half)
