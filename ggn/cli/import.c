@@ -53,16 +53,7 @@ static int import_one(const struct options *o, const char *dir, struct base_err 
 
 static int is_visible(const struct dirent *e) { return e->d_name[0] != '.'; }
 
-/* What is not imported is said, or refused where it looks like a view. */
-static int leave_out(const char *path, struct base_err *err)
-{
-    if (ggn_import_looks_numbered(path))
-        return base_fail(err, BASE_EINVAL, "%s: none of its pictures is called NAME_00020.png (.jpg, .exr, .rawls)", path);
-    fprintf(stderr, "ggn import: %s: no pictures of a view, left out\n", path);
-    return 0;
-}
-
-/* Every view folder in the root, in order of name: a look at all, then the work. */
+/* Every view folder in the root, in order of name: a look at all, then the work, then what was left out. */
 static int import_all(const struct options *o, struct base_err *err)
 {
     struct dirent **entries;
@@ -70,7 +61,7 @@ static int import_all(const struct options *o, struct base_err *err)
     int rc = 0, found = 0, n = scandir(o->dir, &entries, is_visible, alphasort);
     if (n < 0)
         return base_fail(err, BASE_EIO, "%s: %s", o->dir, strerror(errno));
-    for (int i = 0; i < (is_view ? n : 2 * n) && !rc && !base_interrupted; i++) {
+    for (int i = 0; i < (is_view ? n : 3 * n) && !rc && !base_interrupted; i++) {
         char path[4096];
         struct stat st;
         if (base_file_join(path, o->dir, entries[i % n]->d_name, NULL) != 0 || stat(path, &st) != 0 || !S_ISDIR(st.st_mode))
@@ -78,10 +69,12 @@ static int import_all(const struct options *o, struct base_err *err)
         const int pictures = ggn_import_pictures(path);
         if (is_view && pictures > 1)
             rc = base_fail(err, BASE_EINVAL, "%s: pictures of a view, and a folder of them: %s", o->dir, path);
-        else if (pictures == 0 && i < n && !is_view)
-            rc = leave_out(path, err);
-        else if (pictures > 0 && !is_view)
+        else if (pictures > 0 && !is_view && i < 2 * n)
             rc = i < n ? ggn_import_check(path, &o->how, err) : import_one(o, path, err);
+        else if (pictures == 0 && !is_view && i < n && ggn_import_looks_numbered(path))
+            rc = base_fail(err, BASE_EINVAL, "%s: none of its pictures is called NAME_00020.png (.jpg, .exr, .rawls)", path);
+        else if (pictures == 0 && found && i >= 2 * n)
+            fprintf(stderr, "ggn import: %s: no pictures of a view, left out\n", path);
         found += pictures > 0;
     }
     while (n > 0)
