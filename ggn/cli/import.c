@@ -53,25 +53,35 @@ static int import_one(const struct options *o, const char *dir, struct base_err 
 
 static int is_visible(const struct dirent *e) { return e->d_name[0] != '.'; }
 
-/* Every view folder in the root, in order of name: a look at all, then the work. */
+/* Every view folder in the root, in order of name: a look at all, then the work, then what was left out. */
 static int import_all(const struct options *o, struct base_err *err)
 {
     struct dirent **entries;
+    const int is_view = ggn_import_pictures(o->dir) > 1;
     int rc = 0, found = 0, n = scandir(o->dir, &entries, is_visible, alphasort);
     if (n < 0)
         return base_fail(err, BASE_EIO, "%s: %s", o->dir, strerror(errno));
-    for (int i = 0; i < 2 * n && !rc && !base_interrupted; i++) {
+    for (int i = 0; i < (is_view ? n : 3 * n) && !rc && !base_interrupted; i++) {
         char path[4096];
         struct stat st;
-        if (base_file_join(path, o->dir, entries[i % n]->d_name, NULL) != 0 || stat(path, &st) != 0 ||
-            !S_ISDIR(st.st_mode) || ggn_import_pictures(path) == 0)
+        if (base_file_join(path, o->dir, entries[i % n]->d_name, NULL) != 0 || stat(path, &st) != 0 || !S_ISDIR(st.st_mode))
             continue;
-        found++;
-        rc = i < n ? ggn_import_check(path, &o->how, err) : import_one(o, path, err);
+        const int pictures = ggn_import_pictures(path);
+        if (is_view && pictures > 1)
+            rc = base_fail(err, BASE_EINVAL, "%s: pictures of a view, and a folder of them: %s", o->dir, path);
+        else if (pictures > 0 && !is_view && i < 2 * n)
+            rc = i < n ? ggn_import_check(path, &o->how, err) : import_one(o, path, err);
+        else if (pictures == 0 && !is_view && i < n && ggn_import_looks_numbered(path))
+            rc = base_fail(err, BASE_EINVAL, "%s: none of its pictures is called NAME_00020.png (.jpg, .exr, .rawls)", path);
+        else if (pictures == 0 && found && i >= 2 * n)
+            fprintf(stderr, "ggn import: %s: no pictures of a view, left out\n", path);
+        found += pictures > 0;
     }
     while (n > 0)
         free(entries[--n]);
     free(entries);
+    if (!rc && is_view)
+        return import_one(o, o->dir, err);
     if (!rc && !found)
         rc = base_fail(err, BASE_EINVAL, "%s: no NAME_00020.png (.jpg, .exr, .rawls) … in it or in its folders", o->dir);
     return rc;
@@ -103,7 +113,7 @@ int ggn_cmd_import(int argc, char **argv, struct base_err *err)
     if (!rc)
         rc = base_make_folder(o.out, &made, err);
     if (!rc)
-        rc = ggn_import_pictures(o.dir) > 1 ? import_one(&o, o.dir, err) : import_all(&o, err);
+        rc = import_all(&o, err);
     ggn_thresholds_release(&thresholds);
     if (rc && made)
         rmdir(o.out); /* goes only if nothing was imported */

@@ -177,6 +177,9 @@ int ggn_cmd_reconstruct(int argc, char **argv, struct base_err *err)
         if (!rc && !view)
             rc = base_fail(err, BASE_EINVAL, "%s: %s", o.stops,
                            o.view ? "no such view" : "several views: --view NAME chooses one");
+        const uint32_t tiles = (m.width + m.block - 1) / m.block * ((m.height + m.block - 1) / m.block);
+        if (!rc && (uint32_t)view->n > tiles)
+            rc = base_fail(err, BASE_EINVAL, "%s: stops of %d blocks, %s has %u", o.stops, view->n, o.dir, tiles);
     }
     if (!rc && o.reference && !m.reference_spp)
         rc = base_fail(err, BASE_EINVAL, "%s: it was recorded without a reference", o.dir);

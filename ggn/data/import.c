@@ -34,24 +34,35 @@ struct view {
 };
 
 static const char HALF[] = "half"; /* behind a file's name, or the layer */
-static const char *const endings[] = {".png", ".exr", ".jpg", ".jpeg", ".rawls", NULL};
+/* Those behind the first READ name pictures that are not read: what light their numbers are is not known. */
+enum { READ = 5 };
+static const char *const endings[] = {".png", ".exr", ".jpg", ".jpeg", ".rawls", ".tif", ".tiff",
+                                      ".hdr", ".pfm", ".bmp", ".tga",  ".webp",  NULL};
+
+/* Of a picture's name; NULL: it is none's. */
+static const char *const *ending_of(const char *name)
+{
+    const char *dot = strrchr(name, '.');
+    const char *const *e = endings;
+    while (*e && (!dot || strcasecmp(dot, *e) != 0))
+        e++;
+    return *e ? e : NULL;
+}
 
 /* NAME_00020.png -> length of NAME, samples, whether it is NAME_half; 0: no level has such a name. Between name and number
  * stands '_', '-' or '.'. */
 static size_t split_name(const char *name, uint32_t *spp, int *is_half, const char **ending)
 {
+    const char *const *found = ending_of(name);
     const char *dot = strrchr(name, '.'), *digits = dot;
-    int i = 0;
-    while (endings[i] && (!dot || strcasecmp(dot, endings[i]) != 0))
-        i++;
-    if (!endings[i])
+    if (!found)
         return 0;
     while (digits > name && isdigit((unsigned char)digits[-1]))
         digits--;
     if (digits == dot || dot - digits > 9 || digits - name < 2 || !strchr("_-.", digits[-1]))
         return 0;
     *spp = (uint32_t)strtoul(digits, NULL, 10);
-    *ending = endings[i];
+    *ending = *found;
     size_t length = (size_t)(digits - 1 - name);
     const size_t half = sizeof HALF - 1;
     *is_half = length > half + 1 && !memcmp(name + length - half, HALF, half) && strchr("_-.", name[length - half - 1]);
@@ -127,6 +138,9 @@ static int add_file(struct view *v, const char *name, struct base_err *err)
         return 0;
     if (strlen(name) >= sizeof v->levels->file)
         return base_fail(err, BASE_EINVAL, "%s/%s: the name is too long", v->dir, name);
+    if (ending_of(name) - endings >= READ)
+        return base_fail(err, BASE_EINVAL, "%s/%s: such pictures are not read (expected .exr, .png, .jpg or .rawls)", v->dir,
+                         name);
     if (v->ending && v->ending != ending)
         return base_fail(err, BASE_EINVAL, "%s/%s: the sequence '%s' has %s files, too", v->dir, name, v->prefix, v->ending);
     v->ending = ending;
@@ -179,6 +193,20 @@ int ggn_import_pictures(const char *dir)
     scan(dir, &v, NULL);
     free(v.levels);
     return v.pictures;
+}
+
+int ggn_import_looks_numbered(const char *dir)
+{
+    struct dirent **entries;
+    int found = 0, n = scandir(dir, &entries, is_visible, NULL);
+    for (int i = 0; i < n; i++) {
+        const char *name = entries[i]->d_name;
+        found += ending_of(name) && strcspn(name, "0123456789") < (size_t)(strrchr(name, '.') - name);
+        free(entries[i]);
+    }
+    if (n >= 0)
+        free(entries);
+    return found > 1;
 }
 
 /* Samples of the first level that an evenly spaced sequence lacks: most steps are the smallest one, and the others are
@@ -360,6 +388,25 @@ static int find_halves(struct view *v, struct base_err *err)
         if (has_half_layer(v, &v->levels[i]))
             return base_fail(err, BASE_EINVAL, "%s: '%s' has a half, '%s' has none; all or none are needed", v->dir,
                              v->levels[i].file, v->levels[0].file);
+    return 0;
+}
+
+/* The pixels that EXR store are the same ones of their pictures. */
+static int check_windows(const struct view *v, struct base_err *err)
+{
+    struct pic_window first = {0}, here;
+    for (int i = 0; i < 2 * v->n; i++) {
+        const char *file = i % 2 ? v->levels[i / 2].half : v->levels[i / 2].file;
+        char path[4400];
+        snprintf(path, sizeof path, "%s/%s", v->dir, file);
+        if (!*file || pic_read_header(path, &here, NULL, 0, NULL) != 0)
+            continue; /* reading the pixels says why */
+        if (!first.width)
+            first = here;
+        if (here.x0 != first.x0 || here.y0 != first.y0)
+            return base_fail(err, BASE_EINVAL, "%s: its data window begins at %d,%d, that of '%s' at %d,%d", path, here.x0,
+                             here.y0, v->levels[0].file, first.x0, first.y0);
+    }
     return 0;
 }
 
@@ -579,6 +626,8 @@ int ggn_import_view(const char *dir, const char *out, const struct ggn_import_op
         rc = check_levels(&v, o->allow_gaps, err);
     if (!rc)
         rc = find_halves(&v, err);
+    if (!rc && !strcmp(v.ending, ".exr"))
+        rc = check_windows(&v, err);
     if (!rc)
         rc = init_manifest(&v, o, &m, err);
     int made = 0;

@@ -142,7 +142,8 @@ static int list_json(const char *path, const cJSON *root, struct ggn_thresholds 
     cJSON_ArrayForEach (block, blocks) {
         const cJSON *id = cJSON_GetObjectItemCaseSensitive(block, "id");
         const cJSON *y0 = cJSON_GetObjectItemCaseSensitive(block, "y0");
-        if (!cJSON_IsNumber(id) || !(id->valuedouble >= 0 && id->valuedouble < GGN_VIEW_BLOCKS))
+        if (!cJSON_IsNumber(id) || !(id->valuedouble >= 0 && id->valuedouble < GGN_VIEW_BLOCKS) ||
+            id->valuedouble != id->valueint)
             return base_fail(err, BASE_EINVAL, "%s: a block without a usable id", path);
         last = id->valueint > last ? id->valueint : last;
         columns += cJSON_IsNumber(y0) && y0->valuedouble == 0.0;
@@ -169,6 +170,8 @@ static int list_json(const char *path, const cJSON *root, struct ggn_thresholds 
         if (!cJSON_IsNumber(spp) || !(spp->valuedouble > 0.0 && spp->valuedouble < 1e12))
             return base_fail(err, BASE_EINVAL, "%s: block %d: spp %g (expected a number above 0, below 1e12)", path,
                              id->valueint, cJSON_IsNumber(spp) ? spp->valuedouble : (double)NAN);
+        if (!isnan(v->spp[id->valueint]))
+            return base_fail(err, BASE_EINVAL, "%s: block %d appears twice", path, id->valueint);
         v->spp[id->valueint] = spp->valuedouble;
     }
     return 0;

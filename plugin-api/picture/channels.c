@@ -149,24 +149,36 @@ static int refuse_channels(const char *file, const struct pic_channel *list, int
     return base_fail(err, BASE_EINVAL, "%s: none of its channels is a picture: %s (expected R, G and B, or Y)", file, names);
 }
 
-int pic_choose_channels(const char *file, const struct pic_channel *list, int count, struct pic_choice *out,
-                        struct base_err *err)
+/* The layers that the channels make. *out: to be freed. */
+static int find_layers(const char *file, const struct pic_channel *list, int count, struct layer **out, int *layer_count,
+                       struct base_err *err)
 {
-    struct layer *layers = calloc((size_t)count + 1, sizeof *layers);
-    const struct pic_channel *only = NULL;
-    int layer_count = 0, colours, others = 0, rc = 0;
-    if (!layers)
+    *layer_count = 0;
+    *out = calloc((size_t)count + 1, sizeof **out);
+    if (!*out)
         return base_fail_nomem(err, file);
     for (int i = 0; i < count; i++) {
-        struct layer *l = layer_of(layers, &layer_count, &list[i]);
+        struct layer *l = layer_of(*out, layer_count, &list[i]);
         const enum role role = role_of(&list[i]);
         if (l->at[role] < 0)
             l->at[role] = list[i].at;
-        if (role != ALPHA || count == 1) {
+    }
+    return 0;
+}
+
+int pic_choose_channels(const char *file, const struct pic_channel *list, int count, struct pic_choice *out,
+                        struct base_err *err)
+{
+    struct layer *layers;
+    const struct pic_channel *only = NULL;
+    int layer_count, colours, others = 0, rc = find_layers(file, list, count, &layers, &layer_count, err);
+    if (rc)
+        return rc;
+    for (int i = 0; i < count; i++)
+        if (role_of(&list[i]) != ALPHA || count == 1) {
             only = &list[i];
             others++;
         }
-    }
     const struct layer *picture = find_picture(layers, layer_count, &colours);
     if (picture)
         *out = choice_of(picture);
@@ -177,6 +189,31 @@ int pic_choose_channels(const char *file, const struct pic_channel *list, int co
             out->at[out->count++] = l->at[ALPHA];
     } else
         rc = colours > 1 ? refuse_layers(file, layers, layer_count, err) : refuse_channels(file, list, count, err);
+    free(layers);
+    return rc;
+}
+
+int pic_choose_layer(const char *file, const char *name, const struct pic_channel *list, int count, struct pic_choice *out,
+                     struct base_err *err)
+{
+    struct layer *layers;
+    const struct layer *found = NULL;
+    int layer_count, rc = find_layers(file, list, count, &layers, &layer_count, err);
+    if (rc)
+        return rc;
+    for (int i = 0; i < layer_count; i++) {
+        const struct layer *l = &layers[i];
+        const int is_grey = l->at[LUMINANCE] >= 0 && grey_of(l) >= 0;
+        if ((is_colour(l) || is_grey) && (*name ? ends_in(l, name) : l->is_own) &&
+            (!found || (found->length > strlen(name) && l->length == strlen(name))))
+            found = l;
+    }
+    if (found && is_colour(found))
+        *out = (struct pic_choice){found->part, 3, {found->at[RED], found->at[GREEN], found->at[BLUE]}};
+    else if (found)
+        *out = (struct pic_choice){found->part, 3, {found->at[LUMINANCE], found->at[LUMINANCE], found->at[LUMINANCE]}};
+    else
+        rc = base_fail(err, BASE_EINVAL, "%s: has no channels R, G and B in a layer '%s'", file, name);
     free(layers);
     return rc;
 }

@@ -31,6 +31,10 @@ enum { PIC_MAX_CHANNELS = 4096 };
  * of any name. BASE_EINVAL, naming layers or channels, when that does not tell, BASE_ENOMEM. file: named in errors. */
 int pic_choose_channels(const char *file, const struct pic_channel *list, int count, struct pic_choice *out,
                         struct base_err *err);
+/* The layer of this name, or the first whose last words it is ("ViewLayer.half" and a part "half" are "half"), in any case:
+ * red, green and blue, or its luminance thrice. "": those of a part's own layer. */
+int pic_choose_layer(const char *file, const char *name, const struct pic_channel *list, int count, struct pic_choice *out,
+                     struct base_err *err);
 
 #ifdef __cplusplus
 }

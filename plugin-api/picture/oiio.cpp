@@ -57,12 +57,14 @@ int complain(const char *name, std::string why, base_err *err)
                      why.empty() ? "unknown reason" : why.c_str());
 }
 
+bool is_exr(const ImageInput &input) { return std::strcmp(input.format_name(), "openexr") == 0; }
+
 /* Of an EXR all, of other formats the first. Channels are called as in the file: of luminance and chroma OpenImageIO 2.5
  * makes R, G and B. */
-std::vector<ImageSpec> list_parts(ImageInput &input, bool is_exr)
+std::vector<ImageSpec> list_parts(ImageInput &input)
 {
     std::vector<ImageSpec> parts{input.spec()};
-    for (int part = 1; is_exr && part < max_channels && input.seek_subimage(part, 0); part++)
+    for (int part = 1; is_exr(input) && part < max_channels && input.seek_subimage(part, 0); part++)
         parts.push_back(input.spec());
     input.seek_subimage(0, 0);
     input.geterror(); /* there is no such part */
@@ -81,10 +83,10 @@ pic_choice choose_by_place(const ImageSpec &spec)
     return choice;
 }
 
-int choose_picture(ImageInput &input, const char *name, pic_choice *out, base_err *err)
+/* Chooses among the channels of all parts. */
+template <typename rule> int choose_among(ImageInput &input, const char *name, base_err *err, rule choose)
 {
-    const bool is_exr = std::strcmp(input.format_name(), "openexr") == 0;
-    const std::vector<ImageSpec> parts = list_parts(input, is_exr);
+    const std::vector<ImageSpec> parts = list_parts(input);
     std::vector<pic_channel> list;
     for (size_t part = 0; part < parts.size(); part++) {
         const auto part_name = parts[part].get_string_attribute("oiio:subimagename");
@@ -95,13 +97,27 @@ int choose_picture(ImageInput &input, const char *name, pic_choice *out, base_er
     }
     if (list.size() > PIC_MAX_CHANNELS)
         return base_fail(err, BASE_EINVAL, "%s: %zu channels (expected at most %d)", name, list.size(), PIC_MAX_CHANNELS);
-    base_err why = {};
-    const int rc = pic_choose_channels(name, list.data(), static_cast<int>(list.size()), out, &why);
-    if (rc == BASE_ENOMEM || (rc != 0 && is_exr))
-        return base_fail(err, rc, "%s", why.text);
-    if (rc != 0)
-        *out = choose_by_place(parts[0]);
-    return 0;
+    return choose(list.data(), static_cast<int>(list.size()));
+}
+
+int choose_picture(ImageInput &input, const char *name, pic_choice *out, base_err *err)
+{
+    return choose_among(input, name, err, [&](const pic_channel *list, int count) {
+        base_err why = {};
+        const int rc = pic_choose_channels(name, list, count, out, &why);
+        if (rc == BASE_ENOMEM || (rc != 0 && is_exr(input)))
+            return base_fail(err, rc, "%s", why.text);
+        if (rc != 0)
+            *out = choose_by_place(input.spec());
+        return 0;
+    });
+}
+
+int choose_layer(ImageInput &input, const pic_request &q, pic_choice *out, base_err *err)
+{
+    return choose_among(input, q.name, err, [&](const pic_channel *list, int count) {
+        return pic_choose_layer(q.name, q.channel, list, count, out, err);
+    });
 }
 
 /* In the first part that has it. */
@@ -116,28 +132,6 @@ int choose_channel(ImageInput &input, const pic_request &q, pic_choice *out, bas
         }
     }
     return base_fail(err, BASE_EINVAL, "%s: has no channel '%s'", q.name, q.channel);
-}
-
-/* In the first part that has its R, G and B, or its Y, which is repeated. */
-int choose_layer(ImageInput &input, const pic_request &q, pic_choice *out, base_err *err)
-{
-    const std::string layer = *q.channel != '\0' ? std::string(q.channel) + "." : "";
-    for (int part = 0; input.seek_subimage(part, 0); part++) {
-        const std::vector<std::string> &names = input.spec().channelnames;
-        int at[4] = {};
-        for (int c = 0; c < 4; c++)
-            at[c] = static_cast<int>(std::find(names.begin(), names.end(), layer + "RGBY"[c]) - names.begin());
-        const int count = static_cast<int>(names.size());
-        if (at[0] < count && at[1] < count && at[2] < count)
-            *out = {part, 3, {at[0], at[1], at[2]}};
-        else if (at[3] < count)
-            *out = {part, 3, {at[3], at[3], at[3]}};
-        else
-            continue;
-        return 0;
-    }
-    return base_fail(err, BASE_EINVAL, "%s: has no channels '%sR', '%sG' and '%sB'", q.name, layer.c_str(), layer.c_str(),
-                     layer.c_str());
 }
 
 int choose(ImageInput &input, const pic_request &q, pic_choice *out, base_err *err)
@@ -294,7 +288,7 @@ void find_primaries(ImageInput &input, const ImageSpec &spec, const pic_choice &
 {
     static const float rec709[8] = PIC_REC709_PRIMARIES;
     const float same = 1e-3f; /* closer than writers that round to three digits */
-    if (s.count < 3 || s.at[1] == s.at[0] || std::strcmp(input.format_name(), "openexr") != 0)
+    if (s.count < 3 || s.at[1] == s.at[0] || !is_exr(input))
         return;
     const TypeDesc type(TypeDesc::FLOAT, 8);
     const ImageSpec first = input.spec(0, 0);

@@ -30,8 +30,8 @@ int pic_read_display(const char *path, struct pic_image *out, struct base_err *e
 int pic_read_light(const char *path, struct pic_image *out, struct base_err *err);
 /* The values of one channel, found by name ("lull.spp.V") in any part of the file. BASE_EINVAL if there is none. */
 int pic_read_channel(const char *path, const char *channel, struct pic_image *out, struct base_err *err);
-/* The light of LAYER.R, LAYER.G and LAYER.B (LAYER "": R, G and B), or of LAYER.Y thrice, as pic_read_light has that of the
- * picture; f32 alone. BASE_EINVAL if the file does not have them. */
+/* The light of a layer, as pic_choose_layer finds it and pic_read_light has that of the picture; f32 alone. BASE_EINVAL if
+ * the file does not have it. */
 int pic_read_layer(const char *path, const char *layer, struct pic_image *out, struct base_err *err);
 /* Of the first part, without its pixels: where they lie, and the attributes whose names are set. */
 int pic_read_header(const char *path, struct pic_window *window, struct pic_attribute *attributes, int count,

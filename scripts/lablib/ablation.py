@@ -33,13 +33,11 @@ def options(parser):
 
 def read_plan(path):
     common, lines = [], []
-    with open(path, encoding="utf-8") as f:
-        for line in f:
-            words = line.split("#")[0].split()
-            if words and words[0] == "common":
-                common = words[1:]
-            elif words:
-                lines.append((words[0], words[1:]))
+    for _, words in tool.plan_lines(path):
+        if words[0] == "common":
+            common = words[1:]
+        else:
+            lines.append((words[0], words[1:]))
     return common, lines
 
 
@@ -75,7 +73,7 @@ def train(options, data, model):
 
 def row(name, options, model):
     card, half = tool.load(model + ".card.json"), model + ".f16"
-    ms = json.loads(ggn("bench", "--model", model, "--threads", 1, "--rounds", 9, "--batch", 4, "--json"))
+    ms = json.loads(tool.bench("ggn_networks", "--model", model, "--threads", 1, "--rounds", 9, "--batch", 4, "--json"))
     window = json.loads(ggn("inspect", "--json", model))["window"]
     ggn("convert", model, half)
     size = os.path.getsize(half)

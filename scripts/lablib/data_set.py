@@ -79,23 +79,18 @@ def parse_film(where, fields):
 
 def read_plan(path):
     entries, folders, split_of, film = [], {}, {}, FILM
-    with open(path, encoding="utf-8") as f:
-        for number, line in enumerate(f, 1):
-            fields = line.split("#", 1)[0].split()
-            if not fields:
-                continue
-            where = f"{path}:{number}"
-            if fields[0] == "film":
-                film = parse_film(where, fields)
-                continue
-            entry = {**parse_entry(where, fields), "film": film}
-            scene = entry["name"].split("/")[0]
-            if split_of.setdefault(scene, entry["split"]) != entry["split"]:
-                raise Refused(f"{where}: scene '{scene}' is in {split_of[scene]} already (the split is by scene)")
-            if entry["name"] in folders:
-                raise Refused(f"{where}: {entry['name']} is on line {folders[entry['name']]} already")
-            folders[entry["name"]] = number
-            entries.append(entry)
+    for where, fields in tool.plan_lines(path):
+        if fields[0] == "film":
+            film = parse_film(where, fields)
+            continue
+        entry = {**parse_entry(where, fields), "film": film}
+        scene = entry["name"].split("/")[0]
+        if split_of.setdefault(scene, entry["split"]) != entry["split"]:
+            raise Refused(f"{where}: scene '{scene}' is in {split_of[scene]} already (the split is by scene)")
+        if entry["name"] in folders:
+            raise Refused(f"{where}: {entry['name']} is on line {folders[entry['name']]} already")
+        folders[entry["name"]] = where.rsplit(":", 1)[1]
+        entries.append(entry)
     return entries
 
 

@@ -222,8 +222,7 @@ def page(results, kind):
 
 def main(o):
     small = o.size == SIZE
-    with open(o.scenes or os.path.join(tool.ROOT, "scripts", "quote.plan"), encoding="utf-8") as file:
-        plan = [line.split() for line in file if line.strip() and not line.startswith("#")]
+    plan = [words for _, words in tool.plan_lines(o.scenes or os.path.join(tool.ROOT, "scripts", "quote.plan"))]
     name = "denoised" if o.denoise else "small" if small else "large"
     o.work = o.work or os.path.join(tool.BUILD, {"small": "quote", "denoised": "quote-denoised"}.get(name, "quote-%d" % o.size))
     os.makedirs(o.work, exist_ok=True)

@@ -63,6 +63,19 @@ def bench(name, *words, **how):
     return run(os.path.join(BUILD, "bench", name), *words, **how)
 
 
+def plan_lines(path):
+    """(place, words) of each line of a plan that has words in front of its #."""
+    found = []
+    with open(path, encoding="utf-8-sig") as file:
+        for number, line in enumerate(file, 1):
+            words = line.split("#", 1)[0].split()
+            if words:
+                found.append((f"{path}:{number}", words))
+    if not found:
+        raise Refused(f"{path}: a plan with nothing in it")
+    return found
+
+
 def load(*names):
     try:
         with open(os.path.join(*names), encoding="utf-8") as file:

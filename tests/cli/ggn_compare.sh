@@ -98,6 +98,10 @@ printf 'a;1;2;\n' >"$tmp/short.csv"
 fails "block counts differ" '4 blocks against 2' $ggn compare "$tmp/t.csv" "$tmp/short.csv"
 printf '{"blocks": [{"id": -1}]}' >"$tmp/bad.json"
 fails "bad report" 'usable id' $ggn compare "$tmp/t.csv" "$tmp/bad.json"
+printf '{"blocks": [{"id": 0.5, "spp": 3}]}' >"$tmp/bad.json"
+fails "  …half a block" 'usable id' $ggn compare "$tmp/t.csv" "$tmp/bad.json"
+printf '{"blocks": [{"id": 0, "spp": 3}, {"id": 0, "spp": 4}]}' >"$tmp/bad.json"
+fails "  …a block twice" 'bad.json: block 0 appears twice' $ggn compare "$tmp/t.csv" "$tmp/bad.json"
 fails "EXR without the channel" 'no channel' sh -c "oiiotool --pattern constant:color=1,1,1 4x4 3 -d float -o $tmp/rgb.exr && $ggn compare $tmp/t.csv $tmp/rgb.exr"
 
 oiiotool --pattern checker 40x40 3 -d uint8 -o "$tmp/a.png" --pattern constant:color=.5,.5,.5 40x30 3 -d uint8 -o "$tmp/b.png" >/dev/null 2>&1

@@ -95,6 +95,7 @@ $ggn reconstruct "$d" -o "$tmp/r2.png" -s "$tmp/stops.csv" --json >"$tmp/out" 2>
     oiiotool "$view/p3d_toy-view0_00100.png" --cut 32x32+0+0 "$view/p3d_toy-view0_00040.png" --cut 32x32+32+0 --origin +0+0 \
         --mosaic 2x1 "$tmp/r2.png" --fail 0 --warn 0 --diff >"$tmp/err" 2>&1
 check "reconstruct takes the first level that has as many samples, pixel for pixel" $?
+fails "reconstruct: stops of smaller blocks" "many.csv: stops of 20 blocks, $d has " sh -c "printf 'a;1;1;1;1;1;1;1;1;1;1;1;1;1;1;1;1;1;1;1;1\n' >$tmp/many.csv; $ggn reconstruct $d -o $tmp/r.png -s $tmp/many.csv"
 fails "reconstruct: several views" 'view NAME' sh -c "printf 'a;1;2;\nb;1;2;\n' >$tmp/two.csv; $ggn reconstruct $d -o $tmp/r.png -s $tmp/two.csv"
 
 # Damage: each is one clear line and exit 2.

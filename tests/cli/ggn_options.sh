@@ -89,6 +89,16 @@ $ggn import "$tmp/sin3d" -o "$tmp/imported" --block 16 --allow-gaps >"$tmp/out" 
 check "import --allow-gaps" $?
 [ "$(find "$tmp/imported" -name 'block-*' | wc -l)" -eq 4 ]
 check "import --block: four of 16 pixels" $?
+mkdir "$tmp/sin3d/deeper" "$tmp/sin3d/deeper/x"
+$ggn import "$tmp/sin3d" -o "$tmp/sin3d-out" --block 16 --allow-gaps >"$tmp/out" 2>"$tmp/err" &&
+    [ "$(cat "$tmp/err")" = "ggn import: $tmp/sin3d/deeper: no pictures of a view, left out" ]
+check "import says what folder it leaves out" $?
+touch "$tmp/sin3d/deeper/00020.png" "$tmp/sin3d/deeper/00040.png"
+fails "  …refuses one of pictures that it cannot order" "sin3d/deeper: none of its pictures is called NAME_00020.png" \
+    $ggn import "$tmp/sin3d" -o "$tmp/sin3d-out" --block 16 --allow-gaps
+mv "$tmp/sin3d/deeper/00020.png" "$tmp/sin3d/over_1.png" && mv "$tmp/sin3d/deeper/00040.png" "$tmp/sin3d/over_2.png"
+fails "  …and a folder that is a view and has one" "sin3d: pictures of a view, and a folder of them: $tmp/sin3d/p3d_toy-view0_part6" \
+    $ggn import "$tmp/sin3d" -o "$tmp/sin3d-out" --block 16 --allow-gaps
 
 # --- flip -------------------------------------------------------------------------------------------------------------------
 oiiotool --pattern constant:color=.5,.5,.5 80x40 3 -d uint8 -o "$tmp/grey.png" \

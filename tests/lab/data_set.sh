@@ -33,6 +33,10 @@ wrong "a/view0 is on line 1 already" "$good" "$good"
 wrong "'film 64 32' (expected film WIDTHxHEIGHT BLOCK)" "film 64 32"
 wrong "'film 64x64' (expected film WIDTHxHEIGHT BLOCK)" "$good" "film 64x64"
 refused "cannot read" --plan nowhere.plan data
+printf "# only\n\n" >empty.plan
+refused "empty.plan: a plan with nothing in it" --plan empty.plan data
+printf "\357\273\277train a scenes/cornell-box.pbrt 1 linear:1:2:1 0 5\n" >marked.plan
+t "a plan that begins with a mark" sh -c "'$M' data-set --plan marked.plan --list data"
 refused "--only calibration" --plan wrong.plan --only calibration data
 refused "arguments: --nonsense" --nonsense
 printf '%s\n' "train a scenes/cornell-box.pbrt 1 cubic:1:2:1 0 5" >levels.plan

@@ -53,6 +53,41 @@ static void expect(const char *names, const char *wanted)
         fail_msg("%s: %s, not %s", names, text, wanted);
 }
 
+/* A layer by its name, as other programs write it: in front of other words, in small letters, as a part. */
+static void layers_by_name(void **state)
+{
+    (void)state;
+    static const char *const cases[][3] = {
+        {"half", "R G B half.R half.G half.B", "0: 3 4 5"},
+        {"half", "R G B ViewLayer.half.B ViewLayer.half.G ViewLayer.half.R", "0: 5 4 3"},
+        {"half", "R G B HALF.r HALF.g HALF.b", "0: 3 4 5"},
+        {"half", "R G B half.red half.green half.blue", "0: 3 4 5"},
+        {"half", "Y half.Y half.A", "0: 1 1 1"},
+        {"half", "a.half.R a.half.G a.half.B half.R half.G half.B", "0: 3 4 5"}, /* rather the whole name */
+        {"half", "rgb:R rgb:G rgb:B|half:B half:G half:R", "1: 2 1 0"},
+        {"", "half.R half.G half.B R G B", "0: 3 4 5"},
+        {"half", "R G B behalf.R behalf.G behalf.B", NULL},
+        {"half", "R G B half.R half.G", NULL},
+        {"half", "R G B half.X half.Y half.Z", NULL},
+        {"half", "R G B half", NULL}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct file f;
+        struct pic_choice got = {0};
+        struct base_err err = {0};
+        char text[64];
+        make(&f, cases[i][1]);
+        const int rc = pic_choose_layer("a.exr", cases[i][0], f.list, f.count, &got, &err);
+        assert_int_equal(rc, cases[i][2] ? 0 : BASE_EINVAL);
+        if (rc) {
+            assert_string_equal(err.text, "a.exr: has no channels R, G and B in a layer 'half'");
+            continue;
+        }
+        snprintf(text, sizeof text, "%d: %d %d %d", got.part, got.at[0], got.at[1], got.at[2]);
+        if (got.count != 3 || strcmp(text, cases[i][2]) != 0)
+            fail_msg("%s: %s, not %s", cases[i][1], text, cases[i][2]);
+    }
+}
+
 static void pictures(void **state)
 {
     (void)state;
@@ -145,7 +180,7 @@ static void long_lists(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures), cmocka_unit_test(no_pictures),
-                                       cmocka_unit_test(long_lists)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures), cmocka_unit_test(layers_by_name),
+                                       cmocka_unit_test(no_pictures), cmocka_unit_test(long_lists)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -288,6 +288,45 @@ static void halves_of_some_levels(void **state)
     assert_non_null(strstr(err.text, "'a_8.exr' has a half, 'a_4.exr' has none"));
 }
 
+/* Levels whose stored pixels lie elsewhere in their pictures are no levels of one view. */
+static void other_windows(void **state)
+{
+    char dir[600], out[600];
+    struct base_err err = {0};
+    int labelled;
+    (void)state;
+    snprintf(dir, sizeof dir, "%s/windows", root);
+    snprintf(out, sizeof out, "%s/windows-out", root);
+    shell("mkdir %s && cd %s && for n in 4 8; do oiiotool --pattern constant:color=.5,.4,.3 8x8 3 --fullsize 16x16+0+0 "
+          "-d float -o a_$n.exr; done && oiiotool a_8.exr --origin +2+3 --fullsize 16x16+0+0 -o a_16.exr",
+          dir, dir);
+    assert_int_equal(ggn_import_view(dir, out, &plain, &labelled, &err), BASE_EINVAL);
+    assert_non_null(strstr(err.text, "a_16.exr: its data window begins at 2,3, that of 'a_4.exr' at 0,0"));
+    shell("rm %s/a_16.exr%s", dir, "");
+    assert_int_equal(ggn_import_view(dir, out, &plain, &labelled, &err), 0);
+}
+
+/* Of several views one in pictures that are not read, or whose names tell no levels, is no reason to do without it. */
+static void pictures_that_are_no_levels(void **state)
+{
+    static const char *const names[] = {"a_20.tif", "a_20.HDR", "a20.png", "00020.png", "a_20spp.exr", "wood.png", "x7.txt"};
+    struct base_err err = {0};
+    char dir[600];
+    (void)state;
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        snprintf(dir, sizeof dir, "%s/odd-%zu", root, i);
+        shell("mkdir %s%s", dir, "");
+        shell("touch %s/%s", dir, names[i]);
+        shell("touch %s/b%s", dir, names[i]);
+        assert_int_equal(ggn_import_pictures(dir), i < 2 ? 1 : 0);
+        assert_int_equal(ggn_import_looks_numbered(dir), i < 5);
+    }
+    snprintf(dir, sizeof dir, "%s/odd-0", root);
+    shell("rm %s/b%s", dir, names[0]);
+    assert_int_equal(ggn_import_check(dir, &plain, &err), BASE_EINVAL);
+    assert_non_null(strstr(err.text, "odd-0/a_20.tif: such pictures are not read (expected .exr, .png, .jpg or .rawls)"));
+}
+
 static void scene_names(void **state)
 {
     (void)state;
@@ -669,6 +708,8 @@ int main(void)
         cmocka_unit_test(litter_is_left_where_it_is),
         cmocka_unit_test(halves_are_converted_as_pictures),
         cmocka_unit_test(halves_of_some_levels),
+        cmocka_unit_test(other_windows),
+        cmocka_unit_test(pictures_that_are_no_levels),
         cmocka_unit_test(scene_names),
         cmocka_unit_test(rawls),
         cmocka_unit_test(rawls_layout),
