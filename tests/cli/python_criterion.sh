@@ -62,6 +62,10 @@ wrong "wrong.py:1: SyntaxError: '(' was never closed in 'def check(block:'" <<'E
 def check(block:
 E2
 wrong "wrong.py: it has no check(block)" </dev/null
+wrong "wrong.py: python3 ended its process: exit status 1" <<'E2'
+import os; os.closerange(3, 100)
+def check(block): return True
+E2
 wrong "wrong.py: check is 3: expected a function" <<'E2'
 check = 3
 E2
@@ -134,6 +138,7 @@ meek() { # meek: the script on standard input stops every block at 30 samples an
     cat err m.json
     [ ! -s out ] && ! grep -q lull-render err && [ "$(says m.json '{b["reason"] for b in r["blocks"]}')" = "{'criterion'}" ]
 }
+echo 'x = 1' >beside.py
 while read -r body; do
     printf 'import os, sys, threading, time\nrequires = ["color", "half"]\ndef check(block):\n    %s\n    return 30 if block.spp < 30 else True\n' "$body" >body
     t "asked: $body" meek <body
@@ -145,6 +150,7 @@ block.color[:] = 0; block.half.fill(7)
 sys.stdout.close(); sys.stderr.close()
 threading.Thread(target=lambda: time.sleep(1000)).start()
 os.chdir("/"); os.environ.clear()
+import beside; os.chdir("/")
 E2
 printf 'requires = ["color"]\ndef check(block):\n    print("x" * 100)\n    return block.spp > 20\n' >prints.py
 t "no standard streams" sh -c "'$P' $blocks -c prints.py -o n.exr --report n.json <&- >&- 2>&-"

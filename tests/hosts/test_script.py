@@ -125,7 +125,8 @@ def test_failing():
         frame, told = rendered(checked(body))
         assert told.startswith("criterion mine: ") and text in told and "\n" not in told, told
         assert {b.reason for b in frame.blocks} == {"spp-max"} and frame.totals.failed_checks > 1
-    for body in ("return np.bool_(block.spp > 20), np.float32(.5), None", "return (np.int64(block.spp + 9) if block.spp < 20 else True), np.array(.5)",
+    written("x = 1", "beside.py")
+    for body in ("import beside; return beside.x == 1, .5", "return np.bool_(block.spp > 20), np.float32(.5), None", "return (np.int64(block.spp + 9) if block.spp < 20 else True), np.array(.5)",
                  "block.color[:] = np.nan; return True, .5"):
         frame, told = rendered(checked(body, "import numpy as np"))
         assert not told and {b.reason for b in frame.blocks} == {"criterion"} and frame.blocks[0].error == .5, (body, told)
