@@ -147,10 +147,12 @@ def test_refused():
                       ("requires = ['red']\ncheck = print", "mine.py: requires is ['red']"), ("raise SystemExit", "mine.py:1: SystemExit"),
                       ("check = print\nparameters = {'a': []}", "mine.py: the parameter 'a' is []")):
         raises(lull.LullError, why, lull.load, written(text))
-    path = checked("return True", "parameters = {'k': 1.5, 'n': 2}")
+    path = checked("return True", "parameters = {'k': 1.5, 'n': 2, 't': ''}")
     raises(lull.LullError, "no parameter 'x'", lull.load, path, x=1)
     raises(lull.LullError, "n: '1.5' is not an integer", lull.load, path, n=1.5)
     raises(lull.LullError, "no such file", lull.load, tmp("none.py"))
+    raises(ValueError, "has a NUL", lull.load, path, t="a\0b")
+    raises(ValueError, "has a NUL", lull.load, path + "\0")
     raises(lull.LullError, "holds no criterion with the id other", lull.load, f"{path}:other")
     assert lull.load(f"{path}:mine").info.id == "mine"
 
