@@ -132,9 +132,8 @@ class Script:
 
     def _planes(self, name: str) -> int:
         """A mask."""
-        value = getattr(self.module, name, [])
-        if not isinstance(value, (list, tuple)) or not all(isinstance(plane, str) and plane in PLANES for plane in value):
-            raise Refused(f"{name} is {_short(value)}: expected a list of {', '.join(PLANES)}")
+        value = self._of(name, lambda names: isinstance(names, (list, tuple)) and all(isinstance(plane, str) and plane in PLANES for plane in names),
+                         [], f"a list of {', '.join(PLANES)}")
         return sum(1 << list(PLANES).index(plane) for plane in set(value))
 
     @staticmethod
