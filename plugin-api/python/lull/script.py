@@ -7,17 +7,17 @@ A file has `requires`, a list of planes, and `check(block)`; perhaps `uses`, `fi
 """
 from __future__ import annotations
 
+import os
 import sys
 
-if __name__ == "__main__":
-    sys.path = [folder for folder in sys.path if folder]  # not the folder that a renderer was started in
+if __name__ == "__main__":  # of the variables of other Pythons (-E) this one; not the folder that a renderer was started in
+    sys.path = [folder for folder in (*os.environ.get("PYTHONPATH", "").split(":"), *sys.path) if folder]
 
 import contextlib  # noqa: E402
 import ctypes as C  # noqa: E402
 import hashlib  # noqa: E402
 import linecache  # noqa: E402
 import math  # noqa: E402
-import os  # noqa: E402
 import re  # noqa: E402
 import signal  # noqa: E402
 import traceback  # noqa: E402
