@@ -77,7 +77,8 @@ static int write_page(const struct settings *s, const char *report, const char *
             layers[count++] = (struct lull_host_layer){names[i], i == 0 ? picture.u8 : codes[i]};
     if (!rc && lull_host_page(report, quote, layers, count, (uint32_t)picture.width, (uint32_t)picture.height, s->page,
                               &e) != LULL_OK)
-        rc = base_fail(err, BASE_EINVAL, "%s: %s", s->args[0], e.message);
+        rc = base_fail(err, BASE_EINVAL, "%s%s%s: %s", s->args[0], s->quoted ? " with --quoted " : "",
+                       s->quoted ? s->quoted : "", e.message);
     for (int i = 0; i < LAYERS; i++)
         free(codes[i]);
     pic_release(&picture);

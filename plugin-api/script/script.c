@@ -100,7 +100,7 @@ static int cancelled(void *data)
 
 static int32_t ask_child(struct lull_instance *in, double limit_s, struct lull_error *err)
 {
-    char *named = getenv("LULL_PYTHON"), run[] = "-c", python[] = "python3";
+    char *named = getenv("LULL_PYTHON"), run[] = "-Ec", python[] = "python3";
     char *arguments[] = {named && *named ? named : python, run, lull_script_py, NULL};
     struct base_err e = {0};
     switch (base_process_ask(&in->child, arguments, limit_s + GRACE_S, cancelled, (void *)(uintptr_t)in->kit.host, &e)) {

@@ -23,12 +23,17 @@ MPI_ENV = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
            "OMPI_MCA_btl_vader_single_copy_mechanism": "none"}
 WORK, MODEL = Path(sys.argv[1]), sys.argv[2]
 
+# Of criteria in Python: one with numpy; without one there are none.
+PYTHON = next((python for python in (sys.executable, "/usr/bin/python3")
+               if subprocess.run([python, "-c", "import numpy"], stderr=subprocess.DEVNULL).returncode == 0), "")
+
 # name: its arguments, its environment
 CRITERIA = {**{name: (["-c", name], STUB) for name in ("observer", "denoised", "ggn", "halfbuf", "variance", "null", "attributes",
                                                        "noise-mask")},
             "fixed": (["-c", "fixed", "-p", "spp=16"], STUB),
             "svd-entropy": (["-c", "svd-entropy", "-p", f"model={MODEL}"], STUB),
             "denoised, no denoiser": (["-c", "denoised"], {"LULL_OIDN": "/nowhere"}),
+            "dammertz": (["-c", str(ROOT / "plugin-api/examples/dammertz.py")], {**STUB, "LULL_PYTHON": PYTHON}),
             "unset": (["-c", f"{PLUGINS}/unset.so"], STUB), "odd": (["-c", f"{PLUGINS}/unset.so:odd"], STUB)}
 
 # name: the steps of the action, what each adds to the command line
@@ -196,7 +201,7 @@ PICTURES = {
 }
 SIZES = {"": ["--size", "48x32", "--block", "16"], ", of one pixel": ["--size", "1x1", "--block", "16"]}
 # Criteria that look at noise, in pictures that have none: they soon see it.
-SOON, QUIET = {"observer", "denoised", "halfbuf", "variance", "unset"}, {"empty", "black", "of one colour"}
+SOON, QUIET = {"observer", "denoised", "halfbuf", "dammertz", "variance", "unset"}, {"empty", "black", "of one colour"}
 
 
 def nothing(name, picture):
@@ -271,7 +276,7 @@ def main():
         (WORK / "path.csv").write_text("frame;eye;at;up;fov\n1;0 1 3.4;0 1 0;0 1 0;45\n2;0 1 3.3;0 1 0;0 1 0;45\n")
     rows, look = (list(ACTIONS), cell) if acts else ([p + size for p in PICTURES for size in SIZES], nothing)
     has_mpi = shutil.which("mpirun") and (BUILD / "lib/lull/modules/lull-mpi.so").exists()
-    names = [name for name in CRITERIA if acts or name != "denoised, no denoiser"]
+    names = [name for name in CRITERIA if (acts or name != "denoised, no denoiser") and (PYTHON or name != "dammertz")]
     pairs = [(name, row) for row in rows for name in names if has_mpi or "processes" not in row]
     with concurrent.futures.ThreadPoolExecutor(max_workers=3) as pool:
         cells = dict(zip(pairs, pool.map(lambda pair: look(*pair), pairs)))
@@ -282,11 +287,13 @@ def main():
     for pair in pairs:
         (got, wrong), wanted = cells[pair], expected.get(pair)
         report.append((f"{pair[1]}, {pair[0]}: {got[:60]}", wrong if got == wanted else [*wrong, f"expected: {wanted}", f"got:      {got}"]))
-    report.append(("what is expected is tried", [f"{pair}" for pair in expected if pair not in cells and has_mpi]))
+    report.append(("what is expected is tried", [f"{pair}" for pair in expected if pair not in cells and has_mpi and PYTHON]))
     for n, (what, wrong) in enumerate(report, 2):
         print(f"{'not ok' if wrong else 'ok'} {n} - {what}", *(f"# {w}" for w in wrong), sep="\n")
     if not has_mpi:
         print(f"ok {len(report) + 2} - two processes # SKIP there is no MPI")
+    if not PYTHON:
+        print(f"ok {len(report) + 3} - a criterion in Python # SKIP there is no python3 with numpy")
     return any(wrong for _, wrong in report)
 
 

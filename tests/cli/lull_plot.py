@@ -150,9 +150,9 @@ def test_without():
     os.makedirs("without", exist_ok=True)
     write("without/matplotlib.py", 'raise ImportError("none here", name="matplotlib")')
     env = {**os.environ, "PYTHONPATH": os.path.abspath("without")}
-    done = subprocess.run([PROGRAM, "stops.csv", "-o", "no.png"], env=env, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, PROGRAM, "stops.csv", "-o", "no.png"], env=env, capture_output=True, text=True)
     assert done.returncode == 2 and done.stderr.count("\n") == 1 and "apt-get install python3-matplotlib" in done.stderr, done
-    assert subprocess.run([PROGRAM, "--help"], env=env, capture_output=True, text=True).stdout.startswith("Usage: lull-plot ")
+    assert subprocess.run([sys.executable, PROGRAM, "--help"], env=env, capture_output=True, text=True).stdout.startswith("Usage: lull-plot ")
     subprocess.run([sys.executable, "-c", "import lull"], env={**env, "PYTHONPATH": f"{env['PYTHONPATH']}:{PACKAGE}"}, check=True)
 
 

@@ -24,7 +24,7 @@ swept() {
         case $status in
         0) ended=1 ;;
         1 | 2) ended=$lines ;;
-        127) ended=$(grep -c 'error while loading shared libraries' "$tmp/err") ;;
+        127) ended=$(grep -c 'error while loading shared libraries\|cannot allocate TLS data' "$tmp/err") ;;
         *) ended=0 ;;
         esac
         if [ "$ended" != 1 ] || [ "$left" != 0 ]; then

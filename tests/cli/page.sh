@@ -63,6 +63,7 @@ cp p.html made.html && cp r.json made.json
 report=$(dirname "$P")/lull-report
 t "lull-report writes the page of a report and its picture" "$report" r.json old.exr --quoted q.json -o p.html
 t "  …with both" look "data['report'] == report and data['quote'] and list(pictures) == ['picture']"
+t "  …but of another file, which it names" sh -c "'$report' r.json --quoted made.json -o no.html 2>&1 | grep 'made.json: no quote'"
 t "  …without a picture" "$report" r.json -o p.html
 t "  …the report alone" look "data['report'] == report and data['quote'] is None and not pictures"
 oiiotool --pattern constant:color=.1,.2,.3,.5,.5,.5,.9,.8,.7 48x32 9 \

@@ -62,6 +62,10 @@ wrong "wrong.py:1: SyntaxError: '(' was never closed in 'def check(block:'" <<'E
 def check(block:
 E2
 wrong "wrong.py: it has no check(block)" </dev/null
+wrong "wrong.py: python3 ended its process: exit status 1" <<'E2'
+import os; os.closerange(3, 100)
+def check(block): return True
+E2
 wrong "wrong.py: check is 3: expected a function" <<'E2'
 check = 3
 E2
@@ -134,6 +138,7 @@ meek() { # meek: the script on standard input stops every block at 30 samples an
     cat err m.json
     [ ! -s out ] && ! grep -q lull-render err && [ "$(says m.json '{b["reason"] for b in r["blocks"]}')" = "{'criterion'}" ]
 }
+echo 'x = 1' >beside.py
 while read -r body; do
     printf 'import os, sys, threading, time\nrequires = ["color", "half"]\ndef check(block):\n    %s\n    return 30 if block.spp < 30 else True\n' "$body" >body
     t "asked: $body" meek <body
@@ -145,7 +150,15 @@ block.color[:] = 0; block.half.fill(7)
 sys.stdout.close(); sys.stderr.close()
 threading.Thread(target=lambda: time.sleep(1000)).start()
 os.chdir("/"); os.environ.clear()
+import beside; os.chdir("/")
 E2
+mkdir path && echo 'x = 1' >path/on_path.py
+printf 'import on_path\nrequires = ["color", "half"]\ndef check(block):\n    return 30 if block.spp < 30 else True\n' >body
+render=$P
+printf '#!/bin/sh\nPYTHONPATH=path PYTHONHOME=/none PYTHONIOENCODING=x PYTHONHASHSEED=x PYTHONVERBOSE=1 exec "%s" "$@"\n' "$render" >others && chmod +x others
+quiet() { meek && [ ! -s err ]; }
+P=./others t "of the variables for other Pythons it knows PYTHONPATH alone" quiet <body
+P=$render
 printf 'requires = ["color"]\ndef check(block):\n    print("x" * 100)\n    return block.spp > 20\n' >prints.py
 t "no standard streams" sh -c "'$P' $blocks -c prints.py -o n.exr --report n.json <&- >&- 2>&-"
 t "  ...and the blocks stop" [ "$(says n.json '{b["reason"] for b in r["blocks"]}')" = "{'criterion'}" ]
@@ -162,7 +175,6 @@ LULL_PYTHON=/no/such/python3 none "cannot run /no/such/python3: No such file or 
 LULL_PYTHON=$PWD/fifo.py none "cannot run $PWD/fifo.py: Permission denied"
 LULL_PYTHON=false none "python3 ended its process: exit status 1"
 LULL_PYTHON=$own
-render=$P
 printf '#!/bin/sh\nunset LULL_PYTHON\nPATH=/nonexistent exec "%s" "$@"\n' "$render" >pathless && chmod +x pathless
 P=./pathless none "cannot run python3: No such file or directory"
 mkdir bin && cp "$render" bin

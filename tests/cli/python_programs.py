@@ -103,6 +103,28 @@ def test_work():
     assert len(pictures) == 1
 
 
+def test_variables():
+    """what is set for other Pythons, as programs that bring their own do, is no matter of the programs'"""
+    os.mkdir("other")
+    for name in ("numpy", "matplotlib", "lull", "json"):
+        with open(f"other/{name}.py", "w", encoding="utf-8") as file:
+            file.write("raise SystemExit(9)\n")
+    for command in (WORK, [f"{BIN}/lull-study", "--help"], [f"{BIN}/ggn", "compare", "thresholds.csv", "thresholds.csv"]):
+        want = run(command)
+        assert want[0] == 0 and not want[2], (command, want)
+        for name, value in (("HOME", "/none"), ("INSPECT", "1"), ("IOENCODING", "x"), ("PATH", os.path.abspath("other")), ("HASHSEED", "x"), ("VERBOSE", "1")):
+            assert run(command, env={f"PYTHON{name}": value}) == want, (command, name)
+
+
+def test_gone():
+    """a current folder that is no more is what is said, where a name needs it"""
+    gone = 'mkdir gone && cd gone && rmdir ../gone && exec "$@"'
+    for command in ([*WORK[:1], f"{TMP.name}/stops.csv", *WORK[2:]], [*MODULE, "lull", "watch", "none"],
+                    [f"{BIN}/lull-study", "export", RECORDED, "-o", "all.json"], [f"{BIN}/ggn", "compare", *2 * [f"{TMP.name}/thresholds.csv"], "-o", "out"]):
+        status, out, err = run(["sh", "-c", gone, "-", *command])
+        assert status == 2 and not out and err.count("\n") == 1 and "the current folder: No such file or directory" in err, (command, status, out, err)
+
+
 def test_blender():
     """Blender is started with three streams, and by its name"""
     if importlib.util.find_spec("bpy"):

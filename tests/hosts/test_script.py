@@ -125,7 +125,8 @@ def test_failing():
         frame, told = rendered(checked(body))
         assert told.startswith("criterion mine: ") and text in told and "\n" not in told, told
         assert {b.reason for b in frame.blocks} == {"spp-max"} and frame.totals.failed_checks > 1
-    for body in ("return np.bool_(block.spp > 20), np.float32(.5), None", "return (np.int64(block.spp + 9) if block.spp < 20 else True), np.array(.5)",
+    written("x = 1", "beside.py")
+    for body in ("import beside; return beside.x == 1, .5", "return np.bool_(block.spp > 20), np.float32(.5), None", "return (np.int64(block.spp + 9) if block.spp < 20 else True), np.array(.5)",
                  "block.color[:] = np.nan; return True, .5"):
         frame, told = rendered(checked(body, "import numpy as np"))
         assert not told and {b.reason for b in frame.blocks} == {"criterion"} and frame.blocks[0].error == .5, (body, told)
@@ -146,10 +147,12 @@ def test_refused():
                       ("requires = ['red']\ncheck = print", "mine.py: requires is ['red']"), ("raise SystemExit", "mine.py:1: SystemExit"),
                       ("check = print\nparameters = {'a': []}", "mine.py: the parameter 'a' is []")):
         raises(lull.LullError, why, lull.load, written(text))
-    path = checked("return True", "parameters = {'k': 1.5, 'n': 2}")
+    path = checked("return True", "parameters = {'k': 1.5, 'n': 2, 't': ''}")
     raises(lull.LullError, "no parameter 'x'", lull.load, path, x=1)
     raises(lull.LullError, "n: '1.5' is not an integer", lull.load, path, n=1.5)
     raises(lull.LullError, "no such file", lull.load, tmp("none.py"))
+    raises(ValueError, "has a NUL", lull.load, path, t="a\0b")
+    raises(ValueError, "has a NUL", lull.load, path + "\0")
     raises(lull.LullError, "holds no criterion with the id other", lull.load, f"{path}:other")
     assert lull.load(f"{path}:mine").info.id == "mine"
 

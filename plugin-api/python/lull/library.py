@@ -111,9 +111,12 @@ def encoded(text: Union[str, os.PathLike[str]]) -> bytes:
     """A name or another text as the library and the file system take it. A locale of ASCII, such as C, need not have its letters:
     then they are UTF-8, as they would be everywhere else."""
     try:
-        return os.fsencode(text)
+        name = os.fsencode(text)
     except UnicodeEncodeError:
-        return os.fspath(text).encode("utf-8", "surrogateescape")
+        name = os.fspath(text).encode("utf-8", "surrogateescape")
+    if b"\0" in name:  # the library would take what stands before it
+        raise ValueError(f"{text!r} has a NUL")
+    return name
 
 
 def call(name: str, *arguments: Any) -> None:

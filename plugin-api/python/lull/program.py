@@ -142,5 +142,6 @@ def run(command: str, work: Callable[[], Optional[int]], packages: str = "") -> 
         except KeyboardInterrupt:
             status = INTERRUPTED
         except OSError as error:
-            status, why = 2, f"{error.filename}: {error.strerror}" if error.filename else f"{error.strerror or error}"
+            where = error.filename or ("the current folder" if error.errno == errno.ENOENT else "")  # os.getcwd names nothing
+            status, why = 2, f"{where}: {error.strerror}" if where else f"{error.strerror or error}"
         return _end(command, status, why)

@@ -7,22 +7,23 @@ A file has `requires`, a list of planes, and `check(block)`; perhaps `uses`, `fi
 """
 from __future__ import annotations
 
+import os
 import sys
 
-if __name__ == "__main__":
-    sys.path = [folder for folder in sys.path if folder]  # not the folder that a renderer was started in
+if __name__ == "__main__":  # of the variables of other Pythons (-E) this one; not the folder that a renderer was started in
+    sys.path = [folder for folder in (*os.environ.get("PYTHONPATH", "").split(":"), *sys.path) if folder]
 
+import contextlib  # noqa: E402
 import ctypes as C  # noqa: E402
 import hashlib  # noqa: E402
 import linecache  # noqa: E402
 import math  # noqa: E402
-import os  # noqa: E402
 import re  # noqa: E402
 import signal  # noqa: E402
 import traceback  # noqa: E402
 import types  # noqa: E402
 from collections import namedtuple  # noqa: E402
-from typing import Any  # noqa: E402
+from typing import Any, Iterator  # noqa: E402
 
 try:
     import numpy as np
@@ -94,13 +95,8 @@ class Script:
         self.module = types.ModuleType(f"lull_script_{made + 1}")
         self.module.__file__ = path
         sys.modules[self.module.__name__] = self.module  # dataclasses and others look there
-        folder = os.path.dirname(path)
-        sys.path.insert(0, folder)  # for what lies beside it
-        try:
+        with self._neighbours():
             exec(compile(source, path, "exec"), vars(self.module))
-        finally:
-            if folder in sys.path:
-                sys.path.remove(folder)
         self.required, self.used = self._planes("requires"), self._planes("uses")
         self.check = self._of("check", callable, None, "a function")
         self.first_spp = self._of("first_spp", lambda n: type(n) is int and 1 <= n <= 10**15, 1, "an integer from 1 on")
@@ -116,6 +112,17 @@ class Script:
         for name, kind, text in zip(self.parameters, self.kinds, values):
             self.parameters[name] = convert[kind](text)
 
+    @contextlib.contextmanager
+    def _neighbours(self) -> Iterator[None]:
+        """What lies beside it can be imported, also by check."""
+        folder = os.path.dirname(self.path)
+        sys.path.insert(0, folder)
+        try:
+            yield
+        finally:
+            if folder in sys.path:
+                sys.path.remove(folder)
+
     def _of(self, name: str, is_right: Any, preset: Any, expected: str) -> Any:
         """The module's attribute."""
         value = getattr(self.module, name, preset)
@@ -125,9 +132,8 @@ class Script:
 
     def _planes(self, name: str) -> int:
         """A mask."""
-        value = getattr(self.module, name, [])
-        if not isinstance(value, (list, tuple)) or not all(isinstance(plane, str) and plane in PLANES for plane in value):
-            raise Refused(f"{name} is {_short(value)}: expected a list of {', '.join(PLANES)}")
+        value = self._of(name, lambda names: isinstance(names, (list, tuple)) and all(isinstance(plane, str) and plane in PLANES for plane in names),
+                         [], f"a list of {', '.join(PLANES)}")
         return sum(1 << list(PLANES).index(plane) for plane in set(value))
 
     @staticmethod
@@ -151,7 +157,8 @@ class Script:
 
     def decide(self, block: Block) -> tuple[bool, int, float, float]:
         """Stop, samples at the next check (0: any), error, predicted samples: what check returned, understood."""
-        answer = self.check(block)
+        with self._neighbours():
+            answer = self.check(block)
         said, *more = answer if isinstance(answer, (tuple, list)) and answer else (answer,)
         said, line, next_spp = _plain(said), getattr(getattr(self.check, "__code__", None), "co_firstlineno", 0), 0.0
         if isinstance(said, (int, float)) and not isinstance(said, bool) and block.spp < said < math.inf:
@@ -295,4 +302,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (OSError, ValueError):  # the script has closed what we speak through: the caller tells it
+        os._exit(1)
