@@ -329,6 +329,15 @@ static struct pt_hit hit_in(const struct pt_scene *scene, const struct piece *pi
     return hit;
 }
 
+/* Whether all of a round surface is around its axis, seen from without: what lies around it, too, may hide that from a ray. */
+static int is_around(const struct piece *piece, const struct pt_place *at)
+{
+    const struct pt_quadric *q = piece->quadric;
+    return q && !piece->corner_count && q->phi_max > 6.28f &&
+           (q->kind == PT_QUADRIC_CYLINDER || q->z_max - q->z_min > 1.999f * q->radius) &&
+           v3_dot(at->s.n_geometric, v3_sub(at->p, piece->centre)) > 0.0f;
+}
+
 /* Whether the side of a piece against its normal is within a solid: a ray that way comes out of the same shape or, once it
  * has left all that is in between, of the same material. */
 static int is_solid(const struct pt_scene *scene, float time, const struct piece *piece, const struct piece *other)
@@ -340,6 +349,8 @@ static int is_solid(const struct pt_scene *scene, float time, const struct piece
     pt_place_at_hit(PT_FX_ALL, scene, &ray, &hit, &at);
     ray.direction = v3_neg(at.s.n_geometric);
     ray.origin = v3_madd(at.p, 2.0f * nearness(piece, other, at.s.n_geometric), ray.direction);
+    if (is_around(piece, &at))
+        return 1;
     for (int i = 0, inside = 0; i < WITHIN && pt_accel_intersect(scene, &ray, &hit); i++) {
         pt_place_at_hit(PT_FX_ALL, scene, &ray, &hit, &at);
         const int leaves = v3_dot(ray.direction, at.s.n_geometric) > 0.0f;

@@ -285,6 +285,12 @@ static const struct arrangement {
     {"a block in glass on a floor, from below", UP,
      SKY WHITE FLOOR_QUAD "AttributeBegin " GLASS BOX_WITHIN
                           "AttributeEnd Material \"diffuse\" Translate 0 .05 0 Scale .99 .9 .99 " BOX_WITHIN},
+    {"glass that fills a pot", ASLANT,
+     SKY WHITE FLOOR_QUAD STANDING
+     "Shape \"cylinder\" \"float radius\" .5 \"float zmin\" 0 \"float zmax\" 1.3 " GLASS
+     "Translate 0 0 %1$.9g Shape \"cylinder\" \"float radius\" %2$.9g \"float zmin\" 0 \"float zmax\" 1 "
+     "Shape \"disk\" \"float height\" 1 \"float radius\" %2$.9g ReverseOrientation "
+     "Shape \"disk\" \"float radius\" %2$.9g\n"},
     {"glass on a table that shines", CEILING_VIEW, TABLE GLASS "Scale .5 1 .5 " BOX_WITHIN},
     {"the table itself", ASLANT, TABLE GLASS "Scale .5 1 .5 " BOX_WITHIN},
     {"paper on a table that shines", CEILING_VIEW, TABLE PAPER QUAD_XZ("-1", "1", "%1$.9g", "-1", "1")},
