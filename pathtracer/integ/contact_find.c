@@ -329,7 +329,7 @@ static struct pt_hit hit_in(const struct pt_scene *scene, const struct piece *pi
     return hit;
 }
 
-/* Whether all of a round surface is around its axis, seen from without: what lies around it, too, may hide that from a ray. */
+/* Whether a round surface is all around its axis, seen from without: what lies around it, too, may hide that from a ray. */
 static int is_around(const struct piece *piece, const struct pt_place *at)
 {
     const struct pt_quadric *q = piece->quadric;
