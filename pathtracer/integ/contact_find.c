@@ -19,9 +19,12 @@
 #define BESIDE 1e-5f
 #define BESIDE_ROUNDING 2e-7f
 
-/* No scene takes more than seconds: MOST_PIECES of instances, at all times, of which one instance takes half of what is left
- * at most, are looked at, and MOST_PAIRS are compared. What is beyond that is taken as apart. */
-enum { CORNERS = 16, STEPS = 32, TIMES = 9, MOST_PIECES = 1 << 22, MOST_PAIRS = 1 << 26 };
+/* No scene takes more than seconds: MOST_PIECES of instances, at all times, are looked at, and MOST_PAIRS found near them,
+ * of which those that are compared count as COMPARED. An instance and a shape take half of what is left at most. What is
+ * beyond that is taken as apart. */
+enum { CORNERS = 16, STEPS = 32, TIMES = 9, MOST_PIECES = 1 << 22, MOST_PAIRS = 1 << 28, COMPARED = 16 };
+/* So many surfaces within a solid are looked through. */
+enum { WITHIN = 64 };
 
 /* A triangle, a disk as a polygon around it, or the whole of a sphere or cylinder; in render space. */
 struct piece {
@@ -44,9 +47,10 @@ static const struct box everywhere = {{-INFINITY, -INFINITY, -INFINITY}, {INFINI
 struct search {
     struct pt_scene *scene;
     float time;
-    struct piece piece; /* lets rays through */
+    struct piece piece; /* lets rays through, … */
+    int transmits;      /* … by its material */
     int64_t left;       /* pieces of instances that may still be looked at */
-    int64_t pairs;      /* pieces that may still be compared with one of these */
+    int64_t pairs;      /* pieces that may still be found near these */
     int32_t found;
 };
 
@@ -325,7 +329,17 @@ static struct pt_hit hit_in(const struct pt_scene *scene, const struct piece *pi
     return hit;
 }
 
-/* Whether the side of a piece against its normal is within a solid: a ray that way comes out of the same material. */
+/* Whether a round surface is all around its axis, seen from without: what lies around it, too, may hide that from a ray. */
+static int is_around(const struct piece *piece, const struct pt_place *at)
+{
+    const struct pt_quadric *q = piece->quadric;
+    return q && !piece->corner_count && q->phi_max > 6.28f &&
+           (q->kind == PT_QUADRIC_CYLINDER || q->z_max - q->z_min > 1.999f * q->radius) &&
+           v3_dot(at->s.n_geometric, v3_sub(at->p, piece->centre)) > 0.0f;
+}
+
+/* Whether the side of a piece against its normal is within a solid: a ray that way comes out of the same shape or, once it
+ * has left all that is in between, of the same material. */
 static int is_solid(const struct pt_scene *scene, float time, const struct piece *piece, const struct piece *other)
 {
     struct pt_hit hit = hit_in(scene, piece);
@@ -335,10 +349,18 @@ static int is_solid(const struct pt_scene *scene, float time, const struct piece
     pt_place_at_hit(PT_FX_ALL, scene, &ray, &hit, &at);
     ray.direction = v3_neg(at.s.n_geometric);
     ray.origin = v3_madd(at.p, 2.0f * nearness(piece, other, at.s.n_geometric), ray.direction);
-    if (!pt_accel_intersect(scene, &ray, &hit))
-        return 0;
-    pt_place_at_hit(PT_FX_ALL, scene, &ray, &hit, &at);
-    return at.shape->material == scene->shapes[piece->shape].material && v3_dot(ray.direction, at.s.n_geometric) > 0.0f;
+    if (is_around(piece, &at))
+        return 1;
+    for (int i = 0, inside = 0; i < WITHIN && pt_accel_intersect(scene, &ray, &hit); i++) {
+        pt_place_at_hit(PT_FX_ALL, scene, &ray, &hit, &at);
+        const int leaves = v3_dot(ray.direction, at.s.n_geometric) > 0.0f;
+        if (at.shape->material != scene->shapes[piece->shape].material)
+            inside += leaves ? -1 : 1;
+        else if (inside == 0 || (hit.shape == piece->shape && hit.instance == piece->instance))
+            return leaves;
+        ray.t_min = nextafterf(hit.t, INFINITY);
+    }
+    return 0;
 }
 
 static int has_box(const struct pt_shape *shape, struct box box)
@@ -371,11 +393,11 @@ static void compare(void *user, int32_t shape, int32_t primitive, int32_t instan
     const struct pt_scene *scene = search->scene;
     const struct piece *a = &search->piece;
     const struct pt_shape *of_a = &scene->shapes[a->shape], *of_b = &scene->shapes[shape];
-    if ((shape == a->shape && instance == a->instance) || --search->pairs < 0)
-        return;
     /* What alpha lets through is met by its name: it only must come before the opaque. */
-    if (of_b->layer != PT_LAYER_OPAQUE && !lets_through(scene, a->shape))
+    if (--search->pairs < 0 || (shape == a->shape && instance == a->instance) ||
+        (of_b->layer != PT_LAYER_OPAQUE && !search->transmits))
         return;
+    search->pairs -= COMPARED;
     struct piece b;
     piece_of(scene, search->time, shape, primitive, instance, &b);
     pt_vec3 near = v3_scale(v3_add(a->error, b.error), NEAR), around_a = v3_add(a->half, near),
@@ -407,8 +429,9 @@ static void search_shapes(struct search *search, int32_t first, int32_t count, i
     for (int time = 0; time < times; time++) {
         search->time = times > 1 ? (float)time / (float)(times - 1) : 0.0f;
         for (int32_t id = first; id < first + count; id++) {
-            const int64_t pieces = piece_count(search->scene, id);
-            for (int64_t i = 0; i < pieces && search->pairs > 0; i++) {
+            const int64_t pieces = piece_count(search->scene, id), enough = search->pairs / 2;
+            search->transmits = pieces && lets_through(search->scene, id);
+            for (int64_t i = 0; i < pieces && search->pairs > enough; i++) {
                 struct piece *piece = &search->piece;
                 piece_of(search->scene, search->time, id, (int32_t)i, instance, piece);
                 float radius = v3_len(piece->half) + nearness(piece, piece, v3_splat(1.0f));

@@ -236,12 +236,13 @@ static int finish(struct pt_builder *b, double *start)
     double start_s = base_clock_wall_s();
     rc = pt_accel_build(scene, err);
     if (!rc)
-        rc = pt_contacts_find(scene, err);
-    scene->stats.accel_s = base_clock_wall_s() - start_s;
-    if (!rc)
         *start = pt_build_far_view(b);
     rc = rc ? rc : b->diag.rc;
-    if (!rc && *start == b->camera_start) /* else all of it goes */
+    const int stays = *start == b->camera_start; /* else all of it goes */
+    if (!rc && stays)
+        rc = pt_contacts_find(scene, err);
+    scene->stats.accel_s = base_clock_wall_s() - start_s;
+    if (!rc && stays)
         rc = pt_lights_build(scene, err);
     if (!rc)
         add_stats(scene);

@@ -115,6 +115,30 @@ static struct pt_xform then(const struct pt_xform *second, const struct pt_mat34
     return pt_xform_mul(*second, t);
 }
 
+/* Of a ball or pipe that the view begins in: where the rays at the corners of the window leave it, which all others do
+ * later, since it is convex. 0: the view begins elsewhere. */
+static double nearest_of_hollow(const struct view *v, const struct pt_xform *t, const struct pt_quadric *q)
+{
+    const double along = q->kind == PT_QUADRIC_SPHERE, r = (double)q->radius;
+    struct pt_xform inverse;
+    double nearest = INFINITY;
+    if (q->kind == PT_QUADRIC_DISK || !pt_xform_invert(t, &inverse))
+        return 0;
+    for (int k = 0; k < 4; k++) {
+        const double *x = v->a[1 + k % 2], *y = v->a[3 + k / 2], sx = k % 2 ? 1 : -1, sy = k / 2 ? 1 : -1;
+        double p[3], d[3];
+        pt_xform_point(&inverse, (double[3]){sx * x[3], sy * y[3], 0}, p);
+        pt_xform_vector(&inverse, (double[3]){sx * x[2], sy * y[2], 1}, d);
+        const double a = d[0] * d[0] + d[1] * d[1] + along * d[2] * d[2];
+        const double b = p[0] * d[0] + p[1] * d[1] + along * p[2] * d[2];
+        const double c = p[0] * p[0] + p[1] * p[1] + along * p[2] * p[2] - r * r;
+        if (!(c < 0))
+            return 0;
+        nearest = fmin(nearest, a > 0 ? (sqrt(b * b - a * c) - b) / a : INFINITY);
+    }
+    return nearest;
+}
+
 static double nearest_of_shape(const struct view *v, const struct pt_scene *scene, const struct pt_shape *shape,
                                const struct pt_xform *t)
 {
@@ -122,7 +146,7 @@ static double nearest_of_shape(const struct view *v, const struct pt_scene *scen
         const struct pt_quadric *q = &scene->quadrics[shape->data];
         const double r = (double)q->radius, low[3] = {-r, -r, (double)q->z_min}, high[3] = {r, r, (double)q->z_max};
         const struct pt_xform all = then(t, &q->to_render);
-        return nearest_of_box(v, &all, low, high);
+        return fmax(nearest_of_hollow(v, &all, q), nearest_of_box(v, &all, low, high));
     }
     const struct pt_mesh *mesh = &scene->meshes[shape->data];
     double nearest = INFINITY;

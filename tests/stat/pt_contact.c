@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 #include <math.h>
@@ -281,6 +282,15 @@ static const struct arrangement {
     {"glass in a corner", CORNER,
      SKY WHITE FLOOR_QUAD WALL_X("1") "Rotate 90 0 1 0 " WALL_X("-1") "Rotate -90 0 1 0 " GLASS BOX_WITHIN},
     {"glass under a ceiling", UP, SKY WHITE QUAD_XZ("-9", "9", "1", "-9", "9") GLASS BOX_WITHIN},
+    {"a block in glass on a floor, from below", UP,
+     SKY WHITE FLOOR_QUAD "AttributeBegin " GLASS BOX_WITHIN
+                          "AttributeEnd Material \"diffuse\" Translate 0 .05 0 Scale .99 .9 .99 " BOX_WITHIN},
+    {"glass that fills a pot", ASLANT,
+     SKY WHITE FLOOR_QUAD STANDING
+     "Shape \"cylinder\" \"float radius\" .5 \"float zmin\" 0 \"float zmax\" 1.3 " GLASS
+     "Translate 0 0 %1$.9g Shape \"cylinder\" \"float radius\" %2$.9g \"float zmin\" 0 \"float zmax\" 1 "
+     "Shape \"disk\" \"float height\" 1 \"float radius\" %2$.9g ReverseOrientation "
+     "Shape \"disk\" \"float radius\" %2$.9g\n"},
     {"glass on a table that shines", CEILING_VIEW, TABLE GLASS "Scale .5 1 .5 " BOX_WITHIN},
     {"the table itself", ASLANT, TABLE GLASS "Scale .5 1 .5 " BOX_WITHIN},
     {"paper on a table that shines", CEILING_VIEW, TABLE PAPER QUAD_XZ("-1", "1", "%1$.9g", "-1", "1")},
@@ -355,6 +365,28 @@ static void beside_is_not_touching(void **state)
     }
 }
 
+/* Of a mesh whose triangles all overlap, each is near all others: 1e10 pairs. A search of them all ends after minutes. */
+static void search_ends(void **state)
+{
+    (void)state;
+    enum { TRIANGLES = 100000, LINE = 80 };
+    char *text = malloc((size_t)TRIANGLES * LINE);
+    assert_non_null(text);
+    int n = sprintf(text, "Material \"diffuse\" Shape \"trianglemesh\" \"float alpha\" .5 \"point3 P\" [");
+    for (int i = 0; i < TRIANGLES; i++) {
+        const double x = i % 100 * 1e-3, y = i / 100 * 1e-4;
+        n += sprintf(text + n, "%g -1 %g 1 %g 0 %g 1 .5\n", x, y, x, y);
+    }
+    n += sprintf(text + n, "] \"integer indices\" [");
+    for (int i = 0; i < 3 * TRIANGLES; i++)
+        n += sprintf(text + n, "%d ", i);
+    sprintf(text + n, "]");
+    alarm(120);
+    pt_scene_destroy(world_scene(text));
+    alarm(0);
+    free(text);
+}
+
 static void kernels_agree(void **state)
 {
     (void)state;
@@ -387,6 +419,7 @@ int main(void)
         cmocka_unit_test(floor_is_opaque),
         cmocka_unit_test(arrangements_are_gaps),
         cmocka_unit_test(beside_is_not_touching),
+        cmocka_unit_test(search_ends),
         cmocka_unit_test(kernels_agree),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -159,22 +159,26 @@ static void moving_cameras(void **state)
         }
 }
 
-/* A floor that the camera stands on, too, and a wall of cards: nothing but what the window shows counts. */
+/* A floor that the camera stands on, too, a wall of cards, a ball and a pipe around all: nothing but what the window shows counts. */
 static void large_surroundings(void **state)
 {
     (void)state;
     for (size_t i = 0; i < 3; i++) {
         const double d = distances[i];
         char text[3000];
-        snprintf(text, sizeof text,
-                 FILM
-                 "LookAt 0 %.17g %.17g 0 0 0 0 0 1 Camera \"orthographic\" " WINDOW
-                 "WorldBegin AttributeBegin CoordSysTransform \"camera\" Translate 0 0 %.17g " GLOW
-                 "AttributeEnd Material \"diffuse\" \"rgb reflectance\" [ 0 0 0 ] Shape \"bilinearmesh\" \"point3 P\" [ "
-                 "-1e8 -9 -1e8 1e8 -9 -1e8 "
-                 "-1e8 -9 1e8 1e8 -9 1e8 ] Shape \"disk\" \"float radius\" 1e7 \"float height\" 200 Translate 0 0 9e6 Shape "
-                 "\"sphere\" \"float radius\" 1e4",
-                 0.6 * d, -0.8 * d, d);
+        snprintf(
+            text, sizeof text,
+            FILM
+            "LookAt 0 %.17g %.17g 0 0 0 0 0 1 Camera \"orthographic\" " WINDOW
+            "WorldBegin AttributeBegin CoordSysTransform \"camera\" Translate 0 0 %.17g " GLOW
+            "AttributeEnd Material \"diffuse\" \"rgb reflectance\" [ 0 0 0 ] AttributeBegin CoordSysTransform \"camera\" "
+            "Shape \"cylinder\" \"float radius\" 1e5 \"float zmin\" -1e5 \"float zmax\" 1e7 Translate 0 0 %.17g "
+            "Shape \"sphere\" \"float radius\" %.17g AttributeEnd Material \"diffuse\" \"rgb reflectance\" [ 0 0 0 ] Shape "
+            "\"bilinearmesh\" \"point3 P\" [ "
+            "-1e8 -9 -1e8 1e8 -9 -1e8 "
+            "-1e8 -9 1e8 1e8 -9 1e8 ] Shape \"disk\" \"float radius\" 1e7 \"float height\" 200 Translate 0 0 9e6 Shape "
+            "\"sphere\" \"float radius\" 1e4",
+            0.6 * d, -0.8 * d, d, (d + 1.9e6) / 2, (d + 2.1e6) / 2);
         check(text, d, 0, SOBOL_ERROR);
     }
 }
