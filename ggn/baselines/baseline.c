@@ -23,7 +23,6 @@ int ggn_baseline_init(struct ggn_baseline *b, enum ggn_baseline_kind kind, int w
                       struct base_err *err)
 {
     const int least = kind == GGN_SVD_ENTROPY ? GGN_SUB_BLOCK : GGN_MASK_GRID;
-
     if (width < least || height < least || width > SIDE_MAX || height > SIDE_MAX)
         return base_fail(err, BASE_EINVAL, "%s: blocks of %dx%d pixels; it takes %d to %d", ggn_baseline_names[kind], width,
                          height, least, SIDE_MAX);
@@ -56,7 +55,6 @@ struct part {
 static int parts_of(const struct ggn_baseline *b, struct part parts[4])
 {
     const struct ggn_svm *s = &b->svm;
-
     if (b->kind == GGN_SVD_ENTROPY) {
         parts[0] = (struct part){"lstm", 1, 1, {(int)ggn_lstm_parameters(b->features), 1}, b->lstm};
         return 1;
@@ -72,7 +70,6 @@ static char *print(const struct ggn_baseline *b, const cJSON *provenance)
 {
     cJSON *root = cJSON_CreateObject();
     int failed = !root;
-
     base_json_text(root, "kind", "baseline", &failed);
     base_json_text(root, "method", ggn_baseline_names[b->kind], &failed);
     base_json_number(root, "width", b->width, &failed);
@@ -97,7 +94,6 @@ int ggn_baseline_save(const struct ggn_baseline *b, const char *path, enum ggn_t
     struct ggn_container c = {0};
     struct part parts[4];
     int n = parts_of(b, parts), rc = 0;
-
     for (int i = 0; i < n && !rc; i++)
         rc = ggn_container_add(&c, parts[i].name, parts[i].is_weight ? type : GGN_F32, parts[i].rank, parts[i].dim,
                                parts[i].values, err);
@@ -114,7 +110,6 @@ static int make_room(struct ggn_baseline *b, const cJSON *root, const struct ggn
 {
     struct ggn_svm numbers = {0};
     int support = 0, rc;
-
     if (b->kind == GGN_SVD_ENTROPY) {
         size_t n = ggn_lstm_parameters(b->features);
         b->lstm = 2 * n <= c->size ? malloc(n * sizeof *b->lstm) : NULL;
@@ -148,7 +143,6 @@ static int parse(struct ggn_baseline *b, const cJSON *root, const struct ggn_con
     const char *name = cJSON_IsString(method) ? method->valuestring : "";
     const int found = base_word_index(ggn_baseline_names, name, strlen(name));
     int w = 0, h = 0, window = 0;
-
     if (!cJSON_IsString(type) || strcmp(type->valuestring, "baseline") != 0 || found < 0 ||
         (kind != GGN_BASELINES && kind != (enum ggn_baseline_kind)found))
         return base_fail(err, BASE_EINVAL, "not a baseline%s%s", kind != GGN_BASELINES ? " for " : "",
@@ -176,7 +170,6 @@ int ggn_baseline_parse(struct ggn_baseline *b, const struct ggn_container *c, co
 {
     struct base_err inner = {0};
     cJSON *root = cJSON_Parse(c->json);
-
     *b = (struct ggn_baseline){0};
     int rc = root ? parse(b, root, c, kind, &inner) : base_fail(&inner, BASE_EINVAL, "the description is not JSON");
     cJSON_Delete(root);
@@ -190,7 +183,6 @@ int ggn_baseline_load(struct ggn_baseline *b, const char *path, enum ggn_baselin
 {
     struct ggn_container c;
     int rc = ggn_container_read(&c, path, err);
-
     *b = (struct ggn_baseline){0};
     if (rc)
         return rc;
@@ -257,7 +249,6 @@ static void extract_tile(struct ggn_baseline_reader *r, const uint8_t *rgb, doub
     const struct ggn_baseline *b = r->b;
     const size_t pixels = (size_t)b->width * (size_t)b->height;
     double *l = r->lightness;
-
     ggn_lightness(rgb, pixels, l);
     if (b->kind == GGN_ATTRIBUTES_SVM)
         ggn_attributes(l, b->width, b->height, l + pixels, features);
@@ -274,7 +265,6 @@ void ggn_baseline_extract(struct ggn_baseline_reader *r, const uint8_t *rgb, int
     const size_t plane = (size_t)b->width * (size_t)b->height, values = 3 * plane;
     const struct ggn_value tile = {.h = b->height, .w = b->width, .row = b->width, .plane = plane};
     const int across = ggn_tile_count(width, b->width), n = tiles(b, width, height);
-
     if (width == b->width && height == b->height) {
         extract_tile(r, rgb, features);
         return;
@@ -293,7 +283,6 @@ double ggn_baseline_logit(struct ggn_baseline_reader *r, const double *const *fe
     const struct ggn_baseline *b = r->b;
     const double *steps[GGN_WINDOW_MAX];
     double most = -INFINITY;
-
     for (int i = 0; i < tiles(b, width, height); i++) {
         for (int k = 0; k < b->window; k++)
             steps[k] = features[k] + (size_t)i * (size_t)b->features;

@@ -59,7 +59,6 @@ static int train(const struct options *o, enum ggn_baseline_kind kind, struct gg
     struct ggn_method m;
     struct ggn_method_figures figures;
     int rc = ggn_method_learned(&m, &b, s, kind, split, o->early, o->epochs, threads, err);
-
     if (rc)
         return rc;
     rc = ggn_method_measure(&m, s, split, &figures, err);
@@ -90,7 +89,6 @@ int ggn_cmd_baseline(int argc, char **argv, struct base_err *err)
     struct ggn_eval_set set = {0};
     struct base_threads *threads = NULL;
     int skipped, kind = 0;
-
     int rc = base_options_parse(&options, argc, argv, &o, err);
     if (!rc && (kind = base_word_index(ggn_baseline_names, o.name, strlen(o.name))) < 0)
         rc = base_fail(err, BASE_EINVAL, "'%.80s' is none of svd-entropy, attributes, noise-mask", o.name);

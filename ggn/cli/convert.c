@@ -26,7 +26,6 @@ int ggn_cmd_convert(int argc, char **argv, struct base_err *err)
                "`ggn evaluate -m MODEL -m OUT` says which."};
     struct options o = {.type = GGN_F16};
     struct ggn_model *model = NULL;
-
     int rc = base_options_parse(&options, argc, argv, &o, err);
     if (!rc)
         rc = base_file_check_kind(o.paths[1], &ggn_container_kind, err);

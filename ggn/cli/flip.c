@@ -41,7 +41,6 @@ int ggn_cmd_flip(int argc, char **argv, struct base_err *err)
     struct ggn_flip_stats stats;
     float *map = NULL;
     double ssim = 0.0;
-
     int rc = base_options_parse(&options, argc, argv, &o, err);
     if (!rc)
         rc = ggn_cmd_read_pair(argv[0], o.paths, images, err);

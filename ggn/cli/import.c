@@ -100,7 +100,6 @@ int ggn_cmd_import(int argc, char **argv, struct base_err *err)
                "(NAME_half_00020.exr …, or the layer half). Running it again continues where it stopped."};
     struct options o = {.how = {.block = 200, .progress = isatty(2) ? show_progress : NULL}};
     struct ggn_thresholds thresholds = {0};
-
     int rc = base_options_parse(&options, argc, argv, &o, err);
     if (rc)
         return rc;

@@ -32,7 +32,6 @@ static int print_model(const struct ggn_model *m, const struct ggn_container *c,
 {
     const struct ggn_hyper *h = &m->hyper;
     char *provenance = cJSON_Print(m->provenance);
-
     if (!provenance)
         return base_fail_nomem(err, "provenance");
     printf("preset       %s\n", ggn_preset_names[h->preset]);
@@ -70,7 +69,6 @@ int ggn_cmd_inspect(int argc, char **argv, struct base_err *err)
     struct options o = {0};
     struct ggn_container c;
     struct ggn_model *model = NULL;
-
     if (base_options_parse(&options, argc, argv, &o, err) || ggn_container_read(&c, o.path, err))
         return err->code;
     int rc = ggn_model_parse(&c, o.path, &model, err);

@@ -339,7 +339,6 @@ int ggn_cmd_label(int argc, char **argv, struct base_err *err)
                                                        "model observer, which are never called human."};
     struct options o = {.source = GGN_FROM_HALVES, .threads = job_threads(ggn_cmd_job)};
     int rc = base_options_parse(&options, argc, argv, &o, err);
-
     if (rc)
         return rc;
     base_interrupt_catch();

@@ -165,7 +165,6 @@ int ggn_cmd_reconstruct(int argc, char **argv, struct base_err *err)
     struct ggn_thresholds stops = {0};
     struct picture p = {0};
     const struct ggn_view *view = NULL;
-
     int rc = base_options_parse(&options, argc, argv, &o, err);
     if (!rc)
         rc = seq_manifest_read(o.dir, &m, err);

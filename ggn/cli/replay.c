@@ -33,7 +33,6 @@ static int add_adjusted(void *into, const char *arg, struct base_err *err)
     struct options *o = into;
     struct ggn_policy any = ggn_policy_default();
     const char *equals = strchr(arg, '=');
-
     if (!equals || equals == arg || (size_t)(equals - arg) >= sizeof o->adjusted[0].name || o->n_adjusted == MAX_ADJUSTED)
         return base_fail(err, BASE_EINVAL, "expected KEY=NUMBER, at most %d times", MAX_ADJUSTED);
     int i = o->n_adjusted++;

@@ -104,7 +104,6 @@ int ggn_cmd_train(int argc, char **argv, struct base_err *err)
                                                        "same data, options and seed give the same model bytes, also "
                                                        "after an interruption and --resume, with any number of threads."};
     struct settings s = {.preset = GGN_PRESET_LULL};
-
     /* Twice: the preset decides the defaults that other options override, wherever it stands. */
     int rc = base_options_parse(&options, argc, argv, &s, err);
     s.plan = ggn_train_plan_default((enum ggn_preset)s.preset);

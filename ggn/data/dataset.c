@@ -248,7 +248,6 @@ enum ggn_split ggn_split_learned(const cJSON *learned, const char *scene)
 static enum ggn_split by_models(const struct ggn_split_options *o, const char *scene)
 {
     enum ggn_split split = GGN_SPLIT_TEST;
-
     for (int i = 0; i < o->n_learned; i++) {
         enum ggn_split own = ggn_split_learned(o->learned[i], scene);
         split = own < split ? own : split;
@@ -271,7 +270,6 @@ int ggn_split_choose(struct ggn_dataset *data, const struct ggn_split_options *o
                      struct base_err *err)
 {
     const int fifth = data->n_scenes < 3 ? 1 : 2;
-
     *source = source_of(data, o);
     for (int i = 0; i < data->n; i++) {
         struct ggn_dataset_view *v = &data->views[i];

@@ -15,21 +15,18 @@ struct look {
 static double window_logit(void *data)
 {
     const struct look *l = data;
-
     return l->logit(l->data, l->level);
 }
 
 static double law(void *data)
 {
     const struct look *l = data;
-
     return l->law[l->now];
 }
 
 static int is_check(const struct ggn_stop_rule *rule, const struct ggn_stopper *s, const struct ggn_level_series *c, int i)
 {
     double next = s->used ? (double)s->verdict.next_spp : rule->policy.first_spp;
-
     return c->spp[i] >= next || i + 1 == c->n_levels || next - c->spp[i] <= c->spp[i + 1] - next;
 }
 
@@ -40,7 +37,6 @@ void ggn_replay(const struct ggn_level_series *c, const struct ggn_stop_rule *ru
     const struct ggn_evidence evidence = {&look, window_logit, law};
     struct ggn_stop_rule endless = *rule;
     struct ggn_stopper s = {0};
-
     endless.policy.threshold = 0;
     for (int i = 0; i < c->n_levels; i++) {
         seen[i] = (struct ggn_seen){.p = (double)NAN};
@@ -61,7 +57,6 @@ void ggn_replay(const struct ggn_level_series *c, const struct ggn_stop_rule *ru
 int ggn_replay_stop(const struct ggn_seen *seen, int n_levels, int passes, double threshold)
 {
     struct ggn_stopper s = {0};
-
     for (int i = 0; i < n_levels; i++)
         if (!isnan(seen[i].p) && ggn_stopper_pass(&s, passes, seen[i].p < threshold))
             return i;

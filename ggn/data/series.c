@@ -34,7 +34,6 @@ void ggn_series_set_release(struct ggn_series_set *set)
 int ggn_series_set_count(const struct ggn_series_set *set, enum ggn_split split, int real_only)
 {
     int n = 0;
-
     for (int i = 0; i < set->n; i++)
         n += set->series[i].split == split && !(real_only && set->series[i].synthetic);
     return n;
@@ -58,7 +57,6 @@ uint32_t ggn_series_set_crc(const struct ggn_series_set *set)
 {
     const size_t values = ggn_series_set_values(set);
     uLong crc = crc32(0, NULL, 0);
-
     for (int i = 0; i < set->n; i++) {
         const struct ggn_level_series *c = &set->series[i];
         const double what[] = {c->split, c->block, c->n_levels, c->has_label ? c->label.threshold : -1};
@@ -81,7 +79,6 @@ int ggn_series_grow(const struct ggn_series_set *set, struct ggn_level_series *c
     const size_t n = (size_t)levels, values = ggn_series_set_values(set);
     uint8_t **const images[] = {&c->noisy, &c->has_noise_map, &c->noise_map};
     const size_t bytes[] = {values, 1, values / 3};
-
     double *spp = realloc(c->spp, n * sizeof *spp);
     if (!spp)
         return base_fail_nomem(err, "images of the data set");
@@ -103,7 +100,6 @@ void ggn_series_measure(const struct ggn_series_set *set, struct ggn_level_serie
                         const float *d, double scale, int keep_texture)
 {
     const size_t values = ggn_series_set_values(set);
-
     for (int i = 0; i < 2; i++)
         seq_simulate(mean, d, values, i ? -scale : scale, set->meter.rgb[i]);
     ggn_measure(&set->meter, set->width, set->height, 0.5, keep_texture, &c->measure[k],
@@ -118,7 +114,6 @@ static int fill_levels(const struct ggn_series_set *set, struct ggn_level_series
     const size_t values = ggn_series_set_values(set);
     double wanted = 0;
     int rc = 0;
-
     for (uint32_t i = 0; !rc && i < b->n_levels; i++) {
         const struct seq_record *r = &b->levels[i];
         if (ratio > 1 && c->n_levels && r->spp < wanted - 0.5)
@@ -148,7 +143,6 @@ static int fill_series(const struct ggn_series_set *set, struct ggn_level_series
     const int wanted = set->meter.memory != NULL;
     float *mean = wanted ? malloc(2 * values * sizeof *mean) : NULL;
     int rc = wanted && !mean ? base_fail_nomem(err, "noise pictures") : ggn_series_grow(set, c, (int)b->n_levels, err);
-
     if (!rc)
         rc = fill_levels(set, c, b, o->ratio, mean, err);
     free(mean);
@@ -165,7 +159,6 @@ static int load_block(struct ggn_series_set *set, int view, uint32_t index, cons
     const struct ggn_dataset_view *v = &set->data.views[view];
     struct seq_block b;
     int rc = seq_manifest_read_block(v->dir, &v->manifest, index, &b, err);
-
     if (rc)
         return rc;
     if (!set->width) {
@@ -204,7 +197,6 @@ static void find_spacing(struct ggn_series_set *set)
     const struct ggn_level_series *longest = &set->series[0];
     double ratio[SEQ_MAX_RECORDS];
     size_t n = 0;
-
     for (int i = 1; i < set->n; i++)
         if (set->series[i].n_levels > longest->n_levels)
             longest = &set->series[i];
@@ -241,7 +233,6 @@ int ggn_series_set_load(struct ggn_series_set *set, const struct ggn_series_set_
 {
     struct ggn_series_set made = {.noise_maps = o->measures && o->noise_maps, .keep_recorded = o->keep_recorded};
     int rc = ggn_dataset_open(o->dir, &made.data, err), training = 0;
-
     if (rc)
         return rc;
     rc = ggn_split_choose(&made.data, &o->split, &made.split_source, err);

@@ -26,7 +26,6 @@ struct source {
 static int choose_levels(double *spp, double from, double first, double ratio, double highest, int jittered, uint32_t seed)
 {
     int n = 0;
-
     for (double s = floor(first * (jittered ? 1 + 0.1 * ggn_hash_unit(0, seed) : 1) + 0.5);
          n < MAX_LEVELS && s - from <= highest; n++) {
         double off = jittered ? JITTER * (2 * ggn_hash_unit((uint32_t)n + 1, seed) - 1) : 0;
@@ -43,7 +42,6 @@ static int choose_levels(double *spp, double from, double first, double ratio, d
 static void step_down(const struct source *s, size_t pixels, double n, double above, uint32_t seed)
 {
     const float step = (float)sqrt(s->n_full * (1 / n - 1 / above)); /* seq_noise_scale, where above is infinite */
-
     for (size_t p = 0; p < pixels; p++) {
         float signed_step = ggn_hash((uint32_t)p, seed) & 1 ? step : -step;
         for (size_t i = p; i < 3 * pixels; i += pixels)
@@ -59,7 +57,6 @@ static void fill_level(const struct ggn_series_set *set, struct ggn_level_series
 {
     const size_t values = ggn_series_set_values(set);
     uint8_t *out = c->noisy + values * (size_t)k;
-
     for (size_t v = 0; v < values; v++)
         out[v] = ggn_preprocess((b * (double)s->last[v] + a * (double)(s->base[v] + s->noise[v])) / (a + b), NULL, NULL);
     if (set->meter.memory)
@@ -76,7 +73,6 @@ static int make_levels(const struct ggn_series_set *set, struct ggn_level_series
     const size_t values = ggn_series_set_values(set);
     const double n0 = kept ? c->spp[kept - 1] : 0;
     int rc = ggn_series_grow(set, c, kept + n > 0 ? kept + n : 1, err);
-
     if (rc)
         return rc;
     c->n_levels = kept + n;
@@ -98,7 +94,6 @@ static int make_levels(const struct ggn_series_set *set, struct ggn_level_series
 static int append_copy(struct ggn_series_set *set, int of, struct base_err *err)
 {
     int rc = ggn_series_set_append(set, err);
-
     if (rc)
         return rc;
     struct ggn_level_series *c = &set->series[set->n - 1];
@@ -120,7 +115,6 @@ static int read_source(const struct ggn_series_set *set, const struct ggn_level_
     const size_t values = ggn_series_set_values(set);
     const uint32_t index = seq_manifest_find(&v->manifest, c->block);
     struct seq_block b;
-
     s->n_full = 0;
     if (index == v->manifest.n_blocks || !v->manifest.reference_independent)
         return 0;
@@ -152,7 +146,6 @@ int ggn_series_set_add_synthetic(struct ggn_series_set *set, int per_series, uin
     struct source s = {0};
     double spp[MAX_LEVELS];
     int rc = 0;
-
     for (int i = 0, recorded = set->n; !rc && i < recorded; i++) {
         if (set->series[i].split != GGN_SPLIT_TRAIN)
             continue;
@@ -176,7 +169,6 @@ static int simulate_series(const struct ggn_series_set *set, struct ggn_level_se
     double spp[MAX_LEVELS + 1];
     int n =
         choose_levels(spp, 0, set->first_spp < 16 ? set->first_spp : 16, ratio, SEQ_SIMULATED_CAP / ratio, jittered, seed);
-
     spp[n++] = SEQ_SIMULATED_CAP;
     int rc = make_levels(set, c, 0, s, spp, n, seed, err);
     c->simulated |= !rc;
@@ -190,7 +182,6 @@ int ggn_series_set_extend(struct ggn_series_set *set, int all, uint32_t seed, st
     struct source s = {0};
     double spp[MAX_LEVELS];
     int rc = 0;
-
     for (int i = 0, recorded = set->n; !rc && i < recorded; i++) {
         struct ggn_level_series *c = &set->series[i];
         const double last = c->n_levels ? c->spp[c->n_levels - 1] : 0;
@@ -220,7 +211,6 @@ int ggn_series_set_simulate(struct ggn_series_set *set, double ratio, uint32_t s
 {
     struct source s = {0};
     int rc = 0;
-
     for (int i = 0; !rc && i < set->n; i++) {
         struct ggn_level_series *c = &set->series[i];
         if (c->synthetic || !c->has_label)

@@ -18,7 +18,6 @@ int ggn_windows_create(struct ggn_windows *w, const struct ggn_series_set *set, 
                        struct base_err *err)
 {
     size_t room = 1;
-
     *w = (struct ggn_windows){.set = set, .length = o->length};
     for (int i = 0; i < set->n; i++)
         room += (size_t)set->series[i].n_levels;
@@ -59,7 +58,6 @@ static double draw(uint32_t what, uint64_t step, int i, uint32_t seed)
 static int nth_scene(const struct ggn_windows *w, int k)
 {
     int n = 0;
-
     for (int s = 0; s < w->set->data.n_scenes; s++)
         for (int i = 0; i < w->set->n; i++)
             if (w->set->series[i].scene == s && w->first[i + 1] > w->first[i]) {
@@ -73,7 +71,6 @@ static int nth_scene(const struct ggn_windows *w, int k)
 static int nth_series(const struct ggn_windows *w, int scene, int k)
 {
     int n = 0;
-
     for (int i = 0; i < w->set->n; i++)
         if (w->set->series[i].scene == scene && w->first[i + 1] > w->first[i] && n++ == k)
             return i;
@@ -89,7 +86,6 @@ int ggn_windows_draw(const struct ggn_windows *w, uint64_t step, int i, uint32_t
     int series = nth_series(w, scene, (int)(draw(2, step, i, seed) * nth_series(w, scene, -1)));
     const struct ggn_window *list = w->list + w->first[series];
     int n = w->first[series + 1] - w->first[series], any[2] = {0, 0};
-
     for (int k = 0; k < n; k++)
         any[list[k].noisy]++;
     int wanted = any[0] && any[1] ? draw(3, step, i, seed) < 0.5 : any[1] > 0;
@@ -118,7 +114,6 @@ struct ggn_augment ggn_augment_draw(uint64_t step, int i, uint32_t seed, const s
                             .transpose = o->flips && o->square && draw(13, step, i, seed) < 0.5,
                             .blind = draw(18, step, i, seed) >= o->noise_map};
     double exposure = o->jitter * (draw(14, step, i, seed) - 0.5);
-
     for (uint32_t c = 0; c < 3; c++)
         a.gain[c] = (float)exp2(exposure + 0.25 * o->jitter * (draw(15 + c, step, i, seed) - 0.5));
     return a;
@@ -140,7 +135,6 @@ static struct walk walk_of(const struct ggn_augment *a, int width, int height, i
 {
     const ptrdiff_t right = a->flip_x ? -1 : 1, down = a->flip_y ? -row : row;
     const ptrdiff_t start = (a->flip_x ? width - 1 : 0) + (a->flip_y ? (ptrdiff_t)(height - 1) * row : 0);
-
     return a->transpose ? (struct walk){start, down, right} : (struct walk){start, right, down};
 }
 
@@ -148,7 +142,6 @@ static void plane_u8(const uint8_t *src, int width, int height, int row, const s
                      float *out)
 {
     const struct walk w = walk_of(a, width, height, row);
-
     for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++)
             *out++ = table[src[w.start + x * w.right + y * w.down]];
@@ -159,7 +152,6 @@ static void plane_u16(const uint16_t *src, int width, int height, const struct g
                       float *out)
 {
     const struct walk w = walk_of(a, width, height, width);
-
     for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++) {
             float v = (float)src[w.start + x * w.right + y * w.down] * (1 / 257.0F);
@@ -173,7 +165,6 @@ void ggn_window_planes(const struct ggn_level_series *series, int last, int leng
 {
     const size_t pixels = (size_t)width * (size_t)height;
     float table[3][256];
-
     for (int c = 0; c < 3; c++)
         gain_table(augment->gain[c], table[c]);
     for (int k = 0; k < length; k++)
@@ -214,7 +205,6 @@ void ggn_crop_planes(const struct ggn_level_series *series, int level, int width
     const size_t pixels = (size_t)width * (size_t)height, corner = (size_t)y0 * (size_t)width + (size_t)x0;
     const size_t crop = (size_t)crop_w * (size_t)crop_h;
     float table[256];
-
     for (size_t c = 0; c < 3; c++) {
         const uint8_t *x = series->noisy + (3 * (size_t)level + c) * pixels, *y = series->reference + c * pixels;
         gain_table(augment->gain[c], table);

@@ -38,7 +38,6 @@ static int viewer_init(struct viewer *v, const struct run *r, struct base_err *e
 {
     const struct ggn_hyper *h = &r->model->hyper;
     const float *learned[GGN_NETS];
-
     v->set = &r->set->images;
     v->precision = r->precision;
     v->window = h->window;
@@ -70,7 +69,6 @@ static uint16_t *denoised(struct viewer *v, int level, const int *window)
     const size_t values = ggn_series_set_values(v->set);
     const uint8_t *noisy = v->series->noisy + values * (size_t)level;
     int spare = 0;
-
     for (int i = 0; i < v->window; i++) {
         if (v->holds[i] == level)
             return v->denoised + values * (size_t)i;
@@ -94,7 +92,6 @@ static double window_logit(void *data, const int *levels)
     struct ggn_measure measures[GGN_WINDOW_MAX];
     double spp[GGN_WINDOW_MAX];
     float scalars[GGN_SCALARS] = {0};
-
     for (int i = 0; i < v->window; i++) {
         noisy[i] = v->series->noisy + values * (size_t)levels[i];
         clean[i] = denoised(v, levels[i], levels);
@@ -122,7 +119,6 @@ static int judge_block(void *data, long index, int worker, struct base_err *err)
     struct ggn_seen *seen = malloc(levels * sizeof *seen);
     double *law = by_law ? malloc(levels * sizeof *law) : NULL;
     int rc = !seen || (by_law && !law) ? base_fail_nomem(err, r->method->name) : 0;
-
     /* log2 of the law's error: at cases as the set says, at the levels before them as they were measured */
     for (int i = 0; i < c->n_levels && !rc && by_law; i++) {
         double visible = i < skipped ? c->measure[i].visible : r->set->law[b->first + (size_t)(i - skipped)];
@@ -167,7 +163,6 @@ int ggn_eval_trained(struct ggn_method *m, const struct ggn_eval_set *s, const s
                     .method = m,
                     .rule = {.policy = *policy, .window = window, .reach = model->hyper.reach},
                     .observers = observers};
-
     if (window < 2 || window > GGN_WINDOW_MAX)
         return base_fail(err, BASE_EINVAL, "%s: windows of %d images; evaluation takes 2 to %d", name, window,
                          GGN_WINDOW_MAX);

@@ -39,7 +39,6 @@ int ggn_container_add(struct ggn_container *c, const char *name, enum ggn_type t
                       const float *values, struct base_err *err)
 {
     struct ggn_entry *grown = realloc(c->entry, ((size_t)c->n_entries + 1) * sizeof *grown);
-
     if (!grown)
         return base_fail_nomem(err, "tensor table");
     c->entry = grown;
@@ -72,7 +71,6 @@ static size_t aligned(size_t n) { return (n + ALIGN - 1) / ALIGN * ALIGN; }
 static unsigned char *assemble(struct ggn_container *c, size_t *size)
 {
     size_t json_at = HEADER + (size_t)c->n_entries * ENTRY, json_size = strlen(c->json), at = aligned(json_at + json_size);
-
     for (int i = 0; i < c->n_entries; i++) {
         struct ggn_entry *e = &c->entry[i];
         e->offset = at;
@@ -111,7 +109,6 @@ static unsigned char *assemble(struct ggn_container *c, size_t *size)
 static int fits(const struct ggn_container *c, struct base_err *err)
 {
     static const float most[GGN_TYPES] = {FLT_MAX, 65504.0f, 3.3895314e38f};
-
     for (int i = 0; i < c->n_entries; i++)
         for (size_t k = 0; k < c->entry[i].count; k++)
             if (fabsf(c->entry[i].write[k]) > most[c->entry[i].type] && isfinite(c->entry[i].write[k]))
@@ -167,7 +164,6 @@ static int read_entry(struct ggn_entry *e, const unsigned char *p, size_t size, 
 {
     uint32_t type = base_get_u32(p + 48), rank = base_get_u32(p + 52);
     uint64_t count = 1;
-
     memcpy(e->name, p, sizeof e->name);
     e->name[sizeof e->name - 1] = 0;
     for (char *s = e->name; *s; s++) /* names go into messages and listings */
@@ -195,7 +191,6 @@ static int parse(struct ggn_container *c, const char *name, struct base_err *err
 {
     const unsigned char *p = (const unsigned char *)c->data;
     int rc = check_header(p, c->size, name, err);
-
     if (rc)
         return rc;
     size_t json_size = (size_t)base_get_u64(p + 32);
@@ -231,7 +226,6 @@ int ggn_container_get(const struct ggn_container *c, const char *name, int rank,
                       struct base_err *err)
 {
     const struct ggn_entry *e = NULL;
-
     for (int i = 0; i < c->n_entries && !e; i++)
         if (!strcmp(c->entry[i].name, name))
             e = &c->entry[i];

@@ -39,7 +39,6 @@ static int parse_root(const cJSON *root, struct ggn_description *d, struct base_
     const char *name = cJSON_IsString(preset) ? preset->valuestring : "";
     const int index = base_word_index(ggn_preset_names, name, strlen(name));
     int rc = 0;
-
     if (!cJSON_IsString(kind) || strcmp(kind->valuestring, "model") != 0)
         return base_fail(err, BASE_EINVAL, "not a model (its description has no \"kind\": \"model\")");
     if (index < 0)
@@ -66,7 +65,6 @@ int ggn_description_parse(const char *json, struct ggn_description *out, struct 
 {
     cJSON *root = cJSON_Parse(json);
     struct ggn_description d = {.policy = ggn_policy_default()};
-
     if (!root)
         return base_fail(err, BASE_EINVAL, "the description is not JSON");
     int rc = parse_root(root, &d, err);
@@ -87,7 +85,6 @@ int ggn_description_parse(const char *json, struct ggn_description *out, struct 
 static cJSON *to_json(const struct ggn_description *d, int *failed)
 {
     cJSON *root = cJSON_CreateObject();
-
     base_json_text(root, "kind", "model", failed);
     base_json_text(root, "preset", ggn_preset_names[d->hyper.preset], failed);
     for (size_t i = 0; i < N_HYPER; i++)
@@ -113,7 +110,6 @@ char *ggn_description_print(const struct ggn_description *d)
     int failed = 0;
     cJSON *root = to_json(d, &failed);
     char *text = failed ? NULL : cJSON_Print(root);
-
     cJSON_Delete(root);
     return text;
 }

@@ -19,7 +19,6 @@ static struct ggn_inference *create(const struct ggn_hyper *hyper, const struct 
                                     struct base_threads *threads, struct base_err *err)
 {
     struct ggn_inference *j = calloc(1, sizeof *j);
-
     if (!j) {
         base_fail_nomem(err, sizeof(real) == sizeof(float) ? "judge" : "networks in double precision");
         return NULL;
@@ -40,7 +39,6 @@ static struct ggn_inference *create(const struct ggn_hyper *hyper, const struct 
 size_t ggn_inference_bytes(const struct ggn_model *model, int threads)
 {
     size_t bytes = sizeof(struct ggn_inference);
-
     for (int net = 0; net < GGN_NETS; net++)
         bytes += ggn_exec_bytes(&model->graph[net], 1, 0, threads);
     return bytes;
@@ -49,7 +47,6 @@ size_t ggn_inference_bytes(const struct ggn_model *model, int threads)
 struct ggn_inference *ggn_inference_create(const struct ggn_model *model, struct base_threads *threads, struct base_err *err)
 {
     struct ggn_inference *j = create(&model->hyper, model->graph, threads, err);
-
     for (int net = 0; j && net < GGN_NETS; net++)
         j->weights[net] = model->weights[net];
     return j;
@@ -59,7 +56,6 @@ struct ggn_inference *ggn_inference_create_f64(const struct ggn_hyper *hyper, co
                                                const float *const *learned, struct base_err *err)
 {
     struct ggn_inference *j = create(hyper, graph, NULL, err);
-
     for (int net = 0; j && net < GGN_NETS; net++) {
         j->weights[net] = ggn_weights_create(&graph[net], NULL, 0, err);
         if (!j->weights[net]) {
@@ -92,7 +88,6 @@ void ggn_inference_denoise(struct ggn_inference *j, const uint8_t *noisy, uint16
 {
     const struct ggn_value *in = input(j, GGN_NET_R), *out = ggn_graph_output(&j->graph[GGN_NET_R]);
     const int nx = ggn_tile_count(width, in->w), ny = ggn_tile_count(height, in->h);
-
     for (int t = 0; t < nx * ny; t++) {
         int x0 = ggn_tile_start(width, in->w, t % nx), y0 = ggn_tile_start(height, in->h, t / nx);
         ggn_tile_load_u8(noisy, 3, width, height, x0, y0, (real)1 / 255, ggn_exec_plane(j->exec[GGN_NET_R], 0, 0, 0), in);
@@ -114,7 +109,6 @@ static void load_noise_map(struct ggn_inference *j, const uint8_t *noise_map, in
     static const uint8_t there[2] = {0, 1};
     const struct ggn_value *to = input(j, GGN_NET_D);
     real *plane = ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, 2), *flag = ggn_exec_plane(j->exec[GGN_NET_D], 0, 0, 3);
-
     if (noise_map)
         ggn_tile_load_u8(noise_map, 1, width, height, x0, y0, GGN_NOISE_MAP_GAIN, plane, to);
     else
@@ -126,7 +120,6 @@ static double tile_logit(struct ggn_inference *j, const uint8_t *const *noisy, c
                          const uint8_t *noise_map, const float *scalars, int width, int height, int x0, int y0)
 {
     const struct ggn_value *in = input(j, GGN_NET_M);
-
     for (int k = 0; k < j->hyper.window; k++)
         ggn_tile_load_u16(denoised[k], 3, width, height, x0, y0, (real)1 / 65535,
                           ggn_exec_plane(j->exec[GGN_NET_M], 0, 0, 3 * k), in);
@@ -149,7 +142,6 @@ double ggn_inference_logit(struct ggn_inference *j, const uint8_t *const *noisy,
     const struct ggn_value *in = input(j, GGN_NET_M);
     const int nx = ggn_tile_count(width, in->w), ny = ggn_tile_count(height, in->h);
     double highest = 0;
-
     for (int k = 0; k < j->hyper.window; k++)
         if (!ggn_fixed_is_finite(denoised[k], 3 * (size_t)width * (size_t)height))
             return (double)NAN;

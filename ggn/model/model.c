@@ -12,7 +12,6 @@ static struct ggn_model *create(const struct ggn_hyper *hyper, size_t most, stru
 {
     struct ggn_model *m = calloc(1, sizeof *m);
     size_t params = 0;
-
     if (!m) {
         base_fail_nomem(err, "model");
         return NULL;
@@ -71,7 +70,6 @@ static int visit(const struct visit *v, const char *name, int is_weight, int ran
 static int visit_all(const struct visit *v, const struct ggn_model *m, int *count, struct base_err *err)
 {
     char name[GGN_CONTAINER_NAME];
-
     for (int net = 0; net < GGN_NETS; net++) {
         const struct ggn_graph *g = &m->graph[net];
         for (int i = 0; i < g->n_tensors; i++) {
@@ -108,7 +106,6 @@ static int from_container(const struct ggn_container *c, struct ggn_model **mode
     struct ggn_model *m = NULL;
     int count = 0;
     int rc = ggn_description_parse(c->json, &d, err);
-
     if (!rc && !(m = create(&d.hyper, c->size / 2, err)))
         rc = err->code;
     if (!rc)
@@ -135,7 +132,6 @@ int ggn_model_parse(const struct ggn_container *c, const char *name, struct ggn_
 {
     struct base_err inner = {0};
     int rc = from_container(c, model, &inner);
-
     return rc ? base_fail(err, rc, "%s: %s", name, inner.text) : 0;
 }
 
@@ -143,7 +139,6 @@ int ggn_model_load(const char *path, struct ggn_model **model, struct base_err *
 {
     struct ggn_container c;
     int rc = ggn_container_read(&c, path, err);
-
     if (rc)
         return rc;
     rc = ggn_model_parse(&c, path, model, err);
@@ -156,7 +151,6 @@ int ggn_model_save(const struct ggn_model *m, const char *path, enum ggn_type ty
     struct ggn_container c = {0};
     int count = 0;
     int rc = visit_all(&(struct visit){.to = &c, .type = type}, m, &count, err);
-
     if (!rc)
         c.json = ggn_description_print(&(struct ggn_description){m->hyper, m->policy, m->provenance});
     if (!rc && !c.json)
@@ -171,7 +165,6 @@ int ggn_policy_set(struct ggn_model *model, const struct ggn_policy *policy, str
 {
     cJSON *object = cJSON_CreateObject();
     int rc = ggn_policy_check(policy, err), failed = !object;
-
     ggn_policy_put(object, policy, 1, &failed);
     if (!rc && failed)
         rc = base_fail_nomem(err, "model policy");

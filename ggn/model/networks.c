@@ -25,7 +25,6 @@ int ggn_hyper_check(const struct ggn_hyper *p, struct base_err *err)
                   {"k_d", p->k_d, 1, 64},
                   {"picture", p->noise_map, 0, p->preset == GGN_PRESET_LULL},
                   {"scalars", p->scalars ? p->scalars - GGN_SCALARS + 1 : 0, 0, p->reach > 0}};
-
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
         if (fields[i].value < fields[i].min || fields[i].value > fields[i].max)
             return base_fail(err, BASE_EINVAL, "hyper-parameter %s = %d is not in %d..%d", fields[i].name, fields[i].value,
@@ -44,7 +43,6 @@ static const char *const dec_name[5] = {"dec0", "dec1", "dec2", "dec3", "dec4"};
 static int encode(struct ggn_graph *g, int width, int stages[4])
 {
     int x = 0;
-
     for (int i = 0;; i++) {
         ggn_graph_stage(g, enc_name[i]);
         if (i)
@@ -69,7 +67,6 @@ static void build_denoiser(struct ggn_graph *g, const struct ggn_hyper *p)
 {
     const int k = p->k_r;
     int skip[4];
-
     ggn_graph_begin(g, "denoiser", 3, p->height, p->width);
     int x = encode(g, k, skip);
     x = ggn_graph_conv(g, x, -1, 8 * k, 3, 0, SLOPE);
@@ -95,7 +92,6 @@ static void build_generator(struct ggn_graph *g, const struct ggn_hyper *p)
 {
     const int k = p->k_m;
     int like[4];
-
     ggn_graph_begin(g, "generator", 3 * p->window, p->height, p->width);
     int x = encode(g, k, like);
     ggn_graph_stage(g, "dec0");
@@ -121,7 +117,6 @@ static void build_discriminator(struct ggn_graph *g, const struct ggn_hyper *p)
     static const char *const fc[3] = {"fc1", "fc2", "fc3"};
     const int k = p->k_d;
     int x = 0;
-
     ggn_graph_begin(g, "discriminator", p->noise_map ? 4 : 2, p->height, p->width);
     const int scalars = p->scalars ? ggn_graph_input(g, p->scalars) : -1;
     for (int i = 0; i < 3; i++) {

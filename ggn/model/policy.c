@@ -106,7 +106,6 @@ void ggn_policy_set_levels(struct ggn_policy *p, const double *spp, int n)
 int ggn_policy_levels_differ(const struct ggn_policy *policy, const double *spp, int n, double *asked, double *nearest)
 {
     int i = 0, differ = 0;
-
     while (i < n && spp[i] < policy->first_spp)
         i++;
     while (i + 1 < n) {
@@ -127,7 +126,6 @@ size_t ggn_setting_difference(const struct ggn_setting *learned, const struct gg
 {
     static const char *const transfers[] = {"sRGB", "a gamma", "linear codes"};
     size_t used = 0;
-
     text[0] = '\0';
     if (here->width != learned->width || here->height != learned->height)
         used = (size_t)snprintf(text, room, "blocks of %dx%d pixels instead of %dx%d", here->width, here->height,
@@ -160,7 +158,6 @@ void ggn_policy_put(cJSON *to, const struct ggn_policy *policy, int only_own, in
 static int get_levels(const cJSON *list, struct ggn_policy *policy, struct base_err *err)
 {
     const cJSON *item;
-
     if (list && (!cJSON_IsArray(list) || cJSON_GetArraySize(list) > GGN_POLICY_LEVELS))
         return base_fail(err, BASE_EINVAL, "policy: levels: expected a list of at most %d numbers", GGN_POLICY_LEVELS);
     cJSON_ArrayForEach (item, list) {
@@ -198,7 +195,6 @@ int ggn_policy_parse(const cJSON *from, struct ggn_policy *policy, struct base_e
 {
     struct ggn_policy p = ggn_policy_default();
     const cJSON *passes = cJSON_GetObjectItemCaseSensitive(from, "passes");
-
     p.passes = cJSON_IsNumber(passes) ? passes->valueint : 0;
     return ggn_policy_get(from, p, 0, policy, err);
 }

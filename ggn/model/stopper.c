@@ -27,7 +27,6 @@ static double joins_at(const struct ggn_stop_rule *rule, const struct ggn_stoppe
 int ggn_stopper_ask(const struct ggn_stop_rule *rule, struct ggn_stopper *s, uint64_t spp)
 {
     const struct ggn_verdict nothing = {.p = (double)NAN, .predicted_spp = (double)NAN, .noise = (double)NAN};
-
     if (spp && s->asked_spp == spp)
         return GGN_LOOK_NONE;
     s->asked_spp = spp;
@@ -65,7 +64,6 @@ static int stops(const struct ggn_stop_rule *rule, struct ggn_stopper *s, double
 {
     const struct ggn_policy *p = &rule->policy;
     struct ggn_verdict *v = &s->verdict;
-
     v->p = ggn_policy_p(p, logit);
     if (!ggn_stopper_pass(s, p->passes, v->p < p->threshold))
         return 0;
@@ -84,7 +82,6 @@ static double by_law(const struct ggn_stop_rule *rule, struct ggn_stopper *s, co
 {
     const struct ggn_policy *p = &rule->policy;
     double law = e->law(e->data);
-
     if (isnan(law) || s->used < (uint32_t)rule->window || fabs(p->scale * law + p->shift) > CERTAIN)
         s->correction = 0;
     else if (s->spp[s->used - 1] == s->asked_spp)
@@ -98,7 +95,6 @@ static void decide_by_law(const struct ggn_stop_rule *rule, struct ggn_stopper *
     struct ggn_verdict *v = &s->verdict;
     double spp = (double)s->asked_spp, logit = by_law(rule, s, e), joins = joins_at(rule, s);
     double next = ggn_policy_next(p, (double)s->spp[s->used - 1]);
-
     if (isnan(logit)) {
         v->too_early = 1;
         ask_at(s, to_spp(ceil(next)));
@@ -119,7 +115,6 @@ void ggn_stopper_decide(const struct ggn_stop_rule *rule, struct ggn_stopper *s,
     const struct ggn_policy *p = &rule->policy;
     struct ggn_verdict *v = &s->verdict;
     const double spp = (double)s->asked_spp;
-
     if (rule->reach > 0) {
         decide_by_law(rule, s, e);
         return;
@@ -139,7 +134,6 @@ static int unknown_or_positive(double value) { return isnan(value) || (value >= 
 static int verdict_valid(const struct ggn_stopper *s)
 {
     const struct ggn_verdict *v = &s->verdict;
-
     if (v->stop ? !s->used || v->stop > 1 || v->too_early : v->next_spp && v->next_spp <= s->asked_spp)
         return 0;
     return unknown_or_positive(v->predicted_spp) && unknown_or_positive(v->noise) && unknown_or_positive(v->p) &&

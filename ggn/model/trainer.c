@@ -16,7 +16,6 @@ struct ggn_train_options ggn_train_options_default(enum ggn_preset preset)
 {
     int lull = preset == GGN_PRESET_LULL;
     enum ggn_init plain = lull ? GGN_INIT_HE : GGN_INIT_PAPER;
-
     return (struct ggn_train_options){
         .parts = GGN_TRAIN_ALL,
         .batch = lull ? 16 : 64,
@@ -38,7 +37,6 @@ real *ggn_trainer_state(struct ggn_trainer *t, int net, int i, size_t *count)
 {
     struct ggn_weights *w = t->weights[net];
     real *const array[N_STATE] = {w->params, w->mean, w->var, t->adam_m[net], t->adam_v[net]};
-
     if (i < 0 || i >= N_STATE || !array[i])
         return NULL;
     *count = i == 1 || i == 2 ? t->graph[net].n_stats : t->graph[net].n_params;
@@ -50,7 +48,6 @@ static void copy_state(struct ggn_trainer *t, int net, int keep)
 {
     real *good = t->good[net], *now;
     size_t count;
-
     for (int i = 0; good && (now = ggn_trainer_state(t, net, i, &count)); i++, good += count)
         memcpy(keep ? good : now, keep ? now : good, count * sizeof *now);
 }
@@ -79,7 +76,6 @@ static int create_net(struct ggn_trainer *t, int net, struct base_err *err)
 {
     int trained = (t->options.parts & part_of(net)) != 0;
     int rc = ggn_network_build(&t->graph[net], net, &t->hyper, err);
-
     if (rc)
         return rc;
     t->weights[net] = ggn_weights_create(&t->graph[net], NULL, trained ? GGN_WEIGHTS_BACKWARD : 0, err);
@@ -107,7 +103,6 @@ static int create_execs(struct ggn_trainer *t, struct base_err *err)
 {
     const int batch = t->options.batch, paper = t->hyper.preset == GGN_PRESET_PAPER;
     const int drop = t->options.dropout ? 0 : GGN_EXEC_NO_DROPOUT, per_sample = paper ? 1 : 2;
-
     if (t->options.parts & GGN_TRAIN_R) {
         t->r = ggn_exec_create(&t->graph[GGN_NET_R], NULL, batch, GGN_EXEC_GRADS, t->threads, err);
         t->ssim = t->r ? ggn_ssim_create(t->hyper.height, t->hyper.width, t->threads, err) : NULL;
@@ -187,7 +182,6 @@ static int check(struct ggn_trainer *t, int net, double value, const char *what,
     const struct ggn_graph *g = &t->graph[net];
     const char *name = "none";
     double worst = -1;
-
     if (value <= t->options.explode)
         return 0;
     for (int i = g->n_tensors - 1; i >= 0; i--) {
@@ -213,7 +207,6 @@ static int update(struct ggn_trainer *t, int net, size_t n, struct base_err *err
     const struct ggn_train_options *o = &t->options;
     double norm = grad_l2(t, net, n);
     int rc = check(t, net, norm, "gradient norm", err);
-
     if (rc)
         return rc;
     if (o->clip > 0 && norm > o->clip)
@@ -231,7 +224,6 @@ static int update(struct ggn_trainer *t, int net, size_t n, struct base_err *err
 static void set_inputs(const struct ggn_exec *e, int step, int first, const real *const *planes, int stride, int count)
 {
     const struct ggn_value *v = &e->graph->value[0];
-
     for (int i = 0; i < count; i++)
         for (int c = 0; c < v->c; c++)
             ggn_exec_load(e, step * i + first, c, planes[(size_t)i * (size_t)stride + (size_t)c], v->w);
@@ -244,7 +236,6 @@ static double denoised_ssim(struct ggn_trainer *t, int i, const real *const *ref
     const struct ggn_value *v = &t->graph[GGN_NET_R].value[out], *in = &t->graph[GGN_NET_R].value[0];
     const real *x[3], *y[3];
     real *dx[3];
-
     for (int c = 0; c < 3; c++) {
         /* the input's gradient is not needed: its planes hold the reference in the layout of the output */
         real *copy = ggn_exec_grad(t->r, 0, i, c);
@@ -289,7 +280,6 @@ int ggn_trainer_denoiser_step(struct ggn_trainer *t, const real *const *x, const
                               double *loss, struct base_err *err)
 {
     int rc = check_batch(t, count, GGN_TRAIN_R, err);
-
     if (!rc)
         rc = denoiser_forward(t, x, 3, reference, count, loss, err);
     if (rc)
@@ -317,7 +307,6 @@ static void exchange_maps(struct ggn_trainer *t, int count, int back, int add)
 {
     const int out = t->graph[GGN_NET_M].n_values - 1;
     const struct ggn_value *v = &t->graph[GGN_NET_M].value[out];
-
     for (int i = 0; i < 2 * count; i++) {
         const int channel = i % 2, image = i / 2,
                   n = t->m2 ? image : i; /* in one batch a sample's windows lie side by side */
@@ -338,7 +327,6 @@ static void exchange_maps(struct ggn_trainer *t, int count, int back, int add)
 static void set_measured(struct ggn_trainer *t, const struct ggn_batch *b)
 {
     const struct ggn_value *v = &t->graph[GGN_NET_D].value[0];
-
     for (int i = 0; i < b->count && t->hyper.noise_map; i++) {
         real *noise_map = ggn_exec_plane(t->d, 0, i, 2), *flag = ggn_exec_plane(t->d, 0, i, 3);
         for (int y = 0; y < v->h; y++)
@@ -355,7 +343,6 @@ static void set_measured(struct ggn_trainer *t, const struct ggn_batch *b)
 static double answer(const struct ggn_trainer *t, int i, double law)
 {
     double z = (double)*ggn_exec_output(t->d, i, 0);
-
     return t->hyper.reach > 0 ? law + ggn_residual_correction(z, t->hyper.reach) : z;
 }
 
@@ -389,7 +376,6 @@ static double classify(struct ggn_trainer *t, const struct ggn_batch *b, double 
     const double share = 1.0 / b->count;
     double each[GGN_BATCH_MAX], total = 0;
     double *z = logits ? logits : each;
-
     t->d->dropout_seed = ggn_hash((uint32_t)t->steps, ggn_hash((uint32_t)t->adam_t[GGN_NET_D], t->options.seed));
     ggn_exec_forward(t->d, t->weights[GGN_NET_D], b->count, GGN_TRAIN);
     for (int i = 0; i < b->count; i++) {
@@ -406,7 +392,6 @@ int ggn_trainer_classifier_step(struct ggn_trainer *t, const struct ggn_batch *b
 {
     const int planes = 3 * t->hyper.window;
     int rc = check_batch(t, b->count, GGN_TRAIN_MD, err);
-
     if (rc)
         return rc;
     if (t->hyper.preset == GGN_PRESET_PAPER)
@@ -438,7 +423,6 @@ static int paper_denoise(struct ggn_trainer *t, const struct ggn_batch *b, struc
                          struct base_err *err)
 {
     const struct ggn_graph *r = &t->graph[GGN_NET_R];
-
     for (int k = 0; k < t->hyper.window; k++) {
         int rc = denoiser_forward(t, b->noisy + 3 * k, 3 * t->hyper.window, b->reference, b->count,
                                   &record->denoiser_loss[k], err);
@@ -464,7 +448,6 @@ int ggn_trainer_paper_step(struct ggn_trainer *t, const struct ggn_batch *b, str
     const size_t m_trained = m->tensor[m->n_tensors - 2].offset; /* all but the last convolution's weight and bias */
     const int record_all = b->count <= 64;
     int rc = check_batch(t, b->count, GGN_TRAIN_ALL, err);
-
     if (rc)
         return rc;
     if (t->hyper.preset != GGN_PRESET_PAPER)

@@ -8,7 +8,6 @@
 static int reflect(int i, int size)
 {
     int k = i % (2 * size);
-
     return k < size ? k : 2 * size - 1 - k;
 }
 
@@ -34,7 +33,6 @@ TILE_LOAD(ggn_tile_load_u16, uint16_t)
 void ggn_tile_store_u16(uint16_t *dst, int width, int height, int x0, int y0, const real *src, const struct ggn_value *v)
 {
     const int w = width - x0 < v->w ? width - x0 : v->w, h = height - y0 < v->h ? height - y0 : v->h;
-
     for (int c = 0; c < 3; c++)
         for (int y = 0; y < h; y++) {
             const real *from = src + (size_t)c * v->plane + (long)y * v->row;

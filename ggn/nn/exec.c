@@ -27,7 +27,6 @@ static size_t size_up(struct ggn_exec *e, int workers, size_t *n_sums)
     const int back = e->flags & GGN_EXEC_GRADS;
     const size_t images = (size_t)e->capacity;
     size_t normed = 0;
-
     e->n_acts = place_values(g, e->flags, e->offset);
     /* of a worker: the lane sums of one weight gradient task, or one task of Winograd's form; vectors have <= 64 bytes */
     e->scratch_size = (size_t)GGN_TILE_MAX * GGN_GRAD_IC * 9 * (64 / sizeof(real)) + 256;
@@ -73,7 +72,6 @@ struct ggn_exec *ggn_exec_create(const struct ggn_graph *graph, const struct ggn
     const size_t bytes = size_up(&plan, workers, &n_sums), acts = plan.n_acts * (size_t)capacity;
     /* calloc: fresh pages are zero already, and the zero padding of the layout is never written with anything else */
     struct ggn_exec *e = calloc(1, bytes + ALIGN_BYTES);
-
     if (!e) {
         base_fail_nomem(err, "network activations");
         return NULL;
@@ -100,7 +98,6 @@ static const struct ggn_layer_passes *const passes[] = {GGN_OPS(PASSES)};
 static const struct ggn_layer *fusible_bn(const struct ggn_exec *e, int i)
 {
     const struct ggn_layer *l = &e->graph->layer[i];
-
     if (e->mode != GGN_EVAL || (e->flags & (GGN_EXEC_GRADS | GGN_EXEC_NO_FUSE)) || l->op != GGN_OP_CONV ||
         i + 1 >= e->graph->n_layers || l[1].op != GGN_OP_BN || l[1].in != l->out || e->graph->value[l->out].uses != 1)
         return NULL;

@@ -27,7 +27,6 @@ static int input_planes(real **out, const struct ggn_task *t, real *base, long n
 static long cut_conv(struct ggn_task *t, int c_in, int c_out, const real *wino)
 {
     const struct ggn_value *v = ggn_task_out(t);
-
     if (wino && t->l->kernel == 3 && ggn_wino_suits(c_in, c_out, v->h, v->w, t->e->kernels->lanes)) {
         t->wino = wino + 4 * t->l->pack;
         ggn_wino_cut(ggn_wino_tiles(v->h, v->w), c_out, &t->px_blocks, &t->oc_group);
@@ -58,7 +57,6 @@ static void conv_piece(const struct ggn_task *t, long i)
                             .h = v->h,
                             .w_px = v->w,
                             .row = v->row};
-
     for (int c = 0; c < v->c; c++)
         y[c] = ggn_exec_at(t->e, all, t->bn ? t->bn->out : l->out, n, c);
     if (t->back) {
@@ -99,7 +97,6 @@ static void conv_act_back(const struct ggn_task *t, long c)
 {
     const struct ggn_value *v = ggn_task_out(t);
     double sum = 0;
-
     for (int n = 0; n < t->e->batch; n++) {
         real *dy = ggn_exec_grad(t->e, t->l->out, n, (int)c);
         sum += t->l->slope == 1 ? t->e->kernels->sum(dy, v->h, v->w, v->row)
@@ -128,7 +125,6 @@ static long cut_weights(struct ggn_task *t)
     const struct ggn_kernels *k = t->e->kernels;
     const struct ggn_value *v = ggn_task_out(t);
     const int n_in = ggn_task_c_in(t);
-
     t->weights_by_wino = k->wino_grad && t->l->kernel == 3 && ggn_wino_grad_suits(n_in, v->c, v->h, v->w, k->lanes);
     t->oc_group = t->weights_by_wino ? GGN_WINO_GRAD : k->tile_oc;
     t->ic_group = t->weights_by_wino ? GGN_WINO_GRAD : GGN_GRAD_IC;
@@ -145,7 +141,6 @@ static void weights_by_definition(const struct ggn_task *t, const struct weight_
     const int taps = t->l->kernel * t->l->kernel, values = p->ot * p->nic * taps;
     const long px = (long)v->h * v->row;
     real sums[GGN_TILE_MAX * GGN_GRAD_IC * 9]; /* [nic][taps][ot] */
-
     memset(t->scratch, 0, (size_t)(values * k->lanes) * sizeof *t->scratch);
     for (long at = 0; at < px; at += GRAD_CHUNK)
         k->conv_grad(t->scratch, (const real *const *)x, p->nic, dy, p->ot, taps, v->row, at,
@@ -188,7 +183,6 @@ static void conv_weight_back(const struct ggn_task *t, long i)
                             .ic0 = (int)(i % t->ic_groups) * t->ic_group};
     real *x[GGN_MAX_CHANNELS];
     const real *dy[GGN_WINO_GRAD];
-
     p.ot = c_out - p.oc < t->oc_group ? c_out - p.oc : t->oc_group;
     p.nic = n_in - p.ic0 < t->ic_group ? n_in - p.ic0 : t->ic_group;
     input_planes(x, t, t->e->acts, n);
@@ -202,7 +196,6 @@ static void conv_weight_sum(const struct ggn_task *t, long i)
 {
     const size_t from = (size_t)i * SUM_CHUNK, count = ggn_conv_weights(t->e->graph, t->l);
     const long n = (long)(count - from < SUM_CHUNK ? count - from : SUM_CHUNK);
-
     for (int image = 0; image < t->e->batch; image++)
         t->e->kernels->axpy(t->e->params_grad + t->l->weight + from, 1, ggn_leaf(t, image) + from, n);
 }
@@ -214,7 +207,6 @@ static void conv_backward(struct ggn_task *t)
     const struct ggn_graph *g = t->e->graph;
     const int c_out = ggn_task_out(t)->c;
     const int c_in = ggn_task_c_in(t);
-
     ggn_task_run(t, c_out, conv_act_back);
     ggn_task_run(t, cut_weights(t), conv_weight_back);
     ggn_task_run(t, (long)((ggn_conv_weights(g, t->l) + SUM_CHUNK - 1) / SUM_CHUNK), conv_weight_sum);
@@ -232,7 +224,6 @@ static void im2col_piece(const struct ggn_task *t, long i)
     int c = (int)(i % out->c), dy = c % 9 / 3 - t->l->pad, dx = c % 3 - t->l->pad;
     const real *x = ggn_exec_plane(t->e, t->l->in, n, c / 9);
     real *y = ggn_exec_plane(t->e, t->l->out, n, c);
-
     int s0 = 0, s1 = out->w; /* columns [s0, s1) lie inside */
     while (s0 < s1 && s0 * t->l->stride + dx < 0)
         s0++;
@@ -257,7 +248,6 @@ static void im2col_back_piece(const struct ggn_task *t, long i)
     long n = i / in->c;
     int c = (int)(i % in->c);
     real *dx = ggn_exec_grad(t->e, t->l->in, n, c);
-
     for (int r = 0; r < in->h && !t->l->add_in; r++)
         memset(dx + (long)r * in->row, 0, (size_t)in->w * sizeof *dx);
     for (int tap = 0; tap < 9; tap++) {

@@ -22,7 +22,6 @@ static void bn_image(const struct ggn_task *t, long i)
     const int n = (int)(i / v->c), c = (int)(i % v->c);
     const real *x = ggn_exec_plane(t->e, t->l->in, n, c);
     double *sums = bn_sums_of(t, n, c);
-
     sums[0] = t->e->kernels->sum(x, v->h, v->w, v->row) / ((double)v->h * v->w);
     sums[1] = t->e->kernels->sum_sq(x, sums[0], v->h, v->w, v->row);
 }
@@ -33,7 +32,6 @@ static void bn_combine(const struct ggn_task *t)
     const struct ggn_value *v = ggn_task_out(t);
     const double pixels = (double)v->h * v->w;
     double *means = bn_total(t, 0), *squares = bn_total(t, 1);
-
     memset(t->e->sums, 0, 2 * (size_t)v->c * sizeof *means);
     for (int n = 0; n < t->e->batch; n++)
         for (int c = 0; c < v->c; c++)
@@ -52,7 +50,6 @@ static void bn_statistics(const struct ggn_task *t, long c)
     const size_t s = t->l->stats + (size_t)c;
     const double count = (double)v->h * v->w * t->e->batch;
     const double mean = bn_total(t, 0)[c] / t->e->batch, var = bn_total(t, 1)[c] / count;
-
     t->e->bn_mean[s] = (real)mean;
     t->e->bn_inv[s] = (real)(1 / sqrt(var + GGN_BN_EPS));
     double unbiased = count > 1 ? var * count / (count - 1) : var;
@@ -65,7 +62,6 @@ static void bn_channel(const struct ggn_task *t, long c)
     const struct ggn_value *v = ggn_task_out(t);
     const size_t s = t->l->stats + (size_t)c;
     real scale = t->w->scale[s], shift = t->w->shift[s];
-
     if (t->e->mode == GGN_TRAIN) {
         bn_statistics(t, c);
         scale = t->w->params[t->l->weight + (size_t)c] * t->e->bn_inv[s];
@@ -82,7 +78,6 @@ static void bn_channel(const struct ggn_task *t, long c)
 static void bn_forward(struct ggn_task *t)
 {
     const int channels = ggn_task_out(t)->c;
-
     if (t->e->mode == GGN_TRAIN) {
         ggn_task_run(t, (long)t->e->batch * channels, bn_image);
         bn_combine(t);
@@ -96,7 +91,6 @@ static void bn_back_image(const struct ggn_task *t, long i)
 {
     const struct ggn_value *v = ggn_task_out(t);
     const int n = (int)(i / v->c), c = (int)(i % v->c);
-
     t->e->kernels->bn_sums(bn_sums_of(t, n, c), ggn_exec_grad(t->e, t->l->out, n, c), ggn_exec_plane(t->e, t->l->in, n, c),
                            t->e->bn_mean[t->l->stats + (size_t)c], v->h, v->w, v->row);
 }
@@ -109,7 +103,6 @@ static void bn_back_channel(const struct ggn_task *t, long c)
     const double inv = (double)t->e->bn_inv[s], mean = (double)t->e->bn_mean[s];
     const double gamma = (double)t->w->params[t->l->weight + (size_t)c];
     const double sum[2] = {bn_total(t, 0)[c], bn_total(t, 1)[c]};
-
     t->e->params_grad[t->l->weight + (size_t)c] += (real)(sum[1] * inv);
     t->e->params_grad[t->l->bias + (size_t)c] += (real)sum[0];
     double b = t->e->mode == GGN_TRAIN ? -gamma * inv * inv * inv * sum[1] / count : 0;
@@ -123,7 +116,6 @@ static void bn_back_channel(const struct ggn_task *t, long c)
 static void bn_backward(struct ggn_task *t)
 {
     const int channels = ggn_task_out(t)->c;
-
     ggn_task_run(t, (long)t->e->batch * channels, bn_back_image);
     memset(t->e->sums, 0, 2 * (size_t)channels * sizeof *t->e->sums);
     for (int n = 0; n < t->e->batch; n++)
@@ -146,7 +138,6 @@ struct pair {
 static struct pair pair_of(const struct ggn_task *t, long i)
 {
     struct pair p = {.in = ggn_task_in(t), .out = ggn_task_out(t)};
-
     p.n = i / p.in->c;
     p.c = (int)(i % p.in->c);
     int c_out = p.c % p.out->c; /* FLATTEN has its own loop */
@@ -197,7 +188,6 @@ PLANE_LAYER(up, up_plane(t, &p),
 static long pool3_argmax(const struct ggn_value *in, const real *x, int r, int s)
 {
     long best = -1;
-
     for (int y = 2 * r > 0 ? 2 * r - 1 : 0; y <= 2 * r + 1 && y < in->h; y++)
         for (int q = 2 * s > 0 ? 2 * s - 1 : 0; q <= 2 * s + 1 && q < in->w; q++) {
             long at = (long)y * in->row + q;
@@ -213,7 +203,6 @@ static void pool3_row(const struct pair *p, int r)
     const struct ggn_value *in = p->in;
     const real *b = p->x + 2L * r * in->row, *a = r > 0 ? b - in->row : b, *c = 2 * r + 1 < in->h ? b + in->row : b;
     real column[GGN_MAX_SIDE], *y = p->y + (long)r * p->out->row;
-
     for (int i = 0; i < in->w; i++)
         column[i] = ggn_larger(ggn_larger(a[i], b[i]), c[i]);
     for (int s = 0; s < p->out->w; s++) {
@@ -251,7 +240,6 @@ PLANE_LAYER(maxpool, pool_plane(t, &p), pool_back_plane(t, &p))
 static void flatten_plane(const struct ggn_task *t, const struct pair *p, int back)
 {
     real *flat = ggn_exec_at(t->e, back ? t->e->grads : t->e->acts, t->l->out, p->n, p->c * p->in->h * p->in->w);
-
     for (int r = 0; r < p->in->h; r++, flat += p->in->w)
         for (int s = 0; s < p->in->w; s++) {
             if (back)
@@ -280,7 +268,6 @@ static void linear_unit(const struct ggn_task *t, long o)
 {
     const long c_in = ggn_task_in(t)->c, c_all = ggn_task_c_in(t);
     const real *w = t->w->params + t->l->weight + (size_t)(o * c_all);
-
     for (int n = 0; n < t->e->batch; n++) {
         real *y = &ggn_exec_plane(t->e, t->l->out, n, 0)[o];
         *y = t->w->params[t->l->bias + (size_t)o] + t->e->kernels->dot(w, ggn_exec_plane(t->e, t->l->in, n, 0), c_in);
@@ -296,7 +283,6 @@ static void linear_weight_back(const struct ggn_task *t, long o)
 {
     const long c_in = ggn_task_in(t)->c, c_all = ggn_task_c_in(t);
     real *dw = t->e->params_grad + t->l->weight + (size_t)(o * c_all);
-
     for (int n = 0; n < t->e->batch; n++) {
         const real d = ggn_exec_grad(t->e, t->l->out, n, 0)[o];
         t->e->kernels->axpy(dw, d, ggn_exec_plane(t->e, t->l->in, n, 0), c_in);
@@ -312,7 +298,6 @@ static void linear_value_back(const struct ggn_task *t, long n, int in, long fir
     const struct ggn_graph *g = t->e->graph;
     const long c_in = g->value[in].c, c_all = ggn_task_c_in(t);
     real *dx = ggn_exec_grad(t->e, in, n, 0);
-
     if (!add)
         memset(dx, 0, (size_t)c_in * sizeof *dx);
     for (int o = 0; o < ggn_task_out(t)->c; o++)

@@ -89,7 +89,6 @@ int ggn_graph_conv(struct ggn_graph *g, int in, int in2, int c_out, int kernel, 
     struct ggn_layer *l = add_layer(g, GGN_OP_CONV, in, in2);
     const struct ggn_value *a = &g->value[in];
     int c_in = a->c + (in2 >= 0 ? g->value[in2].c : 0);
-
     if (!g->err.code && in2 >= 0 && (g->value[in2].h != a->h || g->value[in2].w != a->w))
         base_fail(&g->err, BASE_EINVAL, "network %s, stage %s: joined tensors differ in size", g->name, g->stage);
     l->kernel = kernel;
@@ -186,7 +185,6 @@ void ggn_graph_mark(struct ggn_graph *g, int value, const char *stage) { g->valu
 int ggn_graph_end(struct ggn_graph *g, struct base_err *err)
 {
     unsigned char written[GGN_MAX_LAYERS + 1] = {0};
-
     if (g->err.code)
         return base_fail(err, g->err.code, "%s", g->err.text);
     for (int i = g->n_layers - 1; i >= 0; i--) {
@@ -229,7 +227,6 @@ size_t ggn_graph_place(const struct ggn_graph *g, size_t offset[GGN_MAX_LAYERS +
 {
     int born[GGN_MAX_LAYERS + 1], dies[GGN_MAX_LAYERS + 1];
     size_t total = 0;
-
     find_lifetimes(g, born, dies);
     for (int first = 0; first < g->n_values; first++) { /* one round per geometry, led by its first value */
         size_t end = total;
@@ -271,7 +268,6 @@ double ggn_layer_mac(const struct ggn_graph *g, int layer)
     const struct ggn_layer *l = &g->layer[layer];
     const struct ggn_value *out = &g->value[l->out];
     double c_in = ggn_layer_c_in(g, l);
-
     if (l->op == GGN_OP_LINEAR)
         return c_in * out->c;
     if (l->op == GGN_OP_CONV)

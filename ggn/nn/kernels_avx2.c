@@ -31,7 +31,6 @@ INLINE void transpose_halves(vf m[4])
 {
     __m256d a = (__m256d)_mm256_unpacklo_ps(m[0], m[1]), b = (__m256d)_mm256_unpackhi_ps(m[0], m[1]);
     __m256d c = (__m256d)_mm256_unpacklo_ps(m[2], m[3]), d = (__m256d)_mm256_unpackhi_ps(m[2], m[3]);
-
     m[0] = (vf)_mm256_unpacklo_pd(a, c);
     m[1] = (vf)_mm256_unpackhi_pd(a, c);
     m[2] = (vf)_mm256_unpacklo_pd(b, d);

@@ -34,7 +34,6 @@ INLINE void deinterleave4(vf p[4], const float *row)
     vf a = LOAD(row), b = LOAD(row + 16), c = LOAD(row + 32), d = LOAD(row + 48);
     vf ab0 = _mm512_permutex2var_ps(a, low, b), ab2 = _mm512_permutex2var_ps(a, high, b);
     vf cd0 = _mm512_permutex2var_ps(c, low, d), cd2 = _mm512_permutex2var_ps(c, high, d);
-
     p[0] = _mm512_shuffle_f32x4(ab0, cd0, 0x44);
     p[1] = _mm512_shuffle_f32x4(ab0, cd0, 0xee);
     p[2] = _mm512_shuffle_f32x4(ab2, cd2, 0x44);
@@ -52,7 +51,6 @@ INLINE void interleave4(vf p[4])
     __m512d a23 = (__m512d)_mm512_permutex2var_ps(p[2], first, p[3]);
     __m512d b23 = (__m512d)_mm512_permutex2var_ps(p[2], second, p[3]);
     const __m512i low = _mm512_set_epi64(11, 3, 10, 2, 9, 1, 8, 0), high = _mm512_set_epi64(15, 7, 14, 6, 13, 5, 12, 4);
-
     p[0] = (vf)_mm512_permutex2var_pd(a01, low, a23);
     p[1] = (vf)_mm512_permutex2var_pd(a01, high, a23);
     p[2] = (vf)_mm512_permutex2var_pd(b01, low, b23);
@@ -66,7 +64,6 @@ INLINE vf shift_in(vf v, float next) { return (vf)_mm512_alignr_epi32((__m512i)S
 INLINE void transpose(vf m[16])
 {
     vf t[16];
-
     for (int i = 0; i < 16; i += 2) {
         t[i] = _mm512_unpacklo_ps(m[i], m[i + 1]);
         t[i + 1] = _mm512_unpackhi_ps(m[i], m[i + 1]);

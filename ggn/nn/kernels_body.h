@@ -33,7 +33,6 @@ INLINE void conv_tile(const struct ggn_conv *a, const real *w, int oc, int i0, i
                       const int taps)
 {
     vf acc[8][TILE_V];
-
     for (int o = 0; o < ot; o++) {
         int load = i0 > 0 || (a->add && a->add[oc + o]);
         for (int v = 0; v < nv; v++)
@@ -82,7 +81,6 @@ static void restore_padding(const struct ggn_conv *a, int oc0, int oc1, long p, 
 {
     long end = (long)a->h * a->row;
     long first = p + (a->w_px - p % a->row);
-
     for (int o = oc0; o < oc1; o++) {
         for (long q = first; q < p + n; q += a->row)
             a->y[o][q] = 0;
@@ -120,7 +118,6 @@ static void conv(const struct ggn_conv *a, long p0, long p1, int oc0, int oc1)
 INLINE void grad_tile(real *acc, const real *x, const real *const *dy, long p0, long p1, const int ot, const int nt)
 {
     vf sum[3][8];
-
     for (int t = 0; t < nt; t++)
         for (int o = 0; o < ot; o++)
             sum[t][o] = LOAD(acc + (t * ot + o) * VW);
@@ -170,7 +167,6 @@ static void lane_sums(real *out, const real *acc, int n)
 static double sum(const real *x, int h, int w, int row)
 {
     double total = 0;
-
     for (int y = 0; y < h; y++, x += row) {
         vf s = SET1(0);
         int i = 0;
@@ -188,7 +184,6 @@ static double sum_sq(const real *x, double mean, int h, int w, int row)
 {
     const real m = (real)mean;
     double total = 0;
-
     for (int y = 0; y < h; y++, x += row) {
         vf s = SET1(0);
         int i = 0;
@@ -214,7 +209,6 @@ static void affine(real *restrict y, const real *restrict x, real scale, real sh
 static void bn_sums(double out[2], const real *dy, const real *x, real mean, int h, int w, int row)
 {
     double total[2] = {0, 0};
-
     for (int r = 0; r < h; r++, x += row, dy += row) {
         vf s0 = SET1(0), s1 = SET1(0);
         int i = 0;
@@ -272,7 +266,6 @@ static void lrelu_grad(real *restrict dx, const real *restrict dy, const real *r
 static double act_grad(real *dy, const real *y, real slope, int h, int w, int row)
 {
     double total = 0;
-
     for (int r = 0; r < h; r++, y += row, dy += row) {
         vf s = SET1(0);
         int i = 0;
@@ -388,7 +381,6 @@ INLINE void up_row(real *restrict y, const real *restrict near, const real *rest
 {
     const real q = (real)0.25, t = (real)0.75;
     real first = t * near[0] + q * far[0], last = t * near[w - 1] + q * far[w - 1];
-
     for (int i = 0; i + 1 < w; i++) {
         real a = t * near[i] + q * far[i], b = t * near[i + 1] + q * far[i + 1];
         y[2 * i + 1] = t * a + q * b;
@@ -441,7 +433,6 @@ static real dot(const real *a, const real *b, long n)
 {
     vf s0 = SET1(0), s1 = SET1(0);
     long i = 0;
-
     for (; i + 2 * VW <= n; i += 2 * VW) {
         s0 = FMA(LOAD(a + i), LOAD(b + i), s0);
         s1 = FMA(LOAD(a + i + VW), LOAD(b + i + VW), s1);
@@ -461,7 +452,6 @@ static void axpy(real *restrict y, real a, const real *restrict x, long n)
 static void blur(real *dst, const real *x, real *tmp, const real taps[2 * GGN_SSIM_RADIUS + 1], int h, int w, int row)
 {
     const int n = 2 * GGN_SSIM_RADIUS + 1;
-
     for (int r = 0; r < h; r++)
         for (int i = -GGN_SSIM_RADIUS; i < w + GGN_SSIM_RADIUS; i += VW) {
             const real *column = x + (long)(r - GGN_SSIM_RADIUS) * row + i;

@@ -37,7 +37,6 @@ static void make_taps(struct ggn_ssim *s)
 {
     float single[N_TAPS];
     double total = 0, sum = 0, sum_2d = 0;
-
     for (int k = 0; k < N_TAPS; k++)
         total += (double)(single[k] = (float)exp(-(k - GGN_SSIM_RADIUS) * (k - GGN_SSIM_RADIUS) / (2 * SIGMA * SIGMA)));
     for (int k = 0; k < N_TAPS; k++)
@@ -56,7 +55,6 @@ struct ggn_ssim *ggn_ssim_create(int h, int w, struct base_threads *threads, str
     const int row = (w + 2 * BORDER + 15) / 16 * 16 + 16;
     const size_t map = (size_t)row * (size_t)(h + 2 * GGN_SSIM_RADIUS + 2);
     struct ggn_ssim *s = calloc(1, sizeof *s + workers * N_MAPS * map * sizeof s->maps[0]);
-
     if (!s) {
         base_fail_nomem(err, "SSIM");
         return NULL;
@@ -93,7 +91,6 @@ static void blur_2d(const struct ggn_ssim *s, real *map, real *tmp)
 static void blur_in_place(struct ggn_ssim *s, int worker, real *map)
 {
     real *tmp = map_of(s, worker, TMP);
-
     if (sizeof(real) == sizeof(double)) {
         blur_2d(s, map, tmp);
         return;
@@ -111,7 +108,6 @@ static double ssim_row(struct ggn_ssim *s, int worker, long at)
     real *eyy = map_of(s, worker, YY) + at, *exy = map_of(s, worker, XY) + at;
     const real c1 = (real)C1, c2 = (real)C2;
     double total = 0;
-
     for (int i = 0; i < s->w; i++) {
         real a1 = 2 * mx[i] * my[i] + c1, a2 = 2 * (exy[i] - mx[i] * my[i]) + c2;
         real b1 = mx[i] * mx[i] + my[i] * my[i] + c1;
@@ -134,7 +130,6 @@ static void ssim_plane(void *data, long i, int worker)
     real *mx = map_of(s, worker, X), *my = map_of(s, worker, Y), *exx = map_of(s, worker, XX), *eyy = map_of(s, worker, YY);
     real *exy = map_of(s, worker, XY);
     double total = 0;
-
     for (int r = 0; r < s->h; r++) {
         const real *x = s->x[i] + (long)r * s->in_row, *y = s->y[i] + (long)r * s->in_row;
         long at = (long)r * s->row;
@@ -171,7 +166,6 @@ double ggn_ssim_mean(struct ggn_ssim *s, const real *const *x, const real *const
                      double grad_scale)
 {
     double total = 0, pixels = (double)n * s->h * s->w;
-
     s->in_row = row;
     s->grad_scale = grad_scale / pixels;
     for (int first = 0; first < n; first += BATCH) {

@@ -24,7 +24,6 @@ struct ggn_weights *ggn_weights_create(const struct ggn_graph *graph, const stru
     size_t wino = k->wino ? 4 * pack : 0;
     size_t bytes = (learned + 2 * stats + (flags & GGN_WEIGHTS_BACKWARD ? 2 : 1) * (pack + wino)) * sizeof(real);
     struct ggn_weights *w = calloc(1, sizeof *w + ALIGN + bytes);
-
     if (!w) {
         base_fail_nomem(err, "network weights");
         return NULL;
@@ -56,7 +55,6 @@ static double normal(uint32_t k, uint32_t seed)
 static double initial(const struct ggn_tensor *t, enum ggn_init init, double fan_in, uint32_t k, uint32_t seed)
 {
     double u = 2 * ggn_hash_unit(k, seed) - 1;
-
     if (init == GGN_INIT_HASH)
         return t->is_bn && !t->is_bias ? 1 + 0.1 * u : t->is_bias ? 0.1 * u : u * sqrt(6 / fan_in);
     if (t->is_bn)
@@ -71,7 +69,6 @@ static double initial(const struct ggn_tensor *t, enum ggn_init init, double fan
 void ggn_weights_init(struct ggn_weights *w, enum ggn_init init, uint32_t seed)
 {
     const struct ggn_graph *g = w->graph;
-
     for (int i = 0; i < g->n_tensors; i++) {
         const struct ggn_tensor *t = &g->tensor[i], *weight = t->is_bias && !t->is_bn ? t - 1 : t;
         int transposed = g->layer[t->layer].transposed;
@@ -95,7 +92,6 @@ static void pack_conv(real *out, const struct ggn_weights *w, const struct ggn_l
     /* the stored tensor is [out][in] or [in][out]; its first index is the packed output or the packed input */
     const int o_first = l->transposed == back, flip = l->transposed != back;
     const size_t o_step = (size_t)taps * (o_first ? (size_t)n_in : 1), i_step = (size_t)taps * (o_first ? 1 : (size_t)n_out);
-
     for (int oc = 0, tile; oc < n_out; oc += tile) {
         tile = n_out - oc < w->kernels->tile_oc ? n_out - oc : w->kernels->tile_oc;
         for (int i = 0; i < n_in; i++)
@@ -116,7 +112,6 @@ static void pack_layer(void *data, long i, int worker)
     const struct ggn_kernels *k = w->kernels;
     const struct ggn_value *v = &g->value[l->out];
     const int c_in = ggn_layer_c_in(g, l);
-
     if (l->op == GGN_OP_CONV) {
         pack_conv(w->pack + l->pack, w, l, 0);
         if (w->pack_back)

@@ -19,7 +19,6 @@ int ggn_wino_tiles(int h, int w) { return ((h + 3) / 4) * ((w + 3) / 4); }
 void ggn_wino_cut(int tiles, int n_out, int *blocks, int *oc_group)
 {
     const int least = (tiles + GGN_WINO_TILES - 1) / GGN_WINO_TILES;
-
     /* Something for every thread; where the tiles of one call suffice, no two tasks read the same weights. */
     *blocks = least > 1 ? (least < 4 ? 4 : least) : n_out < 64 ? 2 : 1;
     *oc_group = *blocks > 1 ? n_out : (n_out / 2 + GGN_TILE_MAX - 1) / GGN_TILE_MAX * GGN_TILE_MAX;
@@ -47,7 +46,6 @@ static inline __attribute__((always_inline)) void pack_tile(float *restrict out,
                                                             const int tile)
 {
     float half[6][3][GGN_TILE_MAX];
-
     for (int x = 0; x < 3; x++)
         for (int o = 0; o < tile; o++)
             spread(&half[0][x][o], 3 * GGN_TILE_MAX, in[x * tile + o], in[(3 + x) * tile + o], in[(6 + x) * tile + o]);
@@ -59,7 +57,6 @@ static inline __attribute__((always_inline)) void pack_tile(float *restrict out,
 void ggn_wino_pack(float *u, const float *packed, int n_in, int n_out, int tile_oc)
 {
     const size_t stride = (size_t)n_in * (size_t)n_out;
-
     for (int oc = 0, tile; oc < n_out; oc += tile) {
         tile = n_out - oc < tile_oc ? n_out - oc : tile_oc;
         for (int i = 0; i < n_in; i++, packed += 9 * tile) {

@@ -33,7 +33,6 @@ INLINE void forward6(vf o[6], const vf x[6])
     const vf four = SET1(4), five = SET1(5), two = SET1(2);
     vf a = FMA(-four, x[2], x[4]), b = FMA(-four, x[1], x[3]);
     vf c = x[4] - x[2], d = x[3] - x[1];
-
     o[0] = FMA(four, x[0], FMA(-five, x[2], x[4]));
     o[1] = a + b;
     o[2] = a - b;
@@ -47,7 +46,6 @@ INLINE void inverse4(vf o[4], const vf m[6])
 {
     vf s = m[1] + m[2], d = m[1] - m[2];
     vf p = m[3] + m[4], q = m[3] - m[4];
-
     o[0] = (m[0] + s) + p;
     o[1] = FMA(SET1(2), q, d);
     o[2] = FMA(SET1(4), p, s);
@@ -58,7 +56,6 @@ INLINE void inverse4(vf o[4], const vf m[6])
 INLINE void split_phases(float *to, const float *row)
 {
     vf p[4];
-
     deinterleave4(p, row);
     for (int j = 0; j < 4; j++)
         STORE(to + j * ROOM, p[j]);
@@ -119,7 +116,6 @@ INLINE void product_tile(float *out, long out_step, const float *a, long a_step,
                          const int ot, const int nv, const int add)
 {
     vf acc[TILE_OC][3];
-
     UNROLL
     for (int o = 0; o < ot; o++)
         UNROLL
@@ -181,7 +177,6 @@ static void multiply(float *m, const float *u, const float *v, const struct ggn_
 static void inverse_channel(float *o, const float *m, const struct ggn_conv *a, int oc, const struct block *b)
 {
     const vf bias = SET1(a->bias ? a->bias[oc] : 0), slope = SET1(a->slope);
-
     for (int lane = 0; lane < b->lanes; lane += L) {
         vf t[4][6];
         for (int j = 0; j < 6; j++) {
@@ -211,7 +206,6 @@ static void inverse_channel(float *o, const float *m, const struct ggn_conv *a, 
 INLINE void join_phases(float *row, const float *from, int n, int add)
 {
     vf p[4];
-
     for (int j = 0; j < 4; j++)
         p[j] = LOAD(from + j * ROOM);
     interleave4(p);
@@ -241,7 +235,6 @@ static void wino_conv(const struct ggn_conv *a, const float *u, int t0, int t1, 
 {
     struct block b = {.t0 = t0, .n = t1 - t0, .lanes = (t1 - t0 + L - 1) / L * L, .tiles_x = (a->w_px + 3) / 4};
     float *d = scratch, *o = d + XI * ROOM, *m = o + 16 * ROOM, *v = m + GGN_WINO_OC * XI * GGN_WINO_TILES;
-
     b.v_stride = (long)a->n_in * b.lanes + L;
     memset(d, 0, (size_t)XI * ROOM * sizeof *d); /* lanes past the last tile */
     for (int i = 0; i < a->n_in; i++) {
@@ -293,7 +286,6 @@ INLINE void spread6(vf o[6], const vf g[4])
     const vf two = SET1(2), four = SET1(4), eight = SET1(8);
     vf even = g[0] + g[2], odd = g[1] + g[3];
     vf even2 = FMA(four, g[2], g[0]), odd2 = FMA(eight, g[3], two * g[1]);
-
     o[0] = g[0];
     o[1] = even + odd;
     o[2] = even - odd;
@@ -306,7 +298,6 @@ INLINE void spread6(vf o[6], const vf g[4])
 INLINE void transform_tile(float *v, const float *strip, const int side)
 {
     vf t[6][6];
-
     for (int j = 0; j < side; j++) {
         vf x[6], o[6];
         for (int i = 0; i < side; i++)
@@ -334,7 +325,6 @@ INLINE void transform_block(float *v, const float *const *plane, int n, const st
                             const struct tile_block *b, float *strip, const int side)
 {
     const int border = side == 6;
-
     for (int c = 0; c < n; c += L)
         for (int r = 0; r < b->rows; r++) {
             for (int i = 0; i < side; i++)
@@ -362,7 +352,6 @@ INLINE void accumulate_row(float *u, const float *m, const float *v, int tiles, 
 static void accumulate(float *u, const float *m, const float *v, const struct ggn_conv_grad *g, int tiles)
 {
     const int vectors = (g->n_in + L - 1) / L;
-
     for (int xi = 0; xi < XI; xi++, u += CHANNELS * CHANNELS, m += STRIDE, v += STRIDE)
         for (int o = 0; o < g->n_out; o += TILE_OC) { /* channels beyond n_out are 0 */
             if (g->n_out - o > TILE_OC / 2)
@@ -378,7 +367,6 @@ INLINE void gather3(vf o[3], const vf u[6])
     const vf sixth = SET1(1.0f / 6);
     vf s = u[1] + u[2], d = u[2] - u[1];
     vf p = u[3] + u[4], q = u[3] - u[4];
-
     o[0] = FMA(SET1(1.0f / 24), p, FMA(-sixth, s, SET1(0.25f) * u[0]));
     o[1] = FMA(SET1(1.0f / 12), q, sixth * d);
     o[2] = FMA(sixth, p - s, u[5]);
@@ -390,7 +378,6 @@ static void write_weights(const struct ggn_conv_grad *g, const float *u, int o, 
     const int n = g->n_in - i0 < L ? g->n_in - i0 : L;
     float *to = g->dw + (long)o * g->o_step + (long)i0 * g->i_step;
     vf t[3][6], m[L < TAPS ? TAPS : L];
-
     for (int j = 0; j < 6; j++) {
         vf x[6], r[3];
         for (int i = 0; i < 6; i++)
@@ -423,7 +410,6 @@ static void wino_grad(const struct ggn_conv_grad *g, float *scratch)
     ? GRAD_TILES
     / tiles_x : 1;
     float *v = scratch, *m = v + XI * STRIDE, *u = m + XI * STRIDE, *strip = u + XI * CHANNELS * CHANNELS;
-
     memset(u, 0, (size_t)(XI * CHANNELS * CHANNELS) * sizeof *u);
     for (int ty = 0; ty < tiles_y; ty += rows)
         for (int part = 0; part < parts; part++) {

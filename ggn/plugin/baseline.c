@@ -29,14 +29,12 @@ struct worker {
 static struct gp_slot slot_of(const void *of, int32_t width, int32_t height)
 {
     const struct lull_instance *in = of;
-
     return (struct gp_slot){.kept = sizeof(double) * ggn_baseline_feature_count(in->model, width, height)};
 }
 
 static void worker_release(void *data)
 {
     struct worker *w = data;
-
     ggn_baseline_reader_destroy(w->reader);
     free(w->codes);
 }
@@ -44,7 +42,6 @@ static void worker_release(void *data)
 static int worker_init(void *data, const struct lull_instance *in, const struct ggn_meter_room *room, struct base_err *err)
 {
     struct worker *w = data;
-
     w->codes = malloc(3 * room->pixels);
     w->reader = w->codes ? ggn_baseline_reader_create(in->model, err) : NULL;
     return w->reader ? 0 : err->code;
@@ -62,7 +59,6 @@ static long read_image(const struct gp_block_view *seen, uint32_t slot)
     const struct worker *w = seen->worker;
     const struct lull_block *b = seen->block;
     long broken = gp_windowed_read(seen, w->codes);
-
     ggn_baseline_extract(w->reader, w->codes, b->x1 - b->x0, b->y1 - b->y0,
                          gp_history_kept(&seen->in->frame.history, b->id, slot));
     return broken;
@@ -74,7 +70,6 @@ static double window_logit(void *data)
     const struct worker *w = seen->worker;
     const struct lull_block *b = seen->block;
     const double *features[GGN_WINDOW_MAX];
-
     for (int i = 0; i < seen->in->rule.window; i++)
         features[i] = gp_history_kept(&seen->in->frame.history, b->id, seen->head->order[i]);
     return ggn_baseline_logit(w->reader, features, b->x1 - b->x0, b->y1 - b->y0);
@@ -83,7 +78,6 @@ static double window_logit(void *data)
 static void hash_model(struct lull_instance *in, const struct ggn_baseline *b)
 {
     const struct ggn_svm *s = &b->svm;
-
     gp_windowed_hash(in, &b->kind, sizeof b->kind);
     if (b->lstm)
         gp_windowed_hash(in, b->lstm, ggn_lstm_parameters(b->features) * sizeof *b->lstm);
@@ -95,7 +89,6 @@ static int32_t load(struct lull_instance *in, const char *path, struct lull_erro
 {
     struct base_err error = {0};
     struct ggn_baseline *b = calloc(1, sizeof *b);
-
     in->model = b;
     if (!b)
         return lull_kit_fail(err, LULL_E_MEMORY, "create: out of memory");

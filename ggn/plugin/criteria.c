@@ -9,7 +9,6 @@ static void frame_replace(struct lull_instance *in, const void *fresh)
 {
     const struct gp_rule *rule = rule_of(in);
     void *frame = (char *)in + rule->frame_at;
-
     rule->frame_release(frame);
     if (fresh)
         memcpy(frame, fresh, rule->frame_size);
@@ -25,7 +24,6 @@ int32_t gp_create(const struct gp_rule *rule, const struct lull_criterion *table
     struct lull_instance *in = NULL;
     int32_t status = lull_kit_create(&rule->kit, table, rule->size, host, pairs, pair_count, pair_stride, text,
                                      instance ? &in : NULL, err);
-
     if (status)
         return status;
     status = rule->init(in, own, text, err);
@@ -69,7 +67,6 @@ int32_t gp_judge(const struct lull_kit_batch *batch, const uint32_t *members, ui
 {
     const struct lull_host *host = lull_kit_read_of(batch->in)->host;
     struct some some = {*batch, members};
-
     if (host && host->parallel_for && count > 0) { /* for one block too: only the host knows which worker is free */
         int32_t status = host->parallel_for(host, count, judge_task, &some);
         return status == LULL_OK ? LULL_OK : lull_kit_fail(err, status, "evaluate: the host left out blocks");
@@ -85,7 +82,6 @@ int32_t gp_evaluate(struct lull_instance *in, const struct lull_view *view, cons
 {
     const struct lull_kit_batch batch = {in, view, blocks, decisions, block_stride, decision_stride, count};
     int32_t status = lull_kit_batch_check(&batch, err);
-
     if (status)
         return status;
     const struct gp_rule *rule = rule_of(in);

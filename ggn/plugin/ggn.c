@@ -42,14 +42,12 @@ static struct gp_slot slot_of(const void *of, int32_t width, int32_t height)
 {
     const struct lull_instance *in = of;
     const size_t values = 3 * (size_t)width * (size_t)height;
-
     return (struct gp_slot){.made = 2 * values, .kept = values + (in->rule.reach > 0 ? sizeof(struct ggn_measure) : 0)};
 }
 
 static void worker_release(void *data)
 {
     struct worker *w = data;
-
     ggn_inference_destroy(w->inference);
     ggn_meter_release(&w->meter);
     free(w->noise_map);
@@ -58,7 +56,6 @@ static void worker_release(void *data)
 static int worker_init(void *data, const struct lull_instance *in, const struct ggn_meter_room *room, struct base_err *err)
 {
     struct worker *w = data;
-
     w->noise_map = malloc(room->pixels);
     if (w->noise_map && (in->rule.reach <= 0 || !ggn_meter_init(&w->meter, room, err)))
         w->inference = ggn_inference_create(in->model, NULL, err);
@@ -76,7 +73,6 @@ static unsigned char *measured(const struct gp_block_view *seen, uint32_t slot)
 static long read_image(const struct gp_block_view *seen, uint32_t slot)
 {
     const struct worker *w = seen->worker;
-
     if (seen->in->rule.reach > 0)
         memcpy(measured(seen, slot), &w->measure, sizeof w->measure);
     return gp_windowed_read(seen, gp_history_kept(&seen->in->frame.history, seen->block->id, slot));
@@ -91,7 +87,6 @@ static void measure_block(const struct gp_block_view *seen)
     float *const *rgb = w->meter.rgb;
     struct lull_kit_tally tally = {0};
     double split;
-
     w->measure = (struct ggn_measure){.visible = (double)NAN};
     if (in->rule.reach <= 0)
         return;
@@ -113,7 +108,6 @@ static double law(void *data)
 {
     const struct gp_block_view *seen = data;
     const struct worker *w = seen->worker;
-
     return ggn_measure_octaves(
         ggn_observer_error(&ggn_observer_default, w->measure.visible, (size_t)lull_kit_pixels(seen->block)));
 }
@@ -124,7 +118,6 @@ static void scalars_of(struct gp_block_view *seen, float scalars[GGN_SCALARS])
     const struct ggn_stopper *s = &seen->head->stopper;
     struct ggn_measure window[GGN_WINDOW_MAX];
     double spp[GGN_WINDOW_MAX];
-
     for (uint32_t i = 0; i < s->used; i++) {
         memcpy(&window[i], measured(seen, seen->head->order[i]), sizeof window[i]);
         spp[i] = (double)s->spp[i];
@@ -145,7 +138,6 @@ static double window_logit(void *data)
     const struct lull_block *b = seen->block;
     int w = b->x1 - b->x0, h = b->y1 - b->y0;
     float scalars[GGN_SCALARS] = {0};
-
     if (seen->in->rule.reach > 0)
         scalars_of(seen, scalars);
     for (int i = 0; i < seen->in->rule.window; i++) {
@@ -164,7 +156,6 @@ static int32_t load(struct lull_instance *in, const char *path, struct lull_erro
 {
     struct base_err error = {0};
     struct ggn_model *model = NULL;
-
     int rc = ggn_model_load(path, &model, &error);
     in->model = model;
     if (rc || ggn_policy_of(model, &in->rule.policy, &error))

@@ -14,7 +14,6 @@ int32_t gp_history_create(struct gp_history *history, const struct gp_history_fo
 {
     const uint64_t slots = (uint64_t)form->window + 1, heads = frame->block_count * sizeof(struct gp_history_block);
     uint64_t bytes = 0;
-
     *history = (struct gp_history){0};
     for (uint32_t i = 0; i < frame->block_count && bytes <= PTRDIFF_MAX; i++) {
         const struct lull_rect *r = lull_kit_rect(frame, i);
@@ -76,7 +75,6 @@ void *gp_history_kept(const struct gp_history *h, uint32_t id, uint32_t slot)
 uint32_t gp_head_push(struct gp_head *head, int window, uint32_t before)
 {
     uint32_t slot = head->order[before];
-
     if (before == (uint32_t)window) {
         /* the oldest image leaves; its slot is the next spare one */
         uint32_t oldest = head->order[0];

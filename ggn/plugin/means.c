@@ -12,7 +12,6 @@ struct state_header {
 static struct state_header header_of(const struct gp_history *means)
 {
     struct state_header header = {{'l', 'o', 'o', 'k', 's', '/', '1', 0}, means->count, 0};
-
     for (uint32_t id = 0; id < means->count; id++)
         header.values += means->block[id].slot.kept / sizeof(float);
     return header;
@@ -34,7 +33,6 @@ const float *gp_means_begin(struct gp_history *means, uint32_t id, uint64_t spp,
 {
     struct gp_head *head = &means->block[id].pending;
     struct ggn_stopper *s = &head->stopper;
-
     *head = means->block[id].head;
     *keep = NULL;
     if (!s->used || spp / 2 >= s->spp[s->used - 1]) {
@@ -52,7 +50,6 @@ int32_t gp_means_save(const struct gp_history *means, const struct lull_writer *
 {
     const struct state_header header = header_of(means);
     int32_t status = means->count ? writer->write(writer, &header, sizeof header) : LULL_OK;
-
     for (uint32_t id = 0; id < means->count && !status; id++) {
         const struct gp_history_block *b = &means->block[id];
         const struct ggn_stopper *s = &b->head.stopper;
@@ -88,7 +85,6 @@ int32_t gp_means_load(struct gp_history *means, const struct lull_reader *reader
 {
     struct state_header header, wanted = header_of(means);
     struct gp_history fresh;
-
     if (!means->count)
         return LULL_OK;
     if (reader->read(reader, &header, sizeof header))

@@ -113,7 +113,6 @@ static double noise_of_difference(const struct question *q, int width, int heigh
     const size_t pixels = (size_t)width * (size_t)height;
     const struct ggn_viewing *viewing = q->in->viewer.viewing;
     struct ggn_meter *w = q->w;
-
     see_both(w, pixels);
     ggn_visible_texture(w->lightness[0], w->lightness[1], width, height, w->scratch, w->texture);
     for (size_t i = 0; i < pixels; i++)
@@ -131,7 +130,6 @@ static double noise_of_moments(const struct question *q, struct lull_rect area)
     const int width = area.x1 - area.x0, height = area.y1 - area.y0;
     const size_t pixels = (size_t)width * (size_t)height;
     struct ggn_meter *w = q->w;
-
     if (!gp_pair_of_moments(&q->of, area, 1, w->rgb))
         return 0;
     see_both(w, pixels);
@@ -157,7 +155,6 @@ static double error_of(const struct question *q, struct lull_rect area, int diff
 {
     const int width = area.x1 - area.x0, height = area.y1 - area.y0, moments = has_moments(q);
     double gain, expected = 0;
-
     if (!differ && !moments)
         return (double)NAN;
     double noise = noise_of_difference(q, width, height, split, &gain);
@@ -181,7 +178,6 @@ static double error_of_block(const struct question *q, struct lull_kit_tally *ta
                                         "must hold a fixed half of the samples";
     double split;
     const int differ = gp_pair_of_block(&q->of, &f->means, "observer", &f->warned, q->w->rgb, tally, &split);
-
     if (differ < 0) {
         tally->early = 1;
         return (double)NAN;
@@ -204,7 +200,6 @@ static double error_of_area(const struct question *q, struct lull_rect area)
 {
     const struct lull_block *b = q->of.block;
     struct lull_kit_tally ignored = {0};
-
     if (gp_rect_same(gp_rect_of(b), area) || !has_room(&q->in->frame.room, area))
         return 0;
     const int differ = gp_pair_of_halves(&q->of, area, q->w->rgb, &ignored);
@@ -236,7 +231,6 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
     const struct question q = {in, {&in->kit, view, b}, &in->frame.meter[worker < in->frame.workers ? worker : 0]};
     struct lull_kit_tally tally = {0};
     double error = (double)NAN;
-
     if (b->spp < in->kit.need.first_spp)
         tally.early = 1;
     else
@@ -298,7 +292,6 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     const uint32_t workers = lull_kit_workers(&in->kit);
     struct frame fresh = {.area = gp_rect_of_frame(frame), .meter = calloc(workers, sizeof *fresh.meter)};
     int good = fresh.meter != NULL;
-
     for (uint32_t i = 0; i < frame->block_count; i++) {
         const struct lull_rect own = *lull_kit_rect(frame, i),
                                around[] = {window_of(&fresh.area, own), border_of(&fresh.area, own)};

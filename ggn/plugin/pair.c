@@ -57,7 +57,6 @@ static int read_part(const struct pair *p, const struct lull_block *b, struct lu
     struct lull_block part = *b;
     struct lull_kit_span s;
     int differ = 0;
-
     part.x0 = rect.x0, part.y0 = rect.y0, part.x1 = rect.x1, part.y1 = rect.y1;
     for (lull_kit_span_begin(&s, p->of->view, &part, p->planes); lull_kit_span_next(&s);)
         for (int32_t i = 0; i < s.count; i++) {
@@ -84,7 +83,6 @@ static int read_around(const struct pair *p, struct lull_kit_tally *tally)
     const struct lull_block *b = p->of->block;
     const size_t values = 3 * (size_t)(area.x1 - area.x0) * (size_t)(area.y1 - area.y0);
     int differ = 0;
-
     memset(p->rgb[0], 0, values * sizeof(float));
     memset(p->rgb[1], 0, values * sizeof(float));
     for (uint32_t i = 0; i < (view->all ? view->all_count : 1); i++) {
@@ -128,7 +126,6 @@ static int pair_of_means(const struct gp_sight *of, struct gp_history *means, fl
     struct lull_kit_span s;
     size_t at = 0;
     int differ = 0;
-
     for (lull_kit_span_begin(&s, of->view, b, COLOR); lull_kit_span_next(&s);)
         for (int32_t i = 0; i < s.count; i++, at++) {
             const double *m = s.value[LULL_PLANE_COLOR][i];
@@ -156,7 +153,6 @@ int gp_pair_of_block(const struct gp_sight *of, struct gp_history *means, const 
 {
     const struct lull_block *b = of->block;
     char text[160];
-
     *split = 0.5;
     if (means->count)
         return pair_of_means(of, means, rgb, tally);

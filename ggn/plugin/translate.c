@@ -44,7 +44,6 @@ int32_t gp_check_block(const struct lull_block *b, const struct lull_rect *r, ui
 struct ggn_display gp_display_of(const struct lull_kit *kit)
 {
     struct ggn_display d = {GGN_TRANSFER_SRGB, kit->gamma, kit->exposure};
-
     if (kit->transfer == LULL_TRANSFER_LINEAR)
         d.transfer = GGN_TRANSFER_LINEAR;
     else if (kit->transfer == LULL_TRANSFER_GAMMA && isfinite(d.gamma) && d.gamma > 0)

@@ -15,7 +15,6 @@ int gp_model_find(const char *name, const char *variable, char *path, size_t roo
     const char *named = variable ? getenv(variable) : NULL;
     char folder[4096] = ".";
     Dl_info info;
-
     if (named && *named) {
         snprintf(path, room, "%s", named);
         return 1;
@@ -40,7 +39,6 @@ static int32_t init(struct lull_instance *in, const void *own, const char *const
 {
     const char *path = text[0];
     char name[64], found[5000];
-
     in->ops = own;
     in->key = UINT32_C(2166136261);
     if (!path) {
@@ -57,7 +55,6 @@ static void release(struct lull_instance *in) { in->ops->model_destroy(in->model
 void gp_windowed_hash(struct lull_instance *in, const void *data, size_t size)
 {
     const unsigned char *p = data;
-
     for (size_t i = 0; i < size; i++)
         in->key = (in->key ^ p[i]) * UINT32_C(16777619); /* FNV-1a */
 }
@@ -66,7 +63,6 @@ void gp_windowed_ready(struct lull_instance *in, const struct lull_param *params
 {
     struct ggn_policy *policy = &in->rule.policy;
     struct lull_requirements *need = &in->kit.need;
-
     for (uint32_t i = 0; i < count; i++)
         if (!isnan(in->kit.value[i]))
             ggn_policy_adjust(policy, params[i].name, in->kit.value[i]);
@@ -101,7 +97,6 @@ static int32_t workers_create(struct gp_windowed_frame *f, const struct lull_ins
     const uint32_t count = lull_kit_workers(&in->kit);
     const size_t size = in->ops->worker_size;
     int rc;
-
     f->worker = calloc(count, size);
     rc = f->worker ? 0 : BASE_ENOMEM;
     while (!rc && f->workers < count)
@@ -116,7 +111,6 @@ static void log_setting(const struct lull_instance *in, const struct lull_frame 
     const struct ggn_setting learned = {(int)need->block_width, (int)need->block_height, GGN_TRANSFER_SRGB};
     struct ggn_setting here = {0, 0, gp_display_of(&in->kit).transfer};
     char difference[200], text[400];
-
     for (uint32_t i = 0; i < frame->block_count; i++) {
         const struct lull_rect *r = lull_kit_rect(frame, i);
         here.width = r->x1 - r->x0 > here.width ? r->x1 - r->x0 : here.width;
@@ -134,7 +128,6 @@ static int32_t begin_frame(struct lull_instance *in, const struct lull_frame *fr
     const struct gp_history_form form = {in->rule.window, "the history of", in->ops->slot, in};
     struct gp_windowed_frame fresh = {.ops = in->ops};
     struct ggn_meter_room room = {0};
-
     for (uint32_t i = 0; i < frame->block_count; i++) {
         const struct lull_rect *r = lull_kit_rect(frame, i);
         ggn_meter_make_room(&room, r->x1 - r->x0, r->y1 - r->y0);
@@ -162,7 +155,6 @@ long gp_windowed_read(const struct gp_block_view *seen, uint8_t *out)
     const struct ggn_display display = gp_display_of(&seen->in->kit);
     long bad = 0;
     struct lull_kit_span s;
-
     for (lull_kit_span_begin(&s, seen->view, b, LULL_PLANE_BIT(LULL_PLANE_COLOR)); lull_kit_span_next(&s);) {
         uint8_t *to = out + (size_t)(s.y - b->y0) * w + (size_t)(s.x - b->x0);
         for (int32_t i = 0; i < s.count; i++)
@@ -196,7 +188,6 @@ static void read_block(struct lull_instance *in, const struct lull_view *view, c
     void *scratch = in->frame.worker + (worker < in->frame.workers ? worker : 0) * in->ops->worker_size;
     struct gp_block_view seen = {in, view, b, head, scratch};
     struct ggn_evidence evidence = in->ops->evidence;
-
     evidence.data = &seen;
     *head = in->frame.history.block[b->id].head;
     const struct ggn_stopper before = head->stopper;
@@ -220,7 +211,6 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
 {
     const struct gp_head *head = &in->frame.history.block[b->id].pending;
     const struct ggn_verdict *v = &head->stopper.verdict;
-
     read_block(in, view, b, worker);
     d->action = v->stop ? LULL_STOP : LULL_CONTINUE;
     d->flags = (v->too_early ? LULL_DECISION_TOO_EARLY : 0) | (head->bad ? LULL_DECISION_BAD_INPUT : 0);
@@ -239,7 +229,6 @@ static int32_t check_block(const struct lull_instance *in, const struct lull_blo
 static void keep(struct lull_instance *in, const struct lull_block *b)
 {
     struct gp_history_block *of = &in->frame.history.block[b->id];
-
     if (in->frame.means.count && of->pending.measured)
         in->frame.means.block[b->id].head = in->frame.means.block[b->id].pending;
     of->head = of->pending;
@@ -257,7 +246,6 @@ static struct state_header header_of(const struct lull_instance *in)
 {
     const struct gp_history *h = &in->frame.history;
     struct state_header header = {{0}, in->key, h->count, (uint32_t)h->form.window, (uint32_t)sizeof(struct gp_head)};
-
     memcpy(header.magic, MAGIC, sizeof MAGIC);
     return header;
 }
@@ -267,7 +255,6 @@ static int32_t save(const struct lull_instance *in, const struct lull_writer *wr
     const struct gp_history *h = &in->frame.history;
     const struct state_header header = header_of(in);
     int32_t status = writer->write(writer, &header, sizeof header);
-
     for (uint32_t id = 0; !status && id < h->count; id++) {
         struct gp_head head = h->block[id].head;
 
@@ -287,7 +274,6 @@ static int32_t save(const struct lull_instance *in, const struct lull_writer *wr
 static int head_valid(const struct gp_head *head, const struct ggn_stop_rule *rule)
 {
     uint32_t seen = 0;
-
     for (int i = 0; i <= rule->window; i++) {
         if (head->order[i] > (uint32_t)rule->window || (seen >> head->order[i] & 1))
             return 0;
@@ -320,7 +306,6 @@ static int32_t load(struct lull_instance *in, const struct lull_reader *reader, 
     struct state_header header, wanted = header_of(in);
     struct gp_history fresh;
     int32_t status = gp_history_like(&fresh, &in->frame.history, err);
-
     if (!status && reader->read(reader, &header, sizeof header))
         status = lull_kit_fail(err, LULL_E_IO, "state: it ends early");
     else if (!status && memcmp(&header, &wanted, sizeof header))

@@ -17,7 +17,6 @@ void ggn_meter_release(struct ggn_meter *m)
 void ggn_meter_make_room(struct ggn_meter_room *room, int width, int height)
 {
     const size_t pixels = (size_t)width * (size_t)height, patches = ggn_visible_patches(width, height);
-
     room->pixels = pixels > room->pixels ? pixels : room->pixels;
     room->patches = patches > room->patches ? patches : room->patches;
     room->width = width > room->width ? width : room->width;
@@ -27,7 +26,6 @@ int ggn_meter_init(struct ggn_meter *m, const struct ggn_meter_room *room, struc
 {
     const size_t pixels = room->pixels, patches = room->patches, doubles = patches + ggn_visibility_scratch(room->width);
     double *memory = pixels < PTRDIFF_MAX / 256 ? malloc(doubles * sizeof *memory + 9 * pixels * sizeof(float)) : NULL;
-
     if (!memory)
         return base_fail_nomem(err, "the noise of a block");
     float *at = (float *)(memory + doubles);
@@ -46,7 +44,6 @@ static void summarise(const struct ggn_meter *m, int width, int height, struct g
     const size_t patches = ggn_visible_patches(width, height);
     double squares = 0, highest = 0;
     int rect[4];
-
     out->texture = 0;
     for (size_t k = 0; k < patches; k++) {
         double sum = 0, sixth = 0;
@@ -70,7 +67,6 @@ double ggn_measure_visible(const struct ggn_meter *m, int width, int height, dou
 {
     const size_t pixels = (size_t)width * (size_t)height;
     double sum = 0;
-
     for (int k = 0; k < 2; k++)
         ggn_visible_lightness(m->rgb[k], pixels, m->lightness[k]);
     if (!keep_texture)
@@ -87,7 +83,6 @@ void ggn_measure(const struct ggn_meter *m, int width, int height, double split,
                  uint8_t *map)
 {
     const size_t pixels = (size_t)width * (size_t)height;
-
     out->visible = ggn_measure_visible(m, width, height, split, keep_texture, &out->lightness);
     summarise(m, width, height, out);
     for (size_t i = 0; map && i < pixels; i++)
@@ -113,7 +108,6 @@ void ggn_measure_scalars(const struct ggn_measure *window, const double *spp, in
                                         last->lightness - 0.5,
                                         last->peak - GAUSSIAN_PEAK,
                                         last->uneven};
-
     for (int i = 0; i < GGN_SCALARS; i++) /* tame: what is far away is one thing */
         scalars[i] = isfinite(values[i]) ? (float)fmin(fmax(values[i], -4), 4) : 0;
 }

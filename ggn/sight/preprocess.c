@@ -19,7 +19,6 @@ static double clean(double value, long *bad)
 uint8_t ggn_preprocess(double linear, const struct ggn_display *display, long *bad)
 {
     double value = clean(linear, bad);
-
     if (!display)
         return base_srgb_code(value);
     value *= display->exposure;

@@ -37,7 +37,6 @@ static cJSON *describe_run(const struct ggn_session *s, int *failed)
                    {"best_step", (double)s->progress.best_step},
                    {"divergences", s->progress.divergences},
                    {"data_key", s->data_crc}};
-
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
         base_json_number(o, numbers[i].name, numbers[i].value, failed);
     if (p->hyper.reach > 0)
@@ -48,7 +47,6 @@ static cJSON *describe_run(const struct ggn_session *s, int *failed)
 static cJSON *describe_data(const struct ggn_session *s, int *failed)
 {
     cJSON *o = cJSON_CreateObject();
-
     for (int split = 0; split < GGN_SPLIT_NONE; split++) {
         cJSON *list = base_json_array(o, ggn_split_names[split], failed);
         for (int i = 0; i < s->set.data.n; i++) {
@@ -70,7 +68,6 @@ static cJSON *describe_data(const struct ggn_session *s, int *failed)
 static cJSON *describe_validation(const struct ggn_classified *v, const struct ggn_stopping *st, int *failed)
 {
     cJSON *o = cJSON_CreateObject();
-
     base_json_number(o, "auc", v->auc, failed);
     base_json_number(o, "accuracy", v->accuracy, failed);
     base_json_number(o, "early_stop_rate", st->early_rate, failed);
@@ -84,7 +81,6 @@ static int write_card(const struct ggn_session *s, const struct ggn_model *model
     char path[4096];
     cJSON *card = cJSON_Duplicate(model->provenance, 1);
     int failed = 0;
-
     base_json_number(card, "k_r", s->hyper.k_r, &failed);
     base_json_number(card, "k_m", s->hyper.k_m, &failed);
     base_json_number(card, "k_d", s->hyper.k_d, &failed);
@@ -115,7 +111,6 @@ static int export(const struct ggn_session *s, const struct ggn_classified *v, c
                   struct base_err *err)
 {
     struct ggn_model *model = s->model;
-
     if (s->hyper.preset == GGN_PRESET_LULL)
         ggn_train_fold(&model->graph[GGN_NET_M], model->weights[GGN_NET_M]->params, s->hyper.window, s->plan->difference, 0);
     int failed = 0;
@@ -133,7 +128,6 @@ static int choose_threshold(const struct ggn_session *s, struct ggn_classified *
                             struct base_err *err)
 {
     struct ggn_checks checks;
-
     if (!s->validation.n)
         return 0;
     int rc = ggn_checks_create(&checks, &s->validation, v->logit, &v->policy, err);
@@ -153,7 +147,6 @@ int ggn_session_finish(struct ggn_session *s, struct base_err *err)
     struct ggn_classified v;
     struct ggn_policy *policy = &v.policy;
     int rc = ggn_classify_validation(s, s->validation.n, &v, err);
-
     if (rc) {
         free(v.logit);
         return rc;

@@ -9,7 +9,6 @@
 void ggn_calibrate_platt(const double *logit, const double *label, int n, struct ggn_policy *policy)
 {
     double a = 1, b = 0, positive = 0;
-
     for (int i = 0; i < n; i++)
         positive += label[i];
     if (positive < 0.5 || positive > n - 0.5)
@@ -50,7 +49,6 @@ struct known {
 static double known_logit(void *data, const int *levels)
 {
     const struct known *k = data;
-
     for (int i = k->first; i < k->end; i++)
         if (k->windows->list[i].last == levels[k->windows->length - 1])
             return k->logit[i];
@@ -62,7 +60,6 @@ int ggn_checks_create(struct ggn_checks *checks, const struct ggn_windows *w, co
 {
     const struct ggn_stop_rule rule = {.policy = *policy, .window = w->length};
     size_t levels = 1;
-
     for (int c = 0; c < w->set->n; c++)
         levels += (size_t)w->set->series[c].n_levels;
     *checks = (struct ggn_checks){.windows = w,
@@ -97,7 +94,6 @@ struct ggn_stopping ggn_calibrate_stopping(const struct ggn_checks *checks, doub
     struct ggn_stopping out = {0};
     double spent = 0, needed = 0;
     int early = 0;
-
     for (int c = 0; c < w->set->n; c++) {
         const struct ggn_level_series *series = &w->set->series[c];
         const struct ggn_seen *own = seen;
@@ -126,7 +122,6 @@ struct ggn_stopping ggn_calibrate_stopping(const struct ggn_checks *checks, doub
 struct ggn_stopping ggn_calibrate_threshold(const struct ggn_checks *checks, double early_rate, double *threshold)
 {
     struct ggn_stopping best = {0};
-
     *threshold = 0;
     for (int k = 1; k <= 99; k++) {
         const struct ggn_stopping now = ggn_calibrate_stopping(checks, k / 100.0);
@@ -141,7 +136,6 @@ struct ggn_stopping ggn_calibrate_threshold(const struct ggn_checks *checks, dou
 double ggn_calibrate_slope(const struct ggn_windows *w, const double *logit, const struct ggn_policy *policy)
 {
     double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
-
     for (int i = 0; i < w->n; i++) {
         double x = w->list[i].octave, y = policy->scale * logit[i] + policy->shift;
         if (fabs(x) > 1)

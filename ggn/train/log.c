@@ -27,7 +27,6 @@ int ggn_log_write_csv(const struct ggn_log *log, const char *path, struct base_e
 {
     struct base_file_out out;
     int rc = base_file_begin(&out, path, err);
-
     if (rc)
         return rc;
     fputs("phase,step,loss,accuracy,validation_loss,validation_accuracy,validation_auc,learning_rate,seconds,processor_s\n",

@@ -10,7 +10,6 @@ static void say(const struct ggn_session *s, const struct ggn_log_row *row, cons
 {
     FILE *f = s->plan->progress;
     double left = (double)(phase->steps - s->progress.step) / fmax(rate, 1e-9) * phase->batch;
-
     if (!f)
         return;
     fprintf(f, "%-8s %6.0f/%llu  loss %.4f", ggn_log_phases[row->phase], row->step, (unsigned long long)phase->steps,
@@ -34,7 +33,6 @@ static int epoch(struct ggn_session *s, const struct ggn_phase *phase, struct ba
     struct ggn_log_row row = {.phase = s->progress.phase};
     char path[4096];
     double start = base_clock_wall_s(), processor = base_clock_process_s(), loss, right;
-
     while (s->progress.step < begin + n) {
         if (s->plan->interrupted && *s->plan->interrupted)
             return GGN_TRAIN_INTERRUPTED;

@@ -43,7 +43,6 @@ static void fill_window(void *data, long i, int worker)
     struct ggn_augment augment =
         f->augment ? ggn_augment_draw(f->step, (int)i, ggn_session_seed(s) ^ 2, &how) : ggn_augment_none();
     float *at = s->buffer + (size_t)i * sample_values(s), *noise_map = at + 2 * window_values(s);
-
     f->label[i] = w->label;
     f->law[i] = s->hyper.reach > 0 ? ggn_session_law(s, c, w->last) : 0;
 
@@ -75,7 +74,6 @@ static struct ggn_batch fill_batch(struct fill *f, int count)
     const size_t plane = (size_t)s->set.width * (size_t)s->set.height;
     const size_t planes = 3 * (size_t)s->hyper.window;
     const float **noisy = s->planes, **second = s->planes + planes * (size_t)s->plan->batch;
-
     base_threads_for(s->threads, count, fill_window, f);
     for (size_t i = 0; i < (size_t)count; i++)
         for (size_t k = 0; k < planes; k++) {
@@ -99,7 +97,6 @@ static struct ggn_batch fill_batch(struct fill *f, int count)
 static void logits(struct ggn_session *s, const struct ggn_windows *windows, const int *index, int n, double *logit)
 {
     const int most = s->plan->batch;
-
     ggn_weights_pack(s->trainer->weights[GGN_NET_M], NULL);
     ggn_weights_pack(s->trainer->weights[GGN_NET_D], NULL);
     for (int first = 0; first < n; first += most) {
@@ -118,7 +115,6 @@ static int denoise_series(const struct ggn_session *s, struct ggn_exec *exec, st
     const struct ggn_value *in = &exec->graph->value[0], *out = ggn_graph_output(exec->graph);
     const int width = s->set.width, height = s->set.height;
     const size_t values = ggn_series_set_values(&s->set);
-
     if (!c->denoised)
         c->denoised = malloc((size_t)c->n_levels * values * sizeof *c->denoised + 1);
     if (!c->denoised)
@@ -141,7 +137,6 @@ static int denoise(struct ggn_session *s, struct ggn_weights *r, enum ggn_split 
 {
     struct ggn_exec *exec = ggn_exec_create(r->graph, NULL, DENOISED_AT_ONCE, 0, s->threads, err);
     int rc = exec ? 0 : BASE_ENOMEM;
-
     ggn_weights_pack(r, NULL);
     for (int i = 0; i < s->set.n && !rc; i++)
         if (split == GGN_SPLITS || s->set.series[i].split == split)
@@ -154,7 +149,6 @@ static int denoise(struct ggn_session *s, struct ggn_weights *r, enum ggn_split 
 static uint64_t epoch_length(const struct ggn_session *s)
 {
     uint64_t n = (uint64_t)(s->train.n / s->plan->batch);
-
     return n ? n : 1;
 }
 
@@ -164,7 +158,6 @@ static int paper_window(const struct ggn_session *s, uint64_t step, int i)
 {
     const uint32_t n = (uint32_t)s->train.n, seed = ggn_hash((uint32_t)(step / epoch_length(s)), ggn_session_seed(s));
     uint32_t bits = 1, k = (uint32_t)(step % epoch_length(s)) * (uint32_t)s->plan->batch + (uint32_t)i;
-
     while (UINT32_C(1) << bits < n)
         bits++;
     /* A Feistel-like walk: each round is a bijection on [0, 2^bits); values beyond n are walked on. */
@@ -187,7 +180,6 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
     int index[GGN_BATCH_MAX];
     double logit[GGN_BATCH_MAX];
     struct ggn_paper_record record;
-
     for (int i = 0; i < n; i++)
         index[i] = paper ? paper_window(s, step, i) : ggn_windows_draw(&s->train, step, i, ggn_session_seed(s));
     struct fill f = {.s = s, .windows = &s->train, .index = index, .step = step, .augment = !paper, .denoised = !paper};
@@ -217,7 +209,6 @@ static void calibrate(const struct ggn_session *s, const double *label, const un
 {
     struct ggn_policy *p = &o->policy;
     int right = 0;
-
     if (s->hyper.reach <= 0)
         ggn_calibrate_platt(o->logit, label, n, p);
     else
@@ -237,7 +228,6 @@ int ggn_classify_validation(struct ggn_session *s, int most, struct ggn_classifi
     int *index = malloc(room * sizeof *index), rc = 0;
     double *label = malloc(room * sizeof *label);
     unsigned char *noisy = malloc(room);
-
     *o = (struct ggn_classified){.logit = malloc(room * sizeof *o->logit),
                                  .auc = (double)NAN,
                                  .loss = (double)NAN,
@@ -272,7 +262,6 @@ static void note_best(struct ggn_session *s, const struct ggn_log_row *row)
     struct ggn_progress *p = &s->progress;
     /* without validation windows (or with one class only) the last epoch counts; a checkpoint knows no infinity, only NaN */
     int better = isnan(row->validation_auc) || !(row->validation_loss >= p->best_loss);
-
     p->stale = better ? 0 : p->stale + 1;
     if (!better)
         return;
@@ -287,7 +276,6 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_
     struct ggn_classified v;
     /* In preset paper the denoiser has moved on: the denoised validation images follow. */
     int rc = s->hyper.preset == GGN_PRESET_PAPER ? denoise(s, s->trainer->weights[GGN_NET_R], GGN_SPLIT_VALIDATION, err) : 0;
-
     if (rc)
         return rc;
     rc = ggn_classify_validation(s, s->plan->validation_windows, &v, err);
@@ -303,7 +291,6 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_
 static int begin(struct ggn_session *s, struct base_err *err)
 {
     const int paper = s->hyper.preset == GGN_PRESET_PAPER;
-
     s->progress = (struct ggn_progress){.phase = GGN_PHASE_CLASSIFIER,
                                         .best_loss = HUGE_VAL,
                                         .seconds = {s->progress.seconds[0], 0},
@@ -330,7 +317,6 @@ int ggn_phase_classifier(struct ggn_session *s, struct base_err *err)
                                     .validate = validate};
     /* The checkpoint first: it holds the denoiser that all images are denoised with. */
     int rc = begin(s, err);
-
     if (!rc)
         rc = ggn_resume_load(s, err);
     if (!rc && !paper)

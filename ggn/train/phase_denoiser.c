@@ -23,7 +23,6 @@ static double draw(uint32_t what, uint64_t step, int i, uint32_t seed)
 static int nth_series(const struct ggn_session *s, enum ggn_split split, int k)
 {
     int n = 0;
-
     for (int i = 0; i < s->set.n; i++)
         if (s->set.series[i].split == split && s->set.series[i].reference && s->set.series[i].n_levels && n++ == k)
             return i;
@@ -34,7 +33,6 @@ static struct crop draw_crop(const struct ggn_session *s, enum ggn_split split, 
 {
     const int size = s->crop, series = nth_series(s, split, -1);
     struct crop c = {.series = nth_series(s, split, (int)(draw(21, step, i, seed) * series)), .augment = ggn_augment_none()};
-
     c.level = (int)(draw(22, step, i, seed) * s->set.series[c.series].n_levels);
     c.x0 = (int)(draw(23, step, i, seed) * (s->set.width - size + 1));
     c.y0 = (int)(draw(24, step, i, seed) * (s->set.height - size + 1));
@@ -59,7 +57,6 @@ static void fill_sample(void *data, long i, int worker)
     const size_t values = 3 * (size_t)size * (size_t)size;
     struct crop c = draw_crop(f->s, f->split, f->step, f->first + (int)i, f->seed);
     float *noisy = f->s->buffer + 2 * (size_t)i * values;
-
     ggn_crop_planes(&f->s->set.series[c.series], c.level, f->s->set.width, f->s->set.height, c.x0, c.y0, size, size,
                     &c.augment, noisy, noisy + values);
     (void)worker;
@@ -70,7 +67,6 @@ static void fill_batch(struct ggn_session *s, enum ggn_split split, uint64_t ste
 {
     struct fill f = {s, split, step, seed, first};
     const size_t plane = (size_t)s->crop * (size_t)s->crop;
-
     base_threads_for(s->threads, count, fill_sample, &f);
     for (int i = 0; i < 3 * count; i++) {
         s->planes[i] = s->buffer + ((size_t)(i / 3) * 6 + (size_t)(i % 3)) * plane;
@@ -82,7 +78,6 @@ static int train_step(struct ggn_session *s, uint64_t step, uint64_t steps, doub
                       struct base_err *err)
 {
     const int n = s->plan->batch_r;
-
     fill_batch(s, GGN_SPLIT_TRAIN, step, ggn_session_seed(s), 0, n);
     *right = (double)NAN;
     s->trainer->options.lr[GGN_NET_R] = ggn_session_lr(s, s->plan->lr_r, step, steps);
@@ -94,7 +89,6 @@ static int validate(struct ggn_session *s, struct ggn_log_row *row, struct base_
 {
     const int n = s->plan->batch_r, any = nth_series(s, GGN_SPLIT_VALIDATION, -1);
     double loss[VALIDATION_CROPS] = {0}, total = 0;
-
     ggn_weights_pack(s->trainer->weights[GGN_NET_R], NULL);
     for (int first = 0; any && first < VALIDATION_CROPS; first += n) {
         int count = VALIDATION_CROPS - first < n ? VALIDATION_CROPS - first : n;
@@ -117,7 +111,6 @@ int ggn_phase_denoiser(struct ggn_session *s, struct base_err *err)
                                     .net = GGN_NET_R,
                                     .step = train_step,
                                     .validate = validate};
-
     if (!nth_series(s, GGN_SPLIT_TRAIN, -1) && phase.steps)
         return base_fail(err, BASE_EINVAL, "%s: no training block has a reference for the denoiser", s->plan->data.dir);
     s->progress.phase = GGN_PHASE_DENOISER;

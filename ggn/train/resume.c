@@ -23,7 +23,6 @@ static float *state_array(struct ggn_session *s, int i, size_t *count)
     static const int best[] = {GGN_NET_M, GGN_NET_D, GGN_NET_R}; /* the denoiser of preset paper only */
     const int paper = s->hyper.preset == GGN_PRESET_PAPER;
     const struct ggn_weights *r = s->model->weights[GGN_NET_R];
-
     if (s->progress.phase == GGN_PHASE_DENOISER || (i < 5 && paper))
         return ggn_trainer_state(s->trainer, GGN_NET_R, i, count);
     if (i < 3) {
@@ -46,7 +45,6 @@ static int visit_arrays(struct ggn_session *s, struct ggn_container *c, int read
     size_t count;
     float *array;
     int rc = 0;
-
     for (int i = 0; !rc && (array = state_array(s, i, &count)); i++) {
         char name[16];
         int dim = (int)count;
@@ -80,7 +78,6 @@ static char *describe(struct ggn_session *s, const struct base_identity *identit
                    {"t0", (double)s->trainer->adam_t[0]},
                    {"t1", (double)s->trainer->adam_t[1]},
                    {"t2", (double)s->trainer->adam_t[2]}};
-
     base_json_text(root, "kind", "training", &failed);
     base_json_text(root, "identity", identity->text, &failed);
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
@@ -105,7 +102,6 @@ static int restore(struct ggn_session *s, const cJSON *root, struct base_err *er
     struct ggn_progress *p = &s->progress;
     const cJSON *row;
     double step = field(root, "step"), steps = field(root, "steps");
-
     if (!(step >= 0) || !(steps >= 0) || !(field(root, "t0") >= 0) || !(field(root, "t1") >= 0) || !(field(root, "t2") >= 0))
         return base_fail(err, BASE_EINVAL, "%s: progress is missing", s->checkpoint_path);
     p->step = (uint64_t)step;
@@ -138,7 +134,6 @@ int ggn_resume_save(struct ggn_session *s, struct base_err *err)
     struct ggn_container c = {0};
     struct base_identity identity = {0};
     int rc = identify(s, &identity, err);
-
     if (!rc && !(c.json = describe(s, &identity)))
         rc = base_fail_nomem(err, "checkpoint");
     if (!rc)
@@ -153,7 +148,6 @@ int ggn_resume_save(struct ggn_session *s, struct base_err *err)
 int ggn_resume_open(struct ggn_session *s, struct base_err *err)
 {
     struct stat st;
-
     if (!s->plan->resume || stat(s->checkpoint_path, &st) != 0)
         return 0;
     int rc = ggn_container_read(&s->checkpoint, s->checkpoint_path, err);
@@ -177,7 +171,6 @@ static int compare(const struct ggn_session *s, const cJSON *root, struct base_e
     static const struct base_identity_words words = {": made with", ": made without", "this run"};
     const cJSON *saved = cJSON_GetObjectItemCaseSensitive(root, "identity");
     struct base_identity identity = {0};
-
     if (!cJSON_IsString(saved))
         return base_fail(err, BASE_EINVAL, "%s: made by an earlier version of Lull: train anew, without --resume",
                          s->checkpoint_path);

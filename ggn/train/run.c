@@ -8,7 +8,6 @@
 struct ggn_train_plan ggn_train_plan_default(enum ggn_preset preset)
 {
     const int lull = preset == GGN_PRESET_LULL;
-
     return (struct ggn_train_plan){
         .data = {.ratio = lull ? 1.1 : 0},
         .hyper = {.preset = preset, .window = 6, .k_r = lull ? 8 : 16, .k_m = lull ? 10 : 20, .k_d = lull ? 32 : 64},
@@ -54,7 +53,6 @@ int ggn_train(const struct ggn_train_plan *plan, struct base_err *err)
 {
     const int lull = plan->hyper.preset == GGN_PRESET_LULL;
     struct ggn_session s = {.plan = plan, .progress.phase = lull ? GGN_PHASE_DENOISER : GGN_PHASE_CLASSIFIER};
-
     snprintf(s.checkpoint_path, sizeof s.checkpoint_path, "%s.ckpt", plan->out);
     int rc = ggn_resume_open(&s, err);
     if (!rc)

@@ -11,7 +11,6 @@ double ggn_session_lr(const struct ggn_session *s, double lr, uint64_t step, uin
 {
     static const double LOWEST = 0.02;
     double t = steps ? (double)step / (double)steps : 0, warm = fmin(1, ((double)step + 1) / fmax(20, 0.02 * (double)steps));
-
     return lr * warm * (LOWEST + (1 - LOWEST) * 0.5 * (1 + cos(BASE_PI * t))) * ldexp(1, -s->progress.divergences);
 }
 
@@ -23,7 +22,6 @@ uint32_t ggn_session_seed(const struct ggn_session *s)
 double ggn_session_law(const struct ggn_session *s, const struct ggn_level_series *c, int k)
 {
     const size_t pixels = (size_t)s->set.width * (size_t)s->set.height;
-
     return ggn_measure_octaves(ggn_observer_error(&ggn_observer_default, c->measure[k].visible, pixels));
 }
 
@@ -33,7 +31,6 @@ static int check_plan(const struct ggn_session *s, struct base_err *err)
 {
     const struct ggn_train_plan *p = s->plan;
     const int paper = p->hyper.preset == GGN_PRESET_PAPER;
-
     if (p->batch < 1 || p->batch > GGN_BATCH_MAX || p->batch_r < 1 || p->batch_r > GGN_BATCH_MAX)
         return base_fail(err, BASE_EINVAL, "a batch has 1 to 1024 samples");
     if (!paper && (s->crop < 16 || s->crop > s->set.width || s->crop > s->set.height))
@@ -66,7 +63,6 @@ int ggn_session_init(struct ggn_session *s, struct base_err *err)
     /* The data first: they say how large networks and crops are, and what of the plan can be done. */
     const struct ggn_train_plan *p = s->plan;
     const int paper = p->hyper.preset == GGN_PRESET_PAPER;
-
     s->threads = base_threads_create(p->threads > 0 ? p->threads : base_threads_available(), err);
     struct ggn_series_set_options data = p->data;
     data.noise_maps = p->noise_map > 0;
@@ -129,7 +125,6 @@ void ggn_session_release(struct ggn_session *s)
 int ggn_session_load_init(struct ggn_session *s, struct base_err *err)
 {
     int rc = ggn_model_load(s->plan->init, &s->init, err);
-
     if (rc)
         return rc;
     const struct ggn_hyper *a = &s->init->hyper, *b = &s->hyper;
@@ -144,7 +139,6 @@ int ggn_session_begin(struct ggn_session *s, int parts, int batch, int height, i
 {
     struct ggn_train_options o = ggn_train_options_default(s->plan->hyper.preset);
     struct ggn_hyper hyper = s->hyper;
-
     hyper.height = height;
     hyper.width = width;
     o.parts = parts;

@@ -14,7 +14,6 @@ void ggn_train_fold(const struct ggn_graph *m, float *params, int window, double
 {
     const struct ggn_tensor *t = &m->tensor[0]; /* [K, 3S, 3, 3] */
     const size_t taps = (size_t)t->dim[2] * (size_t)t->dim[3], in = (size_t)t->dim[1];
-
     for (size_t o = 0; g > 0 && o < (size_t)t->dim[0]; o++)
         for (size_t c = 0; c < 3; c++)
             for (size_t k = 0; k < taps; k++) {
@@ -35,7 +34,6 @@ void ggn_train_fold(const struct ggn_graph *m, float *params, int window, double
 static void copy_channel(const struct ggn_tensor *w, float *params, int o, int i, int transposed)
 {
     const size_t c_out = (size_t)w->dim[transposed ? 1 : 0], c_in = (size_t)w->dim[transposed ? 0 : 1];
-
     for (size_t c = 0; c < c_in; c++) {
         size_t at = transposed ? c * c_out + (size_t)o : (size_t)o * c_in + c;
         float *taps = params + w->offset + 9 * at;
@@ -50,7 +48,6 @@ void ggn_train_identity(const struct ggn_graph *r, float *params)
     const struct ggn_tensor *in0 = tensor(r, "enc0.0.weight"), *in1 = tensor(r, "enc0.1.weight");
     const struct ggn_tensor *out0 = tensor(r, "dec3.0.weight"), *out1 = tensor(r, "dec3.1.weight");
     const struct ggn_tensor *last = tensor(r, "dec3.2.weight"), *bias = tensor(r, "dec3.2.bias");
-
     if (!in0 || !in1 || !out0 || !out1 || !last || !bias || in0->dim[0] < 3)
         return;
     const int k = in0->dim[0];

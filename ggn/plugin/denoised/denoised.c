@@ -137,7 +137,6 @@ static void judge(struct lull_instance *in, const struct lull_view *view, const 
     struct past *now = &in->frame.block[b->id].pending;
     struct lull_kit_tally tally = {0};
     double error = (double)NAN;
-
     (void)view;
     *now = in->frame.block[b->id].past; /* the answer, if it is asked for again */
     if (is_new(in, b)) {
