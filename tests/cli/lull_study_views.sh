@@ -37,7 +37,7 @@ for kinds in grain noisy,noisy noisy, denoisedx; do
     refuses "--kinds $kinds" "--kinds $kinds: expected some of noisy,denoised,blend" "$tmp/levels" --kinds $kinds
 done
 refuses "kinds of settings" "--kinds does nothing in this task (adjustment)" "$tmp/levels" --method adjustment --kinds noisy
-refuses "denoised of what was not" "n-16.png: has no channels 'denoised.R', 'denoised.G' and 'denoised.B' (--kinds shows renders" "$tmp/levels" --kinds denoised
+refuses "denoised of what was not" "n-16.png: has no channels R, G and B in a layer 'denoised' (--kinds shows renders" "$tmp/levels" --kinds denoised
 refuses "blend of what is none" "n-16.png: has no channel 'lull.weight.V' (--kinds shows renders" "$tmp/levels" --kinds blend
 
 # --- clips ---

@@ -72,7 +72,7 @@ static void pictures_are_read_as_they_are_shown(void **state)
     assert_int_equal(lull_host_read_shown(path, NULL, "lull.weight.V", &width, &height, &writer, &e), LULL_E_INVALID);
     assert_non_null(strstr(e.message, "a.png: has no channel 'lull.weight.V'"));
     assert_int_equal(lull_host_read_shown(path, "noisy", NULL, &width, &height, &writer, &e), LULL_E_INVALID);
-    assert_non_null(strstr(e.message, "'noisy.R'"));
+    assert_non_null(strstr(e.message, "'noisy'"));
     assert_int_equal(lull_host_read_shown(folder, NULL, NULL, &width, &height, NULL, &e), LULL_E_INVALID);
     unlink(path);
     assert_int_equal(lull_host_read_shown(path, NULL, NULL, &width, &height, &writer, &e), LULL_E_IO);
