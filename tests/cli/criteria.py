@@ -62,6 +62,7 @@ ACTIONS = {
     "checkpoint, then more": [["--spp-min", "8", "--spp-max", "12", "--checkpoint", "c", "--checkpoint-every", "0"],
                               [*RUNS, "--checkpoint", "c", "--resume", "--report", "a.json"]],
     "sequence": [["--sequence", "s", "--levels", "linear:4:8:4", "--blocks", "0,1", "--reference-spp", "4", "--name", "a/b"]],
+    "recording": [["--sequence", "s", "--planes", "half,moment2", "--past-stops", "--spp-max", "24", "--reference-spp", "4"]],
     "denoise": [[*RUNS, "--denoise", "-o", "a.exr", "--report", "a.json"]],
     "time budget": [[*RUNS, "--time-budget", "0.02", "--report", "a.json"]],
     "error": [[*RUNS, "--error", "100", "--report", "a.json"]],
