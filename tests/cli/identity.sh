@@ -74,7 +74,7 @@ done <leave
 # Of other work than a picture, of where files are, and --denoise, whose parameter and planes are in the identity (denoised.sh).
 elsewhere="--usage --help --version --list-criteria --output --checkpoint --resume --live --quoted --display-server --denoise --spp --json --quote
 --quote-map --quote-pilot --camera-path --frame-seed --frames --plan-every --plan-shot --shot-table --debug-path --explain --blocks --levels --name
---reference-spp --sequence"
+--past-stops --planes --reference-spp --sequence"
 "$P" --help | grep -oE '^ +(-.,? )?--[a-z-]+' | grep -oE -e '--[a-z-]+' | sort -u >all
 { cut -d' ' -f1 decide leave; printf '%s\n' $elsewhere; } | sort -u >known
 t "every option of --help is here" sh -c "comm -23 all known | tee missing; ! test -s missing"
