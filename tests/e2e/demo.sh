@@ -58,7 +58,7 @@ saved=$(tr ';' '\n' <"$dir/own/stop-map.csv" | sed 1d | grep . | sort -n | awk '
 t "  …and says what it saves" grep -qxF "demo: $saved" "$dir/said"
 t "the default criterion stopped blocks" grep -q '"reason":[[:space:]]*"criterion"' "$dir/own/report.json"
 used=$(tr -d ' \t\n' <"$dir/own/report.json" | sed -n 's/.*"criterion":{"id":"\([a-z-]*\)".*/\1/p')
-named=$("${BUILD:-build}/bin/lull-render" --help | tr -s ' \n' ' ' | sed -n 's/.*shared object; default \([a-z-]*\) .*/\1/p')
+named=$("${BUILD:-build}/bin/lull-render" --help | tr -s ' \n' ' ' | sed -n 's/.*Python file; default \([a-z-]*\) .*/\1/p')
 t "  …which is $used, as --help names it" test -n "$used" -a "$used" = "$named"
 t "its blocks differ by four times in samples at least" \
     sh -c "tr ';' '\n' <$dir/own/stop-map.csv | sed 1d | grep . | sort -n | awk 'NR == 1 {a = \$1} {b = \$1} END {exit !(b >= 4 * a)}'"

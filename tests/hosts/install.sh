@@ -8,7 +8,7 @@ if ! "$python" -c 'import numpy, setuptools, wheel' 2>/dev/null; then
 fi
 tmp=$(mktemp -d) || exit 2
 trap 'rm -rf "$tmp"' EXIT
-cp -r plugin-api/python "$tmp/source"
+cp -rL plugin-api/python "$tmp/source" # version.h is a link to the header of the programs in C
 LULL_PLUGIN_PATH=$(cd "$BUILD/lib/lull" && pwd)
 export LULL_PLUGIN_PATH
 if "$python" -m pip install -q --disable-pip-version-check --no-index --no-build-isolation --no-deps --target "$tmp/target" \
