@@ -27,7 +27,7 @@ says() { # says LINE: the last check of the copy ended with status 1 and said th
 helps() { for job in $(scripts/lab --help | sed -n 's/^  \([a-z-]*\)  .*/\1/p'); do scripts/lab "$job" --help | grep -q "^usage: scripts/lab $job" || exit 1; done; }
 t "--help names twenty-two jobs" test "$(scripts/lab --help | grep -c '^  [a-z-]*  ')" -eq 22
 t "  …each with its own" helps
-t "no such job: one line" refuses "expected data-set, cost, " nonsense
+t "no such job: one line" refuses "expected record, data-set, cost, " nonsense
 t "no such option: one line" refuses "lab pages: unrecognized arguments: --what" pages --what
 t "no such step: one line" refuses "expected some of replay" cost --only drew
 mkdir "$tmp/without" && echo 'raise ImportError("none here")' >"$tmp/without/jinja2.py"
