@@ -18,7 +18,8 @@ static int find_library(const char *name, const struct pic_library **out, struct
     if (*out)
         return 0;
     base_guard_begin("the image library", BASE_GUARD_LOADING);
-    *out = loaded = base_module_symbol("lull-images.so", "pic_library", 0, &why);
+    *out = base_module_symbol("lull-images.so", "pic_library", 0, &why);
+    loaded = *out;
     base_guard_end();
     return *out ? 0
            : why.code == BASE_ENOMEM

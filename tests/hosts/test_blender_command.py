@@ -209,7 +209,7 @@ def test_quote():
     assert means == sorted(means) and means[0] < means[-1], table
     assert command(*common, "-q", "--checkpoint", tmp("quote.npz"), "--resume", "-o", tmp("after.exr")) == (0, "")
     status, text = command(*common, "-o", tmp("plain.exr"))
-    assert status == 0 and "visible 0.2 takes about" in text and "error 2 would take" in text, text
+    assert status == 0 and re.search(r"visible 0\.2 takes (about|more than can be told yet)", text) and "error 4 would take" in text, text
     assert Path(tmp("after.exr")).read_bytes() == Path(tmp("plain.exr")).read_bytes()
 
 
