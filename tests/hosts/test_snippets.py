@@ -34,9 +34,10 @@ CHECKED = {("README.md", 1): "tests/packages/readme.sh", ("docs/hosts.md", 1): "
            ("docs/results/decisions.md", 1): "needs the recorded data set, hours", ("docs/scale.md", 1): "tests/cli/mpi.sh",
            ("docs/results/scale.md", 1): "a measurement, minutes", ("docs/results/scale.md", 2): "a measurement, minutes",
            ("docs/results/scale.md", 3): "a measurement, hours", ("docs/study.md", 1): "a server, a training; tests/cli/lull_study.sh, ggn_train.sh",
+           ("docs/recording.md", 1): "a scene of the reader's; tests/hosts/test_replay.py",
            ("docs/watching.md", 2): "a server; tests/cli/watch.sh",
            ("plugin-api/python/README.md", 1): "tests/packages/wheel.sh"}
-CODE = {("docs/denoised.md", "python", 1), ("docs/hosts.md", "python", 1), ("docs/hosts.md", "python", 2), ("docs/hosting.md", "cpp", 1), ("docs/python-criterion.md", "python", 1), ("plugin-api/README.md", "c", 1),
+CODE = {("docs/denoised.md", "python", 1), ("docs/hosts.md", "python", 1), ("docs/hosts.md", "python", 2), ("docs/hosting.md", "cpp", 1), ("docs/python-criterion.md", "python", 1), ("docs/recording.md", "python", 1), ("plugin-api/README.md", "c", 1),
         ("plugin-api/README.md", "c", 2), ("plugin-api/README.md", "c", 3), ("plugin-api/README.md", "cpp", 1), ("plugin-api/README.md", "rust", 1), ("plugin-api/python/README.md", "python", 1), ("plugin-api/python/README.md", "python", 2)}
 
 
@@ -112,6 +113,18 @@ def test_python_criterion():
             mine = Renderer()
             result = lull.Driver(frame, lambda rects, first, count, half: [mine(*r, (*r[:2], first), count) for r in rects], warn=print).run()
             assert result.outcome == "done" and {b.reason for b in frame.blocks} == {"criterion"}
+
+
+def test_python_of_recordings():
+    """docs/recording.md: another renderer's EXR files become a recording"""
+    with elsewhere():
+        rng = np.random.default_rng(1)
+        for n in (16, 32, 64, 128):
+            channels = {c: rng.random((48, 64), np.float32) for c in ("R", "G", "B", "half.R", "half.G", "half.B")}
+            lull.exr.write(f"chess-{n:04d}.exr", channels, (64, 48))
+        exec(small(FOUND["docs/recording.md", "python", 1]), names := {})
+        read = names["recording"].read("rec")
+        assert read.levels(0) == [16, 32, 64, 128] and np.allclose(read.planes(0, 128, ["color"])["color"][..., 0], channels["R"][:read.blocks[0].height, :read.blocks[0].width])
 
 
 def test_python_of_the_denoiser():
