@@ -5,7 +5,7 @@
 as make "exec $(command -v make) -s \"\$@\""
 line=$(readme_line "make blender")
 t "README's line: $line" sh -c "$line"
-zip=$PWD/build/blender/lull-$(sed -n 's/^version = "\(.*\)"/\1/p' plugin-api/python/pyproject.toml).zip
+zip=$PWD/build/blender/lull-$(sed -n 's/^#define BASE_VERSION "\(.*\)"/\1/p' plugin-api/base/version.h).zip
 bpy=$PWD/build/hosts/bpy/bin/python3
 held() { # held WHAT: the last start got that far
     cat "$tmp/said"
