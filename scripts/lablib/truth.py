@@ -12,8 +12,9 @@ import random
 import statistics
 import sys
 import tempfile
+import textwrap
 
-from lablib import record, recordings, tool
+from lablib import record, recordings, tables, tool
 from lablib.sources import EXAMPLES, NETWORK, OBSERVER, PICTURES
 
 SOURCES = PICTURES + OBSERVER + NETWORK + EXAMPLES
@@ -167,10 +168,10 @@ def wrong(results):
         by_scene = {s: row(of["%s %d" % (name, size)], None) for s, of in results["scenes"].items() if not of["trained"]}
         stopped = sum(r["stopped"] for r in by_scene.values())
         off = sorted(((round(r["off"][0] * r["stopped"]), s, r) for s, r in by_scene.items() if r["off"][0]), key=lambda x: (-x[0], x[1]))
-        lines.append("- %d px: %d of %d stops off at %g%s." % (
+        lines.append(textwrap.fill("- %d px: %d of %d stops off at %g%s." % (
             size, sum(count for count, _, _ in off), stopped, OFF[0],
             "".join("%s %s %d of %d (worst %.2f)" % ("," if i else ":", s, count, r["stopped"], r["worst"])
-                    for i, (count, s, r) in enumerate(off))))
+                    for i, (count, s, r) in enumerate(off))), 140, subsequent_indent="  ", break_on_hyphens=False))
     return "\n".join(lines) + "\n"
 
 
@@ -190,10 +191,10 @@ def page(results):
         lines.append("| %s | %d px | %s | %d of %d | %.1f %%%s | %.1f %% | %.1f %% | %s | %s | %s |" % (
             name, size, kind, r["stopped"], r["blocks"], 100 * r["off"][0], "" if math.isnan(low) else " (%.1f–%.1f)" % (100 * low, 100 * high),
             100 * r["off"][1], 100 * r["off"][2], number(r["worst"], "%.2f"), number(r["cost"], "%+.2f"), number(r["samples"], "%.2f")))
-    measured = results["measured"]
-    lines.append("\n%d scenes, %d seeds; `%s`, %s, %s. Shares leave out what the shipped network learned from and what the observer was fitted to (\\*).\n"
-                 "Noise of a reference's worst block, as told by the other: %s." % (
-                     len(results["scenes"]), results["seeds"], measured["command"], measured["date"], measured["commit"], marked(results)))
+    for text in ("%s; %d scenes, %d seeds. Shares leave out what the shipped network learned from and what the observer was fitted to (\\*)." % (
+                     tables.provenance(results["measured"]), len(results["scenes"]), results["seeds"]),
+                 "Noise of a reference's worst block, as told by the other: %s." % marked(results)):
+        lines += ["", *textwrap.wrap(text, 140, break_long_words=False, break_on_hyphens=False)]
     return "\n".join(lines) + "\n"
 
 
