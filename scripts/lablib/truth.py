@@ -194,7 +194,7 @@ def page(results):
     for text in ("%s; %d scenes, %d seeds. Shares leave out what the shipped network learned from and what the observer was fitted to (\\*)." % (
                      tables.provenance(results["measured"]), len(results["scenes"]), results["seeds"]),
                  "Noise of a reference's worst block, as told by the other: %s." % marked(results)):
-        lines += ["", *textwrap.wrap(text, 140, break_long_words=False, break_on_hyphens=False)]
+        lines += ["", *textwrap.wrap(text, 158, break_long_words=False, break_on_hyphens=False)]
     return "\n".join(lines) + "\n"
 
 
