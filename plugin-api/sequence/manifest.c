@@ -177,13 +177,17 @@ int seq_manifest_parse(const char *path, const char *text, size_t size, struct s
     return rc;
 }
 
+int seq_json_read(const char *dir, char path[4096], char **text, size_t *size, struct base_err *err)
+{
+    int rc = base_file_join(path, dir, "manifest.json", err);
+    return rc ? rc : base_file_read(path, MAX_TEXT, text, size, err);
+}
+
 int seq_manifest_read(const char *dir, struct seq_manifest *m, struct base_err *err)
 {
     char path[4096], *text;
     size_t size;
-    int rc = base_file_join(path, dir, "manifest.json", err);
-    if (!rc)
-        rc = base_file_read(path, MAX_TEXT, &text, &size, err);
+    int rc = seq_json_read(dir, path, &text, &size, err);
     if (rc)
         return rc;
     rc = seq_manifest_parse(path, text, size, m, err);

@@ -142,7 +142,8 @@ int seq_record_parse(const struct seq_source *in, uint32_t index, size_t *at, st
     return rc ? rc : parse_planes(in->path, r->stats + (size_t)r->n_stats * SEQ_STAT_BYTES, r->stats + payload, r, err);
 }
 
-const struct seq_plane *seq_find_plane(const struct seq_record *r, enum seq_plane_number plane)
+/* NULL: the record has no such plane. */
+static const struct seq_plane *find_plane(const struct seq_record *r, enum seq_plane_number plane)
 {
     for (uint32_t i = 0; i < r->n_planes; i++)
         if (r->planes[i].plane == (uint32_t)plane)
@@ -150,7 +151,7 @@ const struct seq_plane *seq_find_plane(const struct seq_record *r, enum seq_plan
     return NULL;
 }
 
-int seq_has(const struct seq_record *r, enum seq_plane_number plane) { return seq_find_plane(r, plane) != NULL; }
+int seq_has(const struct seq_record *r, enum seq_plane_number plane) { return find_plane(r, plane) != NULL; }
 
 double seq_stat(const struct seq_record *r, const char *name)
 {
@@ -163,7 +164,7 @@ double seq_stat(const struct seq_record *r, const char *name)
 
 int seq_inflate(const struct seq_record *r, enum seq_plane_number plane, uint8_t *raw, struct base_err *err)
 {
-    const struct seq_plane *s = seq_find_plane(r, plane);
+    const struct seq_plane *s = find_plane(r, plane);
     if (!s)
         return base_fail(err, BASE_EINVAL, "block %u at %u spp: plane %d is missing", r->block, r->spp, (int)plane);
     uLongf got = s->raw_bytes;

@@ -59,8 +59,6 @@ int seq_source_open(const char *path, const uint8_t *bytes, size_t size, uint32_
 /* Record `index` at *at, which is moved past it. */
 int seq_record_parse(const struct seq_source *in, uint32_t index, size_t *at, struct seq_record *r, struct base_err *err);
 
-/* NULL: the record has no such plane. */
-const struct seq_plane *seq_find_plane(const struct seq_record *r, enum seq_plane_number plane);
 int seq_has(const struct seq_record *r, enum seq_plane_number plane);
 /* NaN when the record does not have the statistic. */
 double seq_stat(const struct seq_record *r, const char *name);

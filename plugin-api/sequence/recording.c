@@ -12,7 +12,7 @@
 #include "base/list.h"
 #include "sequence/manifest_json.h"
 
-enum { MAX_TEXT = 1 << 26, MAX_BLOCKS = 1 << 20, MAX_FILES = 1 << 20, MAX_SPP = INT32_MAX };
+enum { MAX_BLOCKS = 1 << 20, MAX_FILES = 1 << 20, MAX_SPP = INT32_MAX };
 
 /* Names of planes, by number from SEQ_PLANE_COLOR on; of parts. */
 static const char *const plane_names[] = {"color",  "weight",   "spp",           "moment2",       "half",
@@ -178,9 +178,7 @@ int seq_recording_read(const char *dir, struct seq_recording *m, struct base_err
 {
     char path[4096], *text;
     size_t size;
-    int rc = base_file_join(path, dir, "manifest.json", err);
-    if (!rc)
-        rc = base_file_read(path, MAX_TEXT, &text, &size, err);
+    int rc = seq_json_read(dir, path, &text, &size, err);
     if (rc)
         return rc;
     rc = seq_recording_parse(path, text, size, m, err);
